@@ -125,7 +125,7 @@ fn main() {
             let mut folder = Folder::open(&place, false).expect("a folder");
             let table = Table::new(&mechanism, folder.begin(TRAJECTORY).expect("a file")).expect("a header");
             let mut writer = AsyncWriter::new(table);
-            integrate(run(), &mut |sample| writer.write(sample)).expect("a run");
+            integrate(run(), &mut |sample| writer.write(sample).map(drop)).expect("a run");
             folder.keep(writer.finish().expect("written")).expect("kept");
         };
         let program = || {

@@ -50,11 +50,11 @@ def runs():
     told("a callback a row beyond that", [(a - b) / rows for a, b in zip(sorted(seen), sorted(plain))], 1e6, "µs")
 
 
-def interrupted():
+def interrupted(method):
     code = (
         "import signal\nsignal.signal(signal.SIGINT, signal.default_int_handler)\n"
         f"import pydriftless as dl\nscene = dl.load({str(SCENES / 'free.json')!r})\nprint('going', flush=True)\n"
-        "import time\ntry:\n    scene.run(until=1e6, method='taylor', every=10, trust='off', max_evaluations=1e10)\n"
+        f"import time\ntry:\n    scene.run(until=1e6, method={method!r}, every=10, trust='off', max_evaluations=1e10)\n"
         "except KeyboardInterrupt as stop:\n    print(time.time(), len(stop.checkpoint), flush=True)\n"
     )
     import signal
@@ -68,7 +68,7 @@ def interrupted():
         child.send_signal(signal.SIGINT)
         out, _ = child.communicate()
         spent.append(float(out.split()[0]) - sent)
-    told("from Ctrl-C to its exception", spent, 1e3, "ms")
+    told(f"from Ctrl-C to its exception, {method}", spent, 1e3, "ms")
 
 
 def digest(rows):
@@ -118,5 +118,6 @@ def sweeps(with_dask):
 if __name__ == "__main__":
     imports()
     runs()
-    interrupted()
+    for method in ("taylor", "dp8", "dopri5", "dop853", "radau9"):
+        interrupted(method)
     sweeps("--dask" in sys.argv)

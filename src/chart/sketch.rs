@@ -266,7 +266,8 @@ impl Pencil<'_> {
         let bars = pose.arms.iter().copied().chain(pose.bars.iter().copied().enumerate());
         for (k, bar) in bars.filter(|(_, bar)| finite(&bar[..])) {
             let ends = bar.map(|end| self.at(end));
-            let colour = if k % 2 == 0 { ORANGE } else { SKY };
+            // Near the colours of the first two lines in charts of angles.
+            let colour = if k % 2 == 0 { SKY } else { ORANGE };
             self.sheet.line(&ends, &Pen::new(mix(colour, INK, 0.3), 5.6 * size))?;
             self.sheet.line(&ends, &Pen::new(mix(colour, WHITE, 0.55), 3.6 * size))?;
             let [from, to] = ends;

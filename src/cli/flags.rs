@@ -12,7 +12,7 @@ pub use folders::*;
 pub use study::*;
 #[cfg(feature = "charts")]
 use values::window;
-use values::{count, levels, limit, methods, number, positive, preferences, stabilizations, wait};
+use values::{count, levels, limit, methods, number, preferences, stabilizations, wait};
 
 #[cfg(feature = "charts")]
 use super::charts::{ChartFlags, MotionFlags};

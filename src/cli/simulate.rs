@@ -1,5 +1,12 @@
 //! `driftless run`: integrate, and keep what came of it.
 
+#[cfg(feature = "charts")]
+mod pictures;
+#[cfg(not(feature = "charts"))]
+#[path = "simulate/pictureless.rs"]
+mod pictures;
+
+use self::pictures::{Pages, check, draw, overlay};
 use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
 use super::interrupt::{self, CheckpointTimer};
@@ -8,8 +15,6 @@ use super::progress::Progress;
 use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report;
-#[cfg(feature = "charts")]
-use crate::report::view::{Gathering, Viewed};
 use crate::run::async_writer::AsyncWriter;
 use crate::run::files::{RECORD, TRAJECTORY};
 use crate::run::table::Table;
@@ -73,41 +78,6 @@ struct Task<'a> {
     arguments: &'a [String],
 }
 
-/// The page of a run, where one is wanted; its rows are seen as they come, but for those of a run that goes
-/// on, which are read again at its end.
-#[derive(Default)]
-struct Pages {
-    #[cfg(feature = "charts")]
-    gathered: Option<Gathering>,
-}
-
-#[cfg(feature = "charts")]
-impl Pages {
-    fn see(&mut self, sample: &Sample) {
-        if let Some(gathered) = &mut self.gathered {
-            gathered.see(sample);
-        }
-    }
-
-    fn write(self, task: &Task<'_>, folder: &mut Folder) -> Result<(), Failure> {
-        let flags = task.flags;
-        if !flags.html {
-            return Ok(());
-        }
-        let run = Viewed::read(folder.path(), flags.window, self.gathered)?;
-        super::view::write(folder, &[run], &flags.scene.tell)
-    }
-}
-
-#[cfg(not(feature = "charts"))]
-impl Pages {
-    fn see(&mut self, _: &Sample) {}
-
-    fn write(self, _: &Task<'_>, _: &mut Folder) -> Result<(), Failure> {
-        Ok(())
-    }
-}
-
 /// Runs a scene, once for each stabilization given.
 ///
 /// # Errors
@@ -124,8 +94,7 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     }
     let text = read_text(&flags.scene.scene)?;
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
-    #[cfg(feature = "charts")]
-    chosen(&mechanism, flags)?;
+    check(&mechanism, flags)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
     let requests = flags.plan.requests();
     let mut plans: Vec<Plan> =
@@ -198,41 +167,6 @@ fn conclude(scene: &Scene, mechanism: &Mechanism, done: Vec<Done>, flags: &RunFl
 }
 
 impl Task<'_> {
-    /// The window charts show; it has to hold rows.
-    #[cfg(feature = "charts")]
-    fn window(&self, plan: &Plan) -> Result<Option<[f64; 2]>, Failure> {
-        let Some([from, to]) = self.flags.window else { return Ok(None) };
-        let rows = ((to.min(plan.until) / plan.every).floor() - (from / plan.every).ceil() + 1.0).max(0.0);
-        if rows >= 2.0 {
-            return Ok(Some([from, to]));
-        }
-        let hint = if from >= plan.until {
-            format!("the run ends at {} s", plan.until)
-        } else {
-            format!("--every {} gives it 100 rows", report::page::rough((to - from) / 100.0))
-        };
-        let text = format!("--window {from}..{to}: {rows} rows of the trajectory lie in it\nhint: {hint}");
-        Err(Failure::new(Exit::Usage, text))
-    }
-
-    /// None without charts.
-    #[cfg(not(feature = "charts"))]
-    fn window(&self, _: &Plan) -> Result<Option<[f64; 2]>, Failure> {
-        Ok(None)
-    }
-
-    /// The page of a run that begins.
-    #[cfg(feature = "charts")]
-    fn page(&self, plan: &Plan) -> Pages {
-        let gathering = || Gathering::new(self.mechanism, plan.until, plan.every, self.flags.window);
-        Pages { gathered: self.flags.html.then(gathering) }
-    }
-
-    #[cfg(not(feature = "charts"))]
-    fn page(&self, _: &Plan) -> Pages {
-        Pages::default()
-    }
-
     /// Runs one plan in a folder of its own.
     fn run(&self, plan: Plan, folder: &str) -> Result<Done, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
@@ -304,8 +238,7 @@ impl Task<'_> {
         let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {
-                writer.write(sample)?;
-                page.see(sample);
+                page.see(writer.write(sample)?);
                 progress.see(sample.t);
                 Ok(())
             };
@@ -395,72 +328,6 @@ impl Task<'_> {
         folder.write(RECORD, text.as_bytes())?;
         Ok(outcome)
     }
-}
-
-/// The columns to be drawn.
-#[cfg(feature = "charts")]
-fn chosen(mechanism: &Mechanism, flags: &RunFlags) -> Result<report::charts::Columns, Failure> {
-    report::charts::Columns::find(mechanism, &flags.chart)
-        .map_err(|error| Failure::new(Exit::Usage, format!("--chart: {error}")))
-}
-
-#[cfg(feature = "charts")]
-fn draw(
-    scene: &Scene,
-    mechanism: &Mechanism,
-    outcome: &Outcome,
-    folder: &mut Folder,
-    flags: &RunFlags,
-) -> Result<(), Failure> {
-    let tell = &flags.scene.tell;
-    if !flags.charts.no_charts {
-        let wanted = report::charts::wanted(mechanism, outcome);
-        if !wanted.contains(&report::charts::Chart::Angles) {
-            tell.remark("no chart of angles: nothing moves");
-        }
-        for chart in wanted {
-            let picture = report::charts::draw(chart, scene, mechanism, outcome)?;
-            flags.charts.keep(folder, chart.name(), &picture, tell)?;
-        }
-        if !flags.chart.is_empty() {
-            let columns = chosen(mechanism, flags)?;
-            let picture = report::charts::columns(scene, mechanism, outcome, &columns)?;
-            flags.charts.keep(folder, "columns", &picture, tell)?;
-        }
-    }
-    if flags.motion.has_any() {
-        let motion = report::charts::motion(scene, mechanism, outcome);
-        flags.motion.keep(folder, "mechanism", &motion, tell)?;
-    }
-    Ok(())
-}
-
-/// Several runs in one page, and their constraint drift in one chart, beside their folders.
-#[cfg(feature = "charts")]
-fn overlay(scene: &Scene, mechanism: &Mechanism, done: &[Done], flags: &RunFlags) -> Result<(), Failure> {
-    if flags.html && done.len() > 1 {
-        let read = |done: &Done| Viewed::read(done.folder.path(), flags.window, None);
-        let runs = done.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        let mut folder = Folder::shared(&flags.out.join(&scene.name))?;
-        super::view::write(&mut folder, &runs, &flags.scene.tell)?;
-    }
-    let outcomes: Vec<&Outcome> = done.iter().map(|done| &done.outcome).collect();
-    if done.len() < 2 || flags.charts.no_charts || !report::charts::drifts(&outcomes) {
-        return Ok(());
-    }
-    let picture = report::charts::overlay(scene, mechanism, &outcomes)?;
-    let mut folder = Folder::shared(&flags.out.join(&scene.name))?;
-    flags.charts.keep(&mut folder, "constraint_drift", &picture, &flags.scene.tell)
-}
-
-#[cfg(not(feature = "charts"))]
-fn overlay(_: &Scene, _: &Mechanism, _: &[Done], _: &RunFlags) -> Result<(), Failure> {
-    Ok(())
-}
-
-#[cfg(not(feature = "charts"))]
-fn draw(_: &Scene, _: &Mechanism, _: &Outcome, _: &mut Folder, _: &RunFlags) -> Result<(), Failure> {
-    Ok(())
 }
 
 /// Prints the results.

@@ -8,9 +8,10 @@ use std::io::{self, Write};
 /// Most quanta a column may span, 2⁴⁸: differences of third order, their signs folded in, stay whole numbers
 /// in a browser's doubles.
 const SPAN: f64 = (1_u64 << 48) as f64;
-/// Effort of the compression: the default, 6, takes a third more of its time for 1.6 % less.
-const LEVEL: u32 = 4;
-/// Highest order of differences tried.
+/// Effort of the compression: the default, 6, takes nine times as long for 8 % less, 4 three and a half times
+/// for 7 %.
+const LEVEL: u32 = 1;
+/// Orders of differences tried, from none on.
 const ORDERS: usize = 4;
 
 /// A column to be packed.
@@ -47,23 +48,14 @@ pub(super) fn pack(column: &Column, bytes: &mut Vec<u8>) -> Packing {
     let span = if low.is_finite() { high - low } else { 0.0 };
     let floor = (span / SPAN).max(f64::MIN_POSITIVE);
     let quantum = if column.quantum > floor { column.quantum } else { floor };
-    let mut whole: Vec<i64> = (column.values.iter())
+    let whole: Vec<i64> = (column.values.iter())
         .map(|value| if value.is_finite() { ((value - offset) / quantum).round() as i64 + 1 } else { 0 })
         .collect();
-    let mut best = (0, cost(&whole), whole.clone());
-    for order in 1..ORDERS {
-        // From the end on, so that each difference finds its predecessor as it was.
-        for k in (1..whole.len()).rev() {
-            whole[k] -= whole[k - 1];
-        }
-        let cost = cost(&whole);
-        if cost < best.1 {
-            best = (order, cost, whole.clone());
-        }
-    }
-    let (order, _, differences) = best;
+    let order = best_order(&whole);
+    let mut last = [0; ORDERS];
     // Small numbers of either sign become small numbers.
-    let codes: Vec<u64> = differences.iter().map(|&d| ((d << 1) ^ (d >> 63)) as u64).collect();
+    let folded = |d: i64| ((d << 1) ^ (d >> 63)) as u64;
+    let codes: Vec<u64> = whole.iter().map(|&n| folded(differences(n, &mut last)[order])).collect();
     let most = codes.iter().copied().max().unwrap_or(0);
     let planes = (64 - most.leading_zeros()).div_ceil(8) as usize;
     for plane in 0..planes {
@@ -72,9 +64,26 @@ pub(super) fn pack(column: &Column, bytes: &mut Vec<u8>) -> Packing {
     Packing { offset, quantum, order, planes }
 }
 
-/// Bits the numbers take, roughly.
-fn cost(numbers: &[i64]) -> u64 {
-    numbers.iter().map(|number| u64::from(64 - number.unsigned_abs().leading_zeros())).sum()
+/// The next differences of every order, the number itself the zeroth; before the first number stand zeros.
+#[inline]
+fn differences(number: i64, last: &mut [i64; ORDERS]) -> [i64; ORDERS] {
+    let mut next = [number; ORDERS];
+    for order in 1..ORDERS {
+        next[order] = next[order - 1] - last[order - 1];
+    }
+    *last = next;
+    next
+}
+
+/// The order whose differences take the fewest bits, roughly.
+fn best_order(whole: &[i64]) -> usize {
+    let (mut last, mut bits) = ([0; ORDERS], [0_u64; ORDERS]);
+    for &number in whole {
+        for (bits, difference) in bits.iter_mut().zip(differences(number, &mut last)) {
+            *bits += u64::from(64 - difference.unsigned_abs().leading_zeros());
+        }
+    }
+    (0..ORDERS).min_by_key(|&order| bits[order]).unwrap_or_default()
 }
 
 /// Deflated, with the header that browsers ask for.

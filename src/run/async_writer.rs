@@ -26,6 +26,8 @@ pub struct AsyncWriter<W: Write + Send + 'static> {
     away: Option<Away<W>>,
     /// Rows to hand over.
     numbers: Vec<f64>,
+    /// Where the last of them begins.
+    last: usize,
     shown: Shown,
 }
 
@@ -68,16 +70,20 @@ impl<W: Write + Send + 'static> Away<W> {
 impl<W: Write + Send + 'static> AsyncWriter<W> {
     /// Goes on with a table.
     pub fn new(table: Table<W>) -> Self {
-        Self { shown: table.shown(), table: Some(table), away: None, numbers: Vec::new() }
+        Self { shown: table.shown(), table: Some(table), away: None, numbers: Vec::new(), last: 0 }
     }
 
-    /// Writes a row, sooner or later.
+    /// Writes a row, sooner or later; its numbers, in the order of the header.
     ///
     /// # Errors
     /// What the writer said of earlier rows.
-    pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
+    pub fn write(&mut self, sample: &Sample) -> io::Result<&[f64]> {
+        if self.numbers.len() >= BATCH {
+            self.hand_over()?;
+        }
+        self.last = self.numbers.len();
         self.shown.append(sample, &mut self.numbers);
-        if self.numbers.len() < BATCH { Ok(()) } else { self.hand_over() }
+        Ok(&self.numbers[self.last..])
     }
 
     /// The table with every row in it; it is written here until many more have come.
@@ -133,6 +139,7 @@ impl<W: Write + Send + 'static> Drop for AsyncWriter<W> {
 mod tests {
     use super::*;
     use crate::dynamics::Mechanism;
+    use crate::run::table::header;
     use crate::scene::read_scene;
     use std::sync::{Arc, Mutex};
 
@@ -164,7 +171,8 @@ mod tests {
             let mut writer = AsyncWriter::new(Table::new(&mechanism, Vec::new()).expect("a header"));
             for i in 0..rows {
                 table.write(&sample(i)).expect("room");
-                writer.write(&sample(i)).expect("room");
+                let row = writer.write(&sample(i)).expect("room");
+                assert_eq!((row[0], row.len()), (sample(i).t, header(&mechanism).len()));
                 if i == rows / 3 {
                     let length = |table: &mut Table<Vec<u8>>| table.written().expect("room").len();
                     assert_eq!(length(writer.table().expect("room")), length(&mut table));

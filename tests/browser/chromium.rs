@@ -147,16 +147,23 @@ impl Tab<'_> {
         self.browser.call(Some(&session), method, parameters)
     }
 
-    /// Opens a file and waits until its page says that it is ready; returns when that was, in ms after it
+    /// Opens a file and waits until all of its page is there; returns when what is in view was, in ms after it
     /// began.
     pub fn open(&mut self, file: &Path, hash: &str) -> f64 {
         let address = format!("file://{}{hash}", file.canonicalize().expect("a file").display());
         self.call("Page.navigate", json!({"url": address}));
         let begin = Instant::now();
+        // One question that the page answers when it is there: many would hold it up.
+        const READY: &str = "location.protocol !== 'file:' || !document.documentElement ? '' : new Promise((done) => { \
+             const { dataset } = document.documentElement; \
+             const look = () => { \
+               const trouble = document.getElementById('trouble'); \
+               if (dataset.complete) done(dataset.ready); \
+               else if (trouble && !trouble.hidden) done('trouble: ' + trouble.textContent); \
+               else setTimeout(look, 20); \
+             }; look(); })";
         loop {
-            let told = self.eval(
-                "location.protocol === 'file:' ? (document.documentElement?.dataset.ready || (document.getElementById('trouble')?.hidden === false ? 'trouble: ' + document.getElementById('trouble').textContent : '')) : ''",
-            );
+            let told = self.eval(READY);
             let told = told.as_str().expect("words").to_owned();
             assert!(!told.starts_with("trouble"), "{}: {told}", file.display());
             if let Ok(ready) = told.parse() {

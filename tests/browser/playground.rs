@@ -2,7 +2,11 @@
 
 use crate::chromium::{Browser, Tab};
 use crate::{DESK, page, row, scene};
+use driftless::{Limits, Mechanism, Plan, Request, Run, Running, Sample, read_scene};
+use std::cell::Cell;
 use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
 
 #[test]
 fn the_playground_integrates_what_is_edited_and_dragged() {
@@ -50,4 +54,53 @@ fn the_playground_integrates_what_is_edited_and_dragged() {
     let message = tab.eval("document.getElementById('message').textContent");
     assert!(message.as_str().expect("words").contains("nmae"), "{message}");
     assert!(tab.complaints().is_empty());
+}
+
+/// Seconds the library takes for so many rows, as the playground asks for them.
+fn native(name: &str, rows: u32) -> f64 {
+    let scene = read_scene(scene(name).as_ref(), &[]).expect("a scene");
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let request = Request { until: Some(3600.0), every: Some(1.0 / 64.0), ..Request::default() };
+    let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
+    let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(&scene));
+    let mut running = Running::new(run.expect("a run"));
+    let seen = Cell::new(0);
+    let begin = Instant::now();
+    let mut observer = |_: &Sample| {
+        seen.set(seen.get() + 1);
+        Ok(())
+    };
+    assert!(!running.go(&mut observer, &mut || seen.get() >= rows).expect("a motion"));
+    begin.elapsed().as_secs_f64()
+}
+
+#[test]
+#[ignore = "prints figures"]
+fn figures() {
+    const ROWS: u32 = 64 * 60;
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/playground/index.html");
+    assert!(file.is_file(), "`.ci/playground fetch` builds it");
+    let mut browser = Browser::start().expect("a browser");
+    let mut tab = browser.tab(DESK);
+    tab.open(&file, "");
+    tab.eval("driftless.play(false)");
+    for name in ["free", "motor", "spring", "four_bars", "chain8", "wall"] {
+        let text = std::fs::read_to_string(scene(name)).expect("a scene");
+        let inside = format!(
+            "(() => {{ driftless.core.read({}); const begin = performance.now(); driftless.core.advance({ROWS}); return 1e-3 * (performance.now() - begin); }})()",
+            serde_json::json!(text)
+        );
+        // In turn, so that other load hits both; the least of nine.
+        let mut least = [f64::INFINITY; 2];
+        for _ in 0..9 {
+            least = [least[0].min(tab.number(&inside)), least[1].min(native(name, ROWS))];
+        }
+        let [page, program] = least;
+        println!(
+            "{name}: 60 s in {:.1} ms in the page, {:.1} ms in the library, {:.1} times as long",
+            1e3 * page,
+            1e3 * program,
+            page / program
+        );
+    }
 }

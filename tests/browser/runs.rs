@@ -120,7 +120,7 @@ fn a_run_lies_beside_its_reference() {
     tab.open(&page, "#t=4");
     assert_eq!(tab.eval("driftless.runs.map((run) => run.label)[1]"), "reference");
     let apart = tab.number(
-        "10 ** driftless.charts.find((chart) => chart.title.startsWith('Distance')).lines[0].values.at(-1)",
+        "10 ** driftless.charts.find((chart) => chart.title.startsWith('Distance')).lines()[0].values.at(-1)",
     );
     // What the run says of its own error is about the distance of its worse bar from the reference.
     let record = std::fs::read_to_string(run.with_file_name("run.json")).expect("a record");

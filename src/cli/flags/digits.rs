@@ -1,6 +1,7 @@
 //! Options of runs in many digits.
 
-use super::{number, positive};
+use super::number;
+use super::values::positive;
 use clap::Args;
 
 /// How many digits a run carries.

@@ -18,33 +18,51 @@ function make(tag, attributes = {}, ...children) {
 
 // ---------------------------------------------------------------------------------------------- numbers
 
-/** The bytes of the packed columns. */
-async function inflated(text) {
+/** Bytes from base64; older browsers have no function for it. */
+function decoded(text) {
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
   const letters = atob(text);
   const bytes = new Uint8Array(letters.length);
   for (let k = 0; k < letters.length; k++) bytes[k] = letters.charCodeAt(k);
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return bytes;
+}
+
+/** The bytes of the packed columns. */
+async function inflated(text) {
+  const stream = new Blob([decoded(text)]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 /** A column as numbers: bytes in planes, signs folded in, differences summed up; 0 stands for a missing one. */
 function unpacked(column, rows, bytes) {
   const numbers = new Float64Array(rows);
-  for (let plane = 0, weight = 1; plane < column.planes; plane++, weight *= 256) {
-    const begin = column.begin + plane * rows;
-    for (let k = 0; k < rows; k++) numbers[k] += weight * bytes[begin + k];
-  }
+  const { begin, planes, order, offset, quantum } = column;
+  let first = 0, second = 0, third = 0;
   for (let k = 0; k < rows; k++) {
-    const code = numbers[k];
-    numbers[k] = code % 2 === 1 ? -(code + 1) / 2 : code / 2;
-  }
-  for (let order = 0; order < column.order; order++) {
-    for (let k = 1; k < rows; k++) numbers[k] += numbers[k - 1];
-  }
-  for (let k = 0; k < rows; k++) {
-    numbers[k] = numbers[k] === 0 ? NaN : column.offset + column.quantum * (numbers[k] - 1);
+    let code = 0;
+    for (let plane = planes - 1; plane >= 0; plane--) code = code * 256 + bytes[begin + plane * rows + k];
+    let number = code % 2 === 1 ? -(code + 1) / 2 : code / 2;
+    if (order > 2) number = third += number;
+    if (order > 1) number = second += number;
+    if (order > 0) number = first += number;
+    numbers[k] = number === 0 ? NaN : offset + quantum * (number - 1);
   }
   return numbers;
+}
+
+/** The columns of a table, each unpacked when it is first asked for. */
+function unpackedLater({ columns, rows }, bytes) {
+  const values = [];
+  columns.forEach((column, k) => Object.defineProperty(values, k, {
+    configurable: true,
+    enumerable: true,
+    get() {
+      const value = unpacked(column, rows, bytes);
+      Object.defineProperty(values, k, { value, enumerable: true });
+      return value;
+    },
+  }));
+  return values;
 }
 
 /** How many digits a number of this quantum has behind the point. */
@@ -388,7 +406,8 @@ class Stage {
     for (const slider of geometry.sliders) this.slider(slider, pose);
     const bar = (body, ends) => {
       const [from, to] = barEnds(body, ends, pose).map((end) => this.at(end));
-      const colour = tint || (body % 2 ? "#56b4e9" : "#e69f00");
+      // Near the colours of the first two lines in charts.
+      const colour = tint || (body % 2 ? "#e69f00" : "#56b4e9");
       this.line([from, to], colours.ink, 7.5 * size);
       this.line([from, to], colour, 5.5 * size);
     };
@@ -469,7 +488,7 @@ function gapped(numbers) {
   return numbers.some(Number.isNaN) ? Array.from(numbers, (number) => (Number.isNaN(number) ? null : number)) : numbers;
 }
 
-/** One chart; `lines` are `{label, column, values, times, colour, width, dash}`. */
+/** One chart; `lines()` are `{label, column, values, times, colour, width, dash}`. It is empty until it is drawn. */
 class Chart {
   constructor(page, home, title, lines) {
     this.page = page;
@@ -478,35 +497,57 @@ class Chart {
     this.heading = make("h3", { text: title });
     this.body = make("div");
     this.element.append(this.heading, this.body);
+    this.body.style.minHeight = `${this.height()}px`;
     home.append(this.element);
-    this.show(lines);
+    this.lines = lines;
+    this.plot = null;
   }
 
-  /** Draws these lines in place of those before. */
-  show(lines) {
-    if (this.plot) this.plot.destroy();
-    this.lines = lines;
+  /** Whether any of it can be seen without scrolling. */
+  isInView() {
+    const { top, bottom } = this.element.getBoundingClientRect();
+    return top < window.innerHeight && bottom > 0;
+  }
+
+  /** Draws it, over the part of the time that all charts show. */
+  draw() {
+    this.clear();
+    const lines = this.lines();
     const same = lines.every((line) => line.times === lines[0].times);
     this.data = same
       ? [lines[0].times, ...lines.map((line) => gapped(line.values))]
       : uPlot.join(lines.map((line) => [line.times, gapped(line.values)]));
-    this.plot = new uPlot(this.options(), this.data, this.body);
+    this.plot = new uPlot(this.options(lines), this.data, this.body);
     this.now = make("div", { class: "now" });
     this.plot.over.append(this.now);
     this.listen();
   }
 
-  options() {
+  clear() {
+    if (this.plot) this.plot.destroy();
+    this.plot = null;
+  }
+
+  /** Shows this part of the time. */
+  zoom(range) {
+    if (this.plot) this.plot.setScale("x", range);
+  }
+
+  height() {
+    return window.innerWidth < 900 ? 170 : 200;
+  }
+
+  options(lines) {
     const colours = palette();
-    const { page, lines } = this;
+    const { page } = this;
     const isLog = lines.length > 0 && lines[0].column.log;
     const axis = { stroke: colours.grey, grid: { stroke: colours.grid, width: 1 }, ticks: { stroke: colours.grid, width: 1 }, font: "11px system-ui, sans-serif" };
     return {
       width: this.width(),
-      height: window.innerWidth < 900 ? 170 : 200,
+      height: this.height(),
       cursor: { sync: { key: "time" }, drag: { x: true, y: false }, points: { size: 6 } },
       legend: { live: true },
-      scales: { x: { time: false }, y: { range: (_, low, high) => padded(low, high, isLog) } },
+      scales: { x: { time: false, ...page.range }, y: { range: (_, low, high) => padded(low, high, isLog) } },
       axes: [
         { ...axis, size: 32, values: (_, splits) => splits.map((t) => `${Number(t.toPrecision(6))} s`) },
         { ...axis, size: 62, ...(isLog ? { incrs: [1, 2, 3, 5, 10, 20, 50, 100], values: (_, splits) => splits.map(tenTo) } : { values: (_, splits) => splits.map((y) => tick(y, splits)) }) },
@@ -577,6 +618,7 @@ class Chart {
   /** Puts the mark of the time where it belongs, and with `values` what the lines are there. */
   tell(t, values) {
     const { plot, now } = this;
+    if (!plot) return;
     const x = plot.valToPos(t, "x");
     const isSeen = x >= 0 && x <= plot.over.clientWidth;
     now.style.display = isSeen ? "" : "none";
@@ -613,7 +655,7 @@ const CALM = 15;
 
 /** A run, its columns unpacked. */
 function opened(run, table, bytes) {
-  const values = table.columns.map((column) => unpacked(column, table.rows, bytes));
+  const values = unpackedLater(table, bytes);
   const whole = { ...run, columns: table.columns, values, t: values[0] };
   whole.motion = new Motion(whole);
   const [begin, end] = whole.exact;
@@ -659,10 +701,12 @@ class Page {
     byId("main").hidden = false;
     this.stage = new Stage(byId("mechanism"), runs);
     this.legend();
-    this.charts.forEach((chart) => chart.plot.destroy());
+    this.charts.forEach((chart) => chart.clear());
     this.charts = [];
+    this.range = { min: main.t[0], max: Math.max(...runs.map((run) => run.t[run.t.length - 1])) };
     byId("charts").replaceChildren();
     this.makeCharts();
+    this.isComplete = this.drawCharts();
     this.words();
     byId("scrub").max = String(main.t.length - 1);
     // Slow enough to be seen, also where a run is over in a moment.
@@ -735,15 +779,31 @@ class Page {
         charts.set(name, known);
       }
     }
-    for (const [title, columns] of charts) this.charts.push(new Chart(this, home, title, this.lines(columns)));
+    for (const [title, columns] of charts) this.charts.push(new Chart(this, home, title, () => this.lines(columns)));
     this.distance(home);
     this.chooser(home);
+  }
+
+  /** Draws the charts in view at once, the others when there is time. */
+  async drawCharts() {
+    const { charts } = this;
+    const inView = charts.map((chart) => chart.isInView());
+    for (const [k, chart] of charts.entries()) if (inView[k]) chart.draw();
+    for (const [k, chart] of charts.entries()) {
+      if (inView[k]) continue;
+      await new Promise((resume) => setTimeout(resume));
+      // Another run may have taken the place of this one, or the theme changed.
+      if (this.charts !== charts) return;
+      if (!chart.plot) chart.draw();
+    }
+    this.schedule();
   }
 
   /** How far the other runs are from the first. */
   distance(home) {
     const { main } = this;
-    const lines = main.distances.flatMap((index, k) => (index === null ? [] : [{
+    const others = main.distances.map((index, k) => [index, k]).filter(([index]) => index !== null);
+    const lines = () => others.map(([index, k]) => ({
       label: `(${k + 2})`,
       column: main.columns[index],
       values: main.values[index],
@@ -751,8 +811,8 @@ class Page {
       colour: () => seriesColour(k + 1),
       width: 1.3 + 0.9 * Math.min(3, this.runs.length - 2 - k),
       dash: [],
-    }]));
-    if (lines.length) this.charts.push(new Chart(this, home, "Distance from the first run [m]", lines));
+    }));
+    if (others.length) this.charts.push(new Chart(this, home, "Distance from the first run [m]", lines));
   }
 
   /** A chart of any column. */
@@ -760,12 +820,11 @@ class Page {
     const { main } = this;
     const options = main.columns.map((column, k) => [labelled(column), k]).filter(([, k]) => k > 0 && k < main.shown);
     const select = make("select", { "aria-label": "Column" }, ...options.map(([text, k]) => make("option", { value: String(k), text })));
-    const first = main.poses.length ? main.poses[0][1] : 1;
-    select.value = String(first);
-    const chart = new Chart(this, home, "Column ", this.lines([main.columns[first]]));
+    select.value = String(main.poses.length ? main.poses[0][1] : 1);
+    const chart = new Chart(this, home, "Column ", () => this.lines([main.columns[Number(select.value)]]));
     chart.heading.append(select);
     select.addEventListener("change", () => {
-      chart.show(this.lines([main.columns[Number(select.value)]]));
+      chart.draw();
       this.schedule();
     });
     this.charts.push(chart);
@@ -776,7 +835,8 @@ class Page {
     if (this.isZooming) return;
     this.isZooming = true;
     const { min, max } = plot.scales.x;
-    for (const other of this.charts) if (other !== chart) other.plot.setScale("x", { min, max });
+    this.range = { min, max };
+    for (const other of this.charts) if (other !== chart) other.zoom(this.range);
     this.isZooming = false;
     this.schedule();
   }
@@ -792,7 +852,9 @@ class Page {
       for (const note of run.notes || []) list.append(make("dt", { text: "note" }), make("dd", { text: note }));
       home.append(list, copied(run.command));
       if (!run.record) continue;
-      const record = make("details", {}, make("summary", { text: "run.json" }), make("pre", { text: JSON.stringify(run.record, null, 2) }));
+      const text = make("pre");
+      const record = make("details", {}, make("summary", { text: "run.json" }), text);
+      record.addEventListener("toggle", () => (text.textContent = JSON.stringify(run.record, null, 2)), { once: true });
       home.append(record);
     }
   }
@@ -814,7 +876,7 @@ class Page {
 
   theme(dark) {
     document.documentElement.classList.toggle("dark", dark);
-    for (const chart of this.charts) chart.show(chart.lines);
+    for (const chart of this.charts) chart.draw();
     this.legend();
     this.resize();
   }
@@ -888,7 +950,7 @@ class Page {
   }
 
   resize() {
-    for (const chart of this.charts) chart.plot.setSize({ width: chart.width(), height: chart.plot.height });
+    for (const chart of this.charts) if (chart.plot) chart.plot.setSize({ width: chart.width(), height: chart.plot.height });
     this.stage.resize();
     this.schedule();
   }
@@ -1534,26 +1596,30 @@ class SweepPage {
 // ---------------------------------------------------------------------------------------------- start
 
 async function start() {
-  const told = JSON.parse(byId("data").textContent);
+  const data = JSON.parse(byId("data").textContent);
   const bytes = await inflated(byId("numbers").textContent);
   document.documentElement.classList.toggle("dark", matchMedia("(prefers-color-scheme: dark)").matches);
   const pages = {
     // Another script's, where the page has it.
     playground: async () => {
-      const page = new Playground(told, bytes);
+      const page = new Playground(data, bytes);
       await page.ready;
       return page;
     },
-    compare: () => new ComparePage(told),
-    sweep: () => new SweepPage(told, bytes),
+    compare: () => new ComparePage(data),
+    sweep: () => new SweepPage(data, bytes),
     runs: () => {
       const page = new Page();
-      page.open(told.runs.map((run, k) => opened(run, told.tables[k], bytes)));
+      page.open(data.runs.map((run, k) => opened(run, data.tables[k], bytes)));
       return page;
     },
   };
-  window.driftless = await pages[told.kind]();
-  document.documentElement.dataset.ready = String(Math.round(performance.now()));
+  window.driftless = await pages[data.kind]();
+  const told = (word) => (document.documentElement.dataset[word] = String(Math.round(performance.now())));
+  // What is in view is there; the rest follows.
+  told("ready");
+  await window.driftless.isComplete;
+  told("complete");
 }
 
 start().catch((error) => {

@@ -70,11 +70,16 @@ impl Gathering {
         Self { numbers: table::Shown::new(mechanism), row: Vec::new(), thinning }
     }
 
-    /// Sees a row.
+    /// Sees the row of a sample.
     pub fn see(&mut self, sample: &Sample) {
         self.row.clear();
         self.numbers.append(sample, &mut self.row);
         self.thinning.push(&self.row);
+    }
+
+    /// Sees a row of the table.
+    pub fn push(&mut self, row: &[f64]) {
+        self.thinning.push(row);
     }
 }
 

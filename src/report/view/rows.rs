@@ -42,12 +42,35 @@ pub(super) struct Thinning {
     /// Rows of the window that may be kept.
     most: usize,
     kept: Kept,
-    /// Of the stretch under way: rows seen, its first row and one of its middle, and the smallest and largest
-    /// number of each column with the number of its row.
+    /// Of the stretch under way: rows seen, its first row and one of its middle, and what is extreme in each
+    /// column.
     seen: u64,
     first: Vec<f64>,
     middle: Vec<f64>,
-    extremes: Vec<[(f64, u64); 2]>,
+    extremes: Vec<Extremes>,
+}
+
+/// The smallest and the largest number of a stretch, each with the number of its row.
+#[derive(Clone, Copy, Debug)]
+struct Extremes {
+    low: (f64, u64),
+    high: (f64, u64),
+}
+
+impl Extremes {
+    /// Of nothing.
+    const NONE: Self = Self { low: (f64::INFINITY, 0), high: (f64::NEG_INFINITY, 0) };
+
+    /// Sees a number; one that is none changes nothing.
+    #[inline]
+    fn see(&mut self, value: f64, row: u64) {
+        if value < self.low.0 {
+            self.low = (value, row);
+        }
+        if value > self.high.0 {
+            self.high = (value, row);
+        }
+    }
 }
 
 impl Thinning {
@@ -70,7 +93,7 @@ impl Thinning {
             seen: 0,
             first: Vec::new(),
             middle: Vec::new(),
-            extremes: vec![NONE; count],
+            extremes: vec![Extremes::NONE; count],
         }
     }
 
@@ -98,18 +121,12 @@ impl Thinning {
             row.clone_into(&mut self.middle);
         }
         for (extremes, &(source, treatment)) in self.extremes.iter_mut().zip(&self.treatments) {
-            // Logarithms are taken of the extremes alone.
-            let value = match treatment {
-                Treatment::Row => continue,
-                Treatment::Logarithm if row[source] == 0.0 => continue,
-                Treatment::Logarithm => row[source].abs(),
-                Treatment::Extremes => row[source],
-            };
-            if value < extremes[0].0 {
-                extremes[0] = (value, self.seen);
-            }
-            if value > extremes[1].0 {
-                extremes[1] = (value, self.seen);
+            match treatment {
+                Treatment::Row => {}
+                // Logarithms are taken of the extremes alone.
+                Treatment::Logarithm if row[source] == 0.0 => {}
+                Treatment::Logarithm => extremes.see(row[source].abs(), self.seen),
+                Treatment::Extremes => extremes.see(row[source], self.seen),
             }
         }
         self.seen += 1;
@@ -128,7 +145,7 @@ impl Thinning {
         for ((column, &(source, treatment)), extremes) in
             self.kept.columns.iter_mut().zip(&self.treatments).zip(&mut self.extremes)
         {
-            let [low, high] = *extremes;
+            let Extremes { low, high } = *extremes;
             let pair = if low.1 <= high.1 { [low.0, high.0] } else { [high.0, low.0] };
             let is_missing = low.0 > high.0;
             column.extend((0..count).map(|k| match treatment {
@@ -136,7 +153,7 @@ impl Thinning {
                 _ if is_missing => f64::NAN,
                 _ => treated(pair[k], treatment),
             }));
-            *extremes = NONE;
+            *extremes = Extremes::NONE;
         }
         self.seen = 0;
     }
@@ -151,9 +168,6 @@ impl Thinning {
         self.kept
     }
 }
-
-/// The extremes of nothing.
-const NONE: [(f64, u64); 2] = [(f64::INFINITY, 0), (f64::NEG_INFINITY, 0)];
 
 fn treated(value: f64, treatment: Treatment) -> f64 {
     match treatment {
