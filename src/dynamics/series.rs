@@ -29,6 +29,7 @@ mod bodywise;
 mod coefficient;
 mod doubles;
 mod drive;
+mod factors;
 #[cfg(feature = "digits")]
 mod long;
 pub mod polynomial;
@@ -41,6 +42,7 @@ use self::action::ActionSeries;
 use self::bodywise::Bodywise;
 pub use self::coefficient::{Coefficient, Constants, SeriesNumber, Terms};
 pub use self::drive::powers;
+use self::factors::{Factors, Scale};
 use self::polynomial::{Fractions, UNROLLED, convolve, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
@@ -99,6 +101,8 @@ pub struct Series<T: SeriesNumber> {
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
     /// then.
     bodywise: Option<Box<Bodywise<T>>>,
+    /// The bodies' series as factors, where numbers are long.
+    factors: Factors<T>,
     /// Limbs that powers of the rates are kept to; none where numbers have none.
     limbs: Vec<usize>,
 }
@@ -147,6 +151,7 @@ impl<T: SeriesNumber> Series<T> {
             pivot: matrix(f.max(n)),
             solution: zeros(f),
             bodywise,
+            factors: Factors::new(mechanism.bodies.len(), partition.driven(), order),
             limbs: Vec::new(),
             partition,
         }
@@ -155,6 +160,18 @@ impl<T: SeriesNumber> Series<T> {
     /// Keeps coefficients of long numbers to so many limbs each, power by power of the rates.
     pub fn keep(&mut self, limbs: Vec<usize>) {
         self.limbs = limbs;
+    }
+
+    /// Scales products of long numbers.
+    pub fn rescale(&mut self, scale: Scale<T>) {
+        self.factors.scale = scale;
+    }
+
+    /// False where powers grow by more than scaled products are made for.
+    pub fn is_sound(&self) -> bool {
+        self.factors.are_sound()
+            && self.springs.iter().all(SpringSeries::is_sound)
+            && self.actions.iter().all(ActionSeries::is_sound)
     }
 
     /// Highest power of the rates.
@@ -268,6 +285,9 @@ impl<T: SeriesNumber> Series<T> {
         if let Some(bodywise) = &mut self.bodywise {
             bodywise.begin(&self.omega[..(first + 1) * n], &self.rest[..first * n]);
         }
+        if T::IS_LONG {
+            self.factors.begin(n, &self.z, &self.omega, &self.drive);
+        }
         for m in first..self.order {
             if N == 0 && self.bodywise.is_some() {
                 self.advance_bodywise(terms, m);
@@ -316,12 +336,9 @@ impl<T: SeriesNumber> Series<T> {
         let factor = T::of((m + 1) as f64);
         bend[angles..].fill(Complex::ZERO);
         if T::IS_LONG {
+            let Factors { scale, z, omega, .. } = &self.factors;
             for i in 0..angles {
-                let pairs = || omega[i..].iter().step_by(n).zip(z[i..].iter().step_by(n).rev());
-                let sum = Complex::new(
-                    T::sum_of_products(pairs().map(|(w, z)| (w, &z.re))),
-                    T::sum_of_products(pairs().map(|(w, z)| (w, &z.im))),
-                );
+                let sum = z[i].times(&omega[i], scale, m + 1, 1..=m + 1);
                 (turned[i], bend[i]) = (sum, sum.left().times(factor));
             }
             return;
@@ -361,12 +378,11 @@ impl<T: SeriesNumber> Series<T> {
             load[x + 1] -= rest[x].im;
         }
         if T::IS_LONG {
+            // Of l = 0 only, R is not complete yet.
+            let Factors { scale, z: factors, rest: known, .. } = &self.factors;
             for k in 0..angles {
-                let before =
-                    || before[k.min(before.len())..].iter().step_by(n).chain(std::iter::once(&rest[k]));
-                let pairs = || z[k..].iter().step_by(n).rev().zip(before());
-                load[k] -= T::sum_of_products(pairs().map(|(z, rest)| (&z.re, &rest.im)));
-                load[k] += T::sum_of_products(pairs().map(|(z, rest)| (&z.im, &rest.re)));
+                let sum = factors[k].cross(&known[k], scale, m, 1..=m);
+                load[k] -= sum + z[k].cross(rest[k]);
             }
             return;
         }
@@ -397,7 +413,7 @@ impl<T: SeriesNumber> Series<T> {
         let n = self.elements;
         let rest = &mut self.rest[m * n..(m + 1) * n];
         for (spring, series) in terms.springs.iter().zip(&mut self.springs) {
-            let force = series.force(spring, m, &self.z, n);
+            let force = series.force(spring, m, &self.z, n, &self.factors.scale);
             spring.span.spread(force, |k, force| rest[k] -= force);
         }
         if !terms.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
@@ -407,7 +423,7 @@ impl<T: SeriesNumber> Series<T> {
                 torsion.pull(action::twist(torsion, m, &self.phi, &self.omega, n), applied);
             }
             for (action, series) in terms.actions.iter().zip(&mut self.actions) {
-                series.act(action, m, &self.z, n, rest, applied);
+                series.act(action, m, &self.z, n, (rest, applied), &self.factors.scale);
             }
             let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
             for (force, series) in terms.forces.iter().zip(&mut self.forces) {
@@ -475,6 +491,9 @@ impl<T: SeriesNumber> Series<T> {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
         mass_terms::<T, N>(terms.tree, &self.bend, rest);
+        if T::IS_LONG {
+            self.factors.push(newest, omega, rest);
+        }
     }
 }
 

@@ -15,6 +15,7 @@
 mod convolution;
 mod decimal;
 mod elementary;
+mod factor;
 mod operators;
 mod quotient;
 
@@ -24,6 +25,7 @@ use std::cmp::Ordering;
 pub use self::convolution::sum_of_products;
 pub use self::decimal::{Layout, decimal_places, limbs_for};
 pub use self::elementary::pi;
+pub use self::factor::{Factor, Scale};
 
 /// Exponents beyond this many limbs count as infinite.
 const FARTHEST: i32 = 1 << 28;

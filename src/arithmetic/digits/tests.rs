@@ -7,7 +7,9 @@ use proptest::prelude::*;
 
 type Number = Digits<8>;
 /// Limbs behind the point that integers of the check count in.
-const PLACES: i32 = 40;
+const PLACES: i32 = 60;
+/// Powers of series.
+const ORDER: usize = 20;
 
 /// x 2^(64 PLACES), cut off.
 fn integer<const W: usize>(x: &Digits<W>) -> BigInt {
@@ -82,6 +84,42 @@ proptest! {
         // Of every term as much as of a single product.
         let off = BigInt::from((integer(&found) - exact).magnitude().clone());
         prop_assert!(off << (64 * (limbs - 1)) <= size * 10 + 10, "{found:?}");
+    }
+
+    /// In a step of 2^step s a product is off by 2^-bits of the largest powers, on the unit of time, at most.
+    #[test]
+    fn scaled_products_are_those_of_integers(
+        numbers in prop::collection::vec((number(), number()), ORDER + 1),
+        radius in -70.0..3.0_f64,
+        bits in 60..400_usize,
+        first in 0..3_usize,
+    ) {
+        let step = radius - 2.5;
+        let scale = Scale::new(radius, step, ORDER, bits);
+        let falling = |m: usize, x: &Number| {
+            let x = Number { exponent: 0, ..*x };
+            x.ldexp(-libm::floor(radius * m as f64) as i32)
+        };
+        let mut factors = [Factor::new(ORDER), Factor::new(ORDER)];
+        let mut powers = [Vec::new(), Vec::new()];
+        let mut largest = f64::NEG_INFINITY;
+        factors.iter_mut().for_each(|factor| factor.restart(&scale));
+        for (m, (a, b)) in numbers.iter().enumerate() {
+            for ((factor, powers), x) in factors.iter_mut().zip(&mut powers).zip([a, b]) {
+                let x = falling(m, x);
+                largest = largest.max(x.log2() + m as f64 * libm::floor(radius - 0.1));
+                factor.push(&scale, x);
+                powers.push(x);
+            }
+        }
+        let [a, b] = &powers;
+        for total in first..=ORDER {
+            let found = factors[0].product(&factors[1], &scale, total, first..=total);
+            let exact: BigInt = (first..=total).map(|j| integer(&a[j]) * integer(&b[total - j]) >> (64 * PLACES)).sum();
+            let off = (integer(&found) - &exact).bits() as f64 - 64.0 * f64::from(PLACES) + total as f64 * step;
+            let allowed = 2.0 * largest.max(0.0) - bits as f64;
+            prop_assert!(off <= allowed || (integer(&found) - exact).bits() < 8, "{total}: 2^{off} > 2^{allowed}");
+        }
     }
 
     #[test]

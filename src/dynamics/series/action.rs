@@ -6,14 +6,15 @@
 //! ```
 
 use super::coefficient::SeriesNumber;
-use super::polynomial::{copy, copy_vectors, product_of_numbers, product_of_vectors, zeros};
-use crate::arithmetic::{Complex, Real};
+use super::factors::{CauchyFactor, Scale, VectorFactor};
+use super::polynomial::{copy, copy_vectors, product, zeros};
+use crate::arithmetic::Complex;
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::force::{Action, Torsion};
 
 /// Series of one applied force or torque, powers 0 to P.
 #[derive(Clone, Debug)]
-pub struct ActionSeries<T> {
+pub struct ActionSeries<T: SeriesNumber> {
     /// s.
     factor: Vec<T>,
     /// F and P' of a force.
@@ -21,6 +22,42 @@ pub struct ActionSeries<T> {
     velocity: Vec<Complex<T>>,
     /// Rate of the body a torque acts on, less that of its base.
     rate: Vec<T>,
+    /// The same as factors, where numbers are long.
+    factors: Option<Box<ActionFactors<T>>>,
+}
+
+#[derive(Clone, Debug)]
+struct ActionFactors<T: SeriesNumber> {
+    turned: VectorFactor<T>,
+    factor: T::Factor,
+    force: VectorFactor<T>,
+    velocity: VectorFactor<T>,
+    rate: T::Factor,
+}
+
+impl<T: SeriesNumber> ActionFactors<T> {
+    fn new(order: usize) -> Self {
+        let (vectors, numbers) = (|| VectorFactor::new(order), || T::Factor::new(order));
+        Self {
+            turned: vectors(),
+            factor: numbers(),
+            force: vectors(),
+            velocity: vectors(),
+            rate: numbers(),
+        }
+    }
+
+    fn restart(&mut self, scale: &Scale<T>) {
+        let vectors = [&mut self.turned, &mut self.force, &mut self.velocity];
+        vectors.into_iter().for_each(|factor| factor.restart(scale));
+        [&mut self.factor, &mut self.rate].into_iter().for_each(|factor| factor.restart(scale));
+    }
+
+    fn are_sound(&self) -> bool {
+        let vectors = [&self.turned, &self.force, &self.velocity];
+        let numbers = [&self.factor, &self.rate];
+        vectors.into_iter().all(VectorFactor::is_sound) && numbers.into_iter().all(CauchyFactor::is_sound)
+    }
 }
 
 impl<T: SeriesNumber> ActionSeries<T> {
@@ -33,7 +70,13 @@ impl<T: SeriesNumber> ActionSeries<T> {
             force: vectors(),
             velocity: vectors(),
             rate: zeros(if is_force { 0 } else { order + 1 }),
+            factors: T::IS_LONG.then(|| Box::new(ActionFactors::new(order))),
         }
+    }
+
+    /// False where powers grow by more than products are made for.
+    pub fn is_sound(&self) -> bool {
+        self.factors.as_ref().is_none_or(|factors| factors.are_sound())
     }
 
     /// The law's series about time `t`.
@@ -56,12 +99,21 @@ impl<T: SeriesNumber> ActionSeries<T> {
         m: usize,
         z: &[Complex<T>],
         n: usize,
-        rest: &mut [Complex<T>],
-        load: &mut [T],
+        (rest, load): (&mut [Complex<T>], &mut [T]),
+        scale: &Scale<T>,
     ) {
+        if let Some(factors) = &mut self.factors {
+            if m == 0 {
+                factors.restart(scale);
+            }
+            factors.factor.push(scale, self.factor[m]);
+        }
         match &action.kind {
             Kind::Force { point, force, follows } => {
-                self.force[m] = if *follows {
+                self.force[m] = if let (true, Some(factors)) = (*follows, &mut self.factors) {
+                    factors.turned.push(scale, z[m * n + action.body].turn(*force));
+                    factors.turned.times(&factors.factor, scale, m, 0..=m)
+                } else if *follows {
                     let turned = z[action.body..].iter().step_by(n).zip(self.factor[..=m].iter().rev());
                     turned.fold(Complex::ZERO, |sum, (z, &factor)| sum + z.turn(*force).times(factor))
                 } else {
@@ -81,18 +133,32 @@ impl<T: SeriesNumber> ActionSeries<T> {
     }
 
     /// Power m of its power \[W/s^m\], from power m of all rates.
-    pub fn power(&mut self, action: &Action<T::Constant>, m: usize, omega: &[T]) -> T {
+    pub fn power(&mut self, action: &Action<T::Constant>, m: usize, omega: &[T], scale: &Scale<T>) -> T {
         match &action.kind {
-            Kind::Force { .. } => product_of_vectors(&self.force[..=m], &self.velocity[..=m]),
+            Kind::Force { .. } => match &mut self.factors {
+                Some(factors) => {
+                    factors.force.push(scale, self.force[m]);
+                    factors.velocity.push(scale, self.velocity[m]);
+                    factors.force.dot(&factors.velocity, scale, m, 0..=m)
+                }
+                None => product(&self.force[..=m], &self.velocity[..=m], |a, b| a.dot(b)),
+            },
             Kind::Torque { torque, base } => {
                 self.rate[m] = base.map_or(omega[action.body], |base| omega[action.body] - omega[base]);
-                product_of_numbers(&self.factor[..=m], &self.rate[..=m]).by(*torque)
+                let power = match &mut self.factors {
+                    Some(factors) => {
+                        factors.rate.push(scale, self.rate[m]);
+                        factors.factor.product(&factors.rate, scale, m, 0..=m)
+                    }
+                    None => product(&self.factor[..=m], &self.rate[..=m], |a, b| a * b),
+                };
+                power.by(*torque)
             }
         }
     }
 
     /// The first powers from another series.
-    pub fn take<U: Real>(&mut self, other: &ActionSeries<U>) {
+    pub fn take<U: SeriesNumber>(&mut self, other: &ActionSeries<U>) {
         copy_vectors(&mut self.force, &other.force);
         copy_vectors(&mut self.velocity, &other.velocity);
         copy(&mut self.rate, &other.rate);

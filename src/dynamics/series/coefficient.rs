@@ -1,5 +1,6 @@
 //! Numbers there are series of, and what the equations of a mechanism are to them.
 
+use super::factors::CauchyFactor;
 use super::{Series, bodywise, drive};
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Over, Real};
 use crate::dynamics::constraint::ConstraintEquation;
@@ -75,6 +76,9 @@ pub trait Constants: Sized {
 
 /// A number whose series are compiled with this crate, once, and not anew wherever they are used.
 pub trait SeriesNumber: Real + Constants + Over<<Self as Constants>::Constant> {
+    /// A series of them as a factor of Cauchy products.
+    type Factor: CauchyFactor<Self>;
+
     /// Power zero, and the laws' series.
     fn begin(series: &mut Series<Self>, t: Self::Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
 
@@ -122,6 +126,8 @@ macro_rules! coefficient {
         }
 
         impl $(<const $size: usize>)? SeriesNumber for $number {
+            type Factor = ();
+
             fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
                 series.begin(t, u, u_rest, u_rate);
             }

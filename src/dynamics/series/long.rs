@@ -1,9 +1,11 @@
 //! Series of numbers of many digits: constants and time have as many, and laws are evaluated in them.
 
+use super::factors::CauchyFactor;
 use super::{Constants, Series, SeriesNumber, Terms, bodywise};
-use crate::arithmetic::digits::Digits;
+use crate::arithmetic::digits::{Digits, Factor, Scale};
 use crate::arithmetic::{Complex, Over, Scalar};
 use crate::dynamics::law::{Law, Phase, Sine};
+use std::ops::RangeInclusive;
 
 impl<const W: usize> Constants for Digits<W> {
     type Constant = Self;
@@ -50,7 +52,33 @@ fn argument<const W: usize>(sine: &Sine<Digits<W>>, t: Digits<W>) -> Digits<W> {
     sine.frequency * t + sine.phase
 }
 
+impl<const W: usize> CauchyFactor<Digits<W>> for Factor<W> {
+    type Scale = Scale;
+
+    fn new(order: usize) -> Self {
+        Self::new(order)
+    }
+
+    fn restart(&mut self, scale: &Scale) {
+        self.restart(scale);
+    }
+
+    fn push(&mut self, scale: &Scale, power: Digits<W>) {
+        self.push(scale, power);
+    }
+
+    fn product(&self, other: &Self, scale: &Scale, total: usize, of: RangeInclusive<usize>) -> Digits<W> {
+        self.product(other, scale, total, of)
+    }
+
+    fn is_sound(&self) -> bool {
+        self.is_sound()
+    }
+}
+
 impl<const W: usize> SeriesNumber for Digits<W> {
+    type Factor = Factor<W>;
+
     fn begin(series: &mut Series<Self>, t: Self, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
         series.begin(t, u, u_rest, u_rate);
     }

@@ -63,40 +63,6 @@ where
     convolve::<1, A, B, S>(1, 0, a, b, term)[0]
 }
 
-/// The same of two series of numbers, rounded once where they are long.
-#[inline(always)]
-pub fn product_of_numbers<T: Real>(a: &[T], b: &[T]) -> T {
-    if T::IS_LONG {
-        return T::sum_of_products(a.iter().zip(b.iter().rev()));
-    }
-    product(a, b, |a, b| a * b)
-}
-
-/// The same of the dot products of two series of vectors.
-#[inline(always)]
-pub fn product_of_vectors<T: Real>(a: &[Complex<T>], b: &[Complex<T>]) -> T {
-    if T::IS_LONG {
-        let pairs = || a.iter().zip(b.iter().rev());
-        return T::sum_of_products(
-            pairs().map(|(a, b)| (&a.re, &b.re)).chain(pairs().map(|(a, b)| (&a.im, &b.im))),
-        );
-    }
-    product(a, b, |a, b| a.dot(b))
-}
-
-/// The same of a series of vectors and one of numbers.
-#[inline(always)]
-pub fn scaled_vectors<T: Real>(a: &[Complex<T>], b: &[T]) -> Complex<T> {
-    if T::IS_LONG {
-        let pairs = || a.iter().zip(b.iter().rev());
-        return Complex::new(
-            T::sum_of_products(pairs().map(|(a, b)| (&a.re, b))),
-            T::sum_of_products(pairs().map(|(a, b)| (&a.im, b))),
-        );
-    }
-    product(a, b, |a, b| a.times(b))
-}
-
 /// The fractions 1/k.
 #[derive(Clone, Debug)]
 pub struct Fractions<T>(Vec<T>);

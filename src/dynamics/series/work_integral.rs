@@ -1,6 +1,7 @@
 //! The account of work in the series.
 
 use super::coefficient::{SeriesNumber, Terms};
+use super::factors::{CauchyFactor, Factors};
 use super::{Series, action};
 use crate::arithmetic::Scalar;
 
@@ -20,23 +21,23 @@ impl<T: SeriesNumber> Series<T> {
             {
                 let mut torque =
                     (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).by(terms.tree.diagonal[i]);
-                let pairs = || {
-                    let rest = self.rest[..=m * n + i].iter().rev().step_by(n);
-                    self.z[i..].iter().step_by(n).zip(rest)
-                };
+                let Factors { scale, z, rest, .. } = &self.factors;
                 if T::IS_LONG {
-                    torque += T::sum_of_products(pairs().map(|(z, rest)| (&z.re, &rest.im)));
-                    torque -= T::sum_of_products(pairs().map(|(z, rest)| (&z.im, &rest.re)));
+                    torque += z[i].cross(&rest[i], scale, m, 0..=m);
                 } else {
-                    pairs().for_each(|(z, &rest)| torque += z.cross(rest));
+                    let rest = self.rest[..=m * n + i].iter().rev().step_by(n);
+                    let pairs = self.z[i..].iter().step_by(n).zip(rest);
+                    pairs.for_each(|(z, &rest)| torque += z.cross(rest));
                 }
                 torque -= self.applied[m * n + i];
                 self.torque[m * n + i] = torque;
-                let drive = self.drive[..=m * n + i].iter().rev().step_by(n);
-                let pairs = self.torque[i..].iter().step_by(n).zip(drive);
                 if T::IS_LONG {
-                    power += T::sum_of_products(pairs);
+                    let Factors { scale, drive, torque: torques, .. } = &mut self.factors;
+                    torques[i].push(scale, torque);
+                    power += torques[i].product(&drive[i], scale, m, 0..=m);
                 } else {
+                    let drive = self.drive[..=m * n + i].iter().rev().step_by(n);
+                    let pairs = self.torque[i..].iter().step_by(n).zip(drive);
                     pairs.for_each(|(&torque, &drive)| power += torque * drive);
                 }
             }
@@ -47,13 +48,14 @@ impl<T: SeriesNumber> Series<T> {
         for (spring, series) in
             terms.springs.iter().zip(&self.springs).filter(|(spring, _)| spring.damping != T::Constant::ZERO)
         {
-            power += series.loss(spring, m);
+            power += series.loss(spring, m, &self.factors.scale);
         }
         for torsion in terms.torsions.iter().filter(|torsion| torsion.damping != T::Constant::ZERO) {
             power += action::loss(torsion, m, &self.omega, n);
         }
         for (action, series) in terms.actions.iter().zip(&mut self.actions) {
-            power += series.power(action, m, &self.omega[m * n..(m + 1) * n]);
+            let omega = &self.omega[m * n..(m + 1) * n];
+            power += series.power(action, m, omega, &self.factors.scale);
         }
         for (force, series) in terms.forces.iter().zip(&self.forces) {
             power += series.power(force, m);

@@ -93,6 +93,7 @@ pub struct Saved {
     words: Vec<Vec<u64>>,
     steps: u64,
     impacts: u64,
+    radius: Option<f64>,
 }
 
 impl Saved {
@@ -250,10 +251,10 @@ impl<const W: usize> LongRun for Runner<W> {
     }
 
     fn save(&self) -> Saved {
-        let LongState { t, u, rate, work, impact_energy, steps, impacts } = self.motion.state();
+        let LongState { t, u, rate, work, impact_energy, steps, impacts, radius } = self.motion.state();
         let numbers = [t, work, impact_energy].into_iter().chain(u).chain(rate);
         let words = numbers.map(Digits::to_words).collect();
-        Saved { precision: self.precision(), words, steps: *steps, impacts: *impacts }
+        Saved { precision: self.precision(), words, steps: *steps, impacts: *impacts, radius: *radius }
     }
 
     fn resume(&mut self, saved: &Saved) -> bool {
@@ -276,6 +277,7 @@ impl<const W: usize> LongRun for Runner<W> {
             impact_energy,
             steps: saved.steps,
             impacts: saved.impacts,
+            radius: saved.radius,
         });
         true
     }

@@ -13,13 +13,15 @@
 use super::keep::Keeper;
 use super::precision::Precision;
 use super::wall;
-use crate::arithmetic::digits::Digits;
+use crate::arithmetic::digits::{Digits, Scale};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{ExactMechanism, ExactStart};
 use crate::dynamics::series::{Constants, Series};
 use crate::stepping::{Cause, StepError};
 
+/// log2 of the factor by which a step may be longer than the one before.
+const SLACK: f64 = 0.25;
 /// Powers the step is taken from: by symmetry some of them may vanish.
 const JUDGES: usize = 5;
 
@@ -40,6 +42,9 @@ pub struct LongState<const W: usize> {
     pub steps: u64,
     /// Impacts passed.
     pub impacts: u64,
+    /// log2 of the radius of convergence of the last step's series \[s\], as far as its last powers tell; `None`
+    /// before there is one.
+    pub radius: Option<f64>,
 }
 
 /// All coordinates at a moment.
@@ -63,6 +68,8 @@ pub struct Motion<const W: usize> {
     pub(super) keeper: Keeper<W>,
     /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends on.
     step: Option<(Digits<W>, Option<usize>)>,
+    /// The radius its series has: see [`LongState`].
+    radius: Option<f64>,
     /// Limbs that each power is kept to.
     kept: Vec<usize>,
     /// Steps may be as long at most \[s\].
@@ -96,6 +103,7 @@ impl<const W: usize> Motion<W> {
             series,
             keeper,
             step: None,
+            radius: None,
             longest: until,
             kept,
             precision,
@@ -107,6 +115,7 @@ impl<const W: usize> Motion<W> {
                 impact_energy: Digits::ZERO,
                 steps: 0,
                 impacts: 0,
+                radius: None,
             },
             mechanism,
         };
@@ -248,16 +257,7 @@ impl<const W: usize> Motion<W> {
         if let Some(step) = self.step {
             return Ok(step);
         }
-        let LongState { t, u, rate, .. } = &self.state;
-        self.series.expand_terms(&self.mechanism.terms(), *t, u, &self.zeros, rate);
-        let mut step = self.wanted();
-        if !self.is_enough(step) {
-            // Some power is larger than the last ones tell: once more with all limbs.
-            self.series.keep(Vec::new());
-            self.series.expand_terms(&self.mechanism.terms(), *t, u, &self.zeros, rate);
-            self.series.keep(self.kept.clone());
-            step = self.wanted();
-        }
+        let step = self.expand();
         let seconds = self.state.t.value();
         if step.is_nan() {
             let hint = "look for a spring of length zero or a position without inertia";
@@ -280,6 +280,46 @@ impl<const W: usize> Motion<W> {
         Ok(step)
     }
 
+    /// Expands the state, and tells how long a step its series makes \[s\].
+    ///
+    /// Products are formed for the radius of convergence that the last step had, and steps may grow by a fifth.
+    /// Where powers turn out larger they are formed once more for the radius found, and then in full.
+    fn expand(&mut self) -> f64 {
+        let Precision { order, bits, .. } = self.precision;
+        let far = -self.precision.tolerance() / order as f64;
+        let mut radius = self.state.radius;
+        for _ in 0..2 {
+            let Some(known) = radius else { break };
+            let scale = Scale::new(known, known - far + SLACK, order, bits);
+            let longest = scale.longest();
+            self.series.rescale(scale);
+            let wanted = self.expand_once();
+            radius = Some(libm::log2(wanted) + far).filter(|radius| radius.is_finite());
+            if wanted.is_nan() {
+                break;
+            }
+            let step = short(wanted.min(longest).min(self.longest));
+            if self.series.is_sound() && self.is_enough(step) {
+                self.radius = radius;
+                return step;
+            }
+        }
+        // Some power is larger than the last ones tell, or there is no step before.
+        self.series.rescale(Scale::default());
+        self.series.keep(Vec::new());
+        let wanted = self.expand_once();
+        self.series.keep(self.kept.clone());
+        self.radius = Some(libm::log2(wanted) + far).filter(|radius| radius.is_finite());
+        if wanted.is_nan() { wanted } else { short(wanted.min(self.longest)) }
+    }
+
+    /// The series of the state, as products and powers are kept; the step it makes \[s\].
+    fn expand_once(&mut self) -> f64 {
+        let LongState { t, u, rate, .. } = &self.state;
+        self.series.expand_terms(&self.mechanism.terms(), *t, u, &self.zeros, rate);
+        self.wanted()
+    }
+
     /// An error at the present state.
     pub(super) fn stop(&self, cause: Cause, step: f64, what: &str, hint: &str) -> StepError {
         let t = self.state.t.value();
@@ -293,7 +333,7 @@ impl<const W: usize> Motion<W> {
         sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
     }
 
-    /// The step at which the last powers fall below the tolerance, a double with few bits \[s\].
+    /// The step at which the last powers fall below the tolerance \[s\].
     fn wanted(&self) -> f64 {
         let (order, first) = (self.precision.order, self.size(0).max(0.0));
         let mut least = f64::INFINITY;
@@ -304,9 +344,7 @@ impl<const W: usize> Motion<W> {
             }
             least = least.min((self.precision.tolerance() + first - size) / k as f64);
         }
-        let step = libm::exp2(least).min(self.longest);
-        // 2⁻²⁰ of its size is cut off, so that times have few bits.
-        f64::from_bits(step.to_bits() >> 32 << 32)
+        libm::exp2(least)
     }
 
     /// True where no power was kept to fewer limbs than it weighs in a step of this length.
@@ -327,6 +365,7 @@ impl<const W: usize> Motion<W> {
         (self.state.u, self.state.rate) = (u, rate);
         self.state.work += work;
         self.state.steps += 1;
+        self.state.radius = self.radius;
         self.step = None;
         self.settle()
     }
@@ -358,4 +397,9 @@ impl<const W: usize> Motion<W> {
         }
         sum.shortened(self.precision.limbs)
     }
+}
+
+/// A step with few bits, so that times have few: 2⁻²⁰ of its size is cut off.
+fn short(step: f64) -> f64 {
+    f64::from_bits(step.to_bits() >> 32 << 32)
 }

@@ -20,6 +20,8 @@ pub struct Precision {
     pub order: usize,
     /// Limbs of all numbers.
     pub limbs: usize,
+    /// Bits that series are kept to.
+    pub bits: usize,
 }
 
 impl Precision {
@@ -27,7 +29,9 @@ impl Precision {
     pub fn new(digits: usize, has_loops: bool) -> Self {
         let order = (ORDER * digits as f64) as usize + 4;
         let spare = if has_loops { (0.5 * BITS * digits as f64) as usize + 96 } else { SPARE };
-        Self { digits, order, limbs: limbs_for(digits, spare).min(MOST - 1) }
+        let bits = libm::ceil(BITS * digits as f64) as usize + spare;
+        let limbs = limbs_for(digits, spare).min(MOST - 1);
+        Self { digits, order, limbs, bits: bits.min(64 * (limbs - 1)) }
     }
 
     /// The same with another order.

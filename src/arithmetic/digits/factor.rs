@@ -1,0 +1,276 @@
+//! Power series as factors of Cauchy products: fixed point on a scaled time.
+//!
+//! ```text
+//! a_m U^m = (V_m - 1/2) 2^e,   0 <= V_m < 1      U = 2^unit seconds: coefficients hardly fall where U is near the radius of convergence
+//! Σ_j a_j b_{M-j} = 2^(e_a + e_b) U^-M (Σ V V' - (Σ V + Σ V')/2 + n/4)
+//! ```
+//!
+//! So no term of a sum has a sign or a place of its own: a column is a loop over limbs one after another in
+//! memory, added up in 192 bits, and the sums of V are differences of sums from the first power on.  A sum of
+//! total power M contributes (step/U)^M to a step, and is formed from so many limbs of its factors as that
+//! leaves; columns below those are left out.  A power larger than there is room for makes the room larger.
+
+use super::{Digits, Kind, Scalar, sum_of_products};
+use std::ops::RangeInclusive;
+
+/// Bits of room above the first power that is not zero.
+const HEAD: i32 = 4;
+/// Powers that others are measured against: by symmetry some may vanish.
+const EARLY: usize = 5;
+/// Bits that later powers may be larger by.
+const GROWTH: i32 = 10;
+/// Bits that room above two factors takes, with two for rounding.
+const GUARD: usize = 2 * HEAD as usize + 4;
+/// Limbs at most, and room of sums: one limb above the point and one below the last column.
+const MOST: usize = super::MOST + 2;
+const ROOM: usize = MOST + 4;
+
+/// The unit of time of a step's series, and the limbs that sums are formed from.
+#[derive(Clone, Debug, Default)]
+pub struct Scale {
+    /// log2 of the unit of time \[s\].
+    unit: i32,
+    /// Limbs of the factors of sums of this total power, falling.  Empty: products are those of numbers with
+    /// exponents.
+    limbs: Vec<usize>,
+    /// log2 of the longest step they serve \[s\].
+    longest: f64,
+}
+
+impl Scale {
+    /// For series up to power `order` that converge up to 2^`radius` s and make steps of up to 2^`step` s, kept
+    /// to so many bits.
+    pub fn new(radius: f64, step: f64, order: usize, bits: usize) -> Self {
+        let unit = libm::floor(radius - 0.1);
+        // Every product left out and every limb cut off may cost one in the last place.
+        let terms = libm::log2((order * bits.div_ceil(64)) as f64);
+        let all = (bits + GUARD) as f64 + terms;
+        let needed = |m: usize| libm::ceil((all - m as f64 * (unit - step)) / 64.0);
+        let limbs = (0..=order + 2).map(|m| needed(m).clamp(1.0, MOST as f64) as usize);
+        Self { unit: unit as i32, limbs: limbs.collect(), longest: step }
+    }
+
+    /// Longest step that the limbs serve \[s\].
+    pub fn longest(&self) -> f64 {
+        if self.limbs.is_empty() { f64::INFINITY } else { libm::exp2(self.longest) }
+    }
+
+    fn limbs(&self, power: usize) -> usize {
+        self.limbs.get(power).copied().unwrap_or(1)
+    }
+}
+
+/// A series whose powers come one after another.
+#[derive(Clone, Debug)]
+pub struct Factor<const W: usize> {
+    powers: Vec<Digits<W>>,
+    /// Limb i of V_m at `i room + m`.
+    limbs: Vec<u64>,
+    room: usize,
+    /// Σ_{j<m} V_j, a limb above the point first, `stride` limbs each.
+    sums: Vec<u64>,
+    stride: usize,
+    /// e; `None` as long as all powers are zero.
+    exponent: Option<i32>,
+    /// What e would be for the first powers alone.
+    early: Option<i32>,
+    is_finite: bool,
+}
+
+impl<const W: usize> Factor<W> {
+    /// Room for powers up to `order`.
+    pub fn new(order: usize) -> Self {
+        let powers = Vec::with_capacity(order + 1);
+        Self {
+            powers,
+            limbs: Vec::new(),
+            room: order + 1,
+            sums: Vec::new(),
+            stride: 0,
+            exponent: None,
+            early: None,
+            is_finite: true,
+        }
+    }
+
+    /// Forgets all powers.
+    pub fn restart(&mut self, scale: &Scale) {
+        self.powers.clear();
+        (self.exponent, self.early, self.is_finite) = (None, None, true);
+        if scale.limbs.is_empty() {
+            return;
+        }
+        let limbs = scale.limbs(0);
+        self.stride = limbs + 1;
+        self.limbs.resize(limbs * self.room, 0);
+        self.sums.clear();
+        self.sums.resize(self.stride * (self.room + 1), 0);
+    }
+
+    /// Takes the next power.
+    pub fn push(&mut self, scale: &Scale, power: Digits<W>) {
+        let m = self.powers.len();
+        self.is_finite &= power.is_finite();
+        self.powers.push(power);
+        if scale.limbs.is_empty() {
+            return;
+        }
+        if matches!(power.kind, Kind::Positive | Kind::Negative) {
+            let bits = 64 * power.exponent - power.limb[0].leading_zeros() as i32;
+            let needed = bits + scale.unit * m as i32 + 1;
+            if m < EARLY {
+                self.early = self.early.max(Some(needed));
+            }
+            if self.exponent.is_none_or(|exponent| needed > exponent) {
+                self.exponent = Some(needed + HEAD);
+                (0..m).for_each(|m| self.place(scale, m));
+            }
+        }
+        self.place(scale, m);
+    }
+
+    /// True where later powers are as small as sums expect.
+    pub fn is_sound(&self) -> bool {
+        match (self.exponent, self.early) {
+            (Some(exponent), Some(early)) => exponent - HEAD - early <= GROWTH,
+            (Some(_), None) => false,
+            (None, _) => true,
+        }
+    }
+
+    /// V_m, and the sum up to it.
+    fn place(&mut self, scale: &Scale, m: usize) {
+        let (limbs, power) = (scale.limbs(m), &self.powers[m]);
+        let mut found = [0; ROOM];
+        let found = &mut found[..limbs];
+        if let (Some(exponent), Kind::Positive | Kind::Negative) = (self.exponent, power.kind) {
+            shifted_down(&power.limb, exponent - 64 * power.exponent - scale.unit * m as i32, found);
+            if power.is_negative() {
+                negate(found);
+            }
+        }
+        found[0] ^= 1 << 63;
+        for (i, &limb) in found.iter().enumerate() {
+            self.limbs[i * self.room + m] = limb;
+        }
+        let (before, sum) = self.sums.split_at_mut((m + 1) * self.stride);
+        let sum = &mut sum[..self.stride];
+        sum.copy_from_slice(&before[m * self.stride..]);
+        if super::plus(&mut sum[1..=limbs], found) {
+            sum[0] += 1;
+        }
+    }
+
+    /// Σ_j a_j b_{total-j} over the powers `of` this series, rounded once.
+    pub fn product(
+        &self,
+        other: &Self,
+        scale: &Scale,
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> Digits<W> {
+        let (first, last) = of.into_inner();
+        if first > last {
+            return Digits::ZERO;
+        }
+        let (from, to) = (total - last, total - first);
+        if scale.limbs.is_empty() {
+            let powers = other.powers[from..=to].iter().rev();
+            return sum_of_products(self.powers[first..=last].iter().zip(powers));
+        }
+        if !(self.is_finite && other.is_finite) {
+            return Digits::NAN;
+        }
+        let (Some(exponent), Some(other_exponent)) = (self.exponent, other.exponent) else {
+            return Digits::ZERO;
+        };
+        let limbs = scale.limbs(total);
+        let a = |i: usize| &self.limbs[i * self.room + first..=i * self.room + last];
+        let b = |i: usize| &other.limbs[i * other.room + from..=i * other.room + to];
+        // A limb above the point, which has the sign, and one more below it than there are columns.
+        let mut sum = [0; ROOM];
+        let sum = &mut sum[..limbs + 2];
+        let mut carry = 0_u128;
+        for column in (0..limbs).rev() {
+            let (mut low, mut high) = (carry, 0);
+            for i in 0..=column {
+                add_products(a(i), b(column - i), &mut low, &mut high);
+            }
+            sum[column + 2] = low as u64;
+            carry = low >> 64 | u128::from(high) << 64;
+        }
+        (sum[1], sum[0]) = (carry as u64, (carry >> 64) as u64);
+        self.without_halves(sum, first, last);
+        other.without_halves(sum, from, to);
+        // n/4.
+        let count = (last - first + 1) as u64;
+        super::plus(&mut sum[..2], &[count >> 2, count << 62]);
+        let is_negative = sum[0] >> 63 == 1;
+        if is_negative {
+            negate(sum);
+        }
+        let bits = exponent + other_exponent - scale.unit * total as i32;
+        raised(is_negative, sum, bits, limbs + 1)
+    }
+
+    /// Takes half of Σ V off.
+    fn without_halves(&self, sum: &mut [u64], first: usize, last: usize) {
+        let count = (sum.len() - 1).min(self.stride);
+        let at = |m: usize| &self.sums[m * self.stride..][..count];
+        let mut part = [0; ROOM];
+        let part = &mut part[..count];
+        part.copy_from_slice(at(last + 1));
+        super::minus(part, at(first));
+        let mut above = 0;
+        for limb in part.iter_mut() {
+            (*limb, above) = (*limb >> 1 | above, *limb << 63);
+        }
+        super::minus(&mut sum[..count], part);
+    }
+}
+
+/// Adds Σ a_j b_{n-1-j} to a number of 192 bits.
+#[inline]
+fn add_products(a: &[u64], b: &[u64], low: &mut u128, high: &mut u64) {
+    let (mut sum, mut above) = (*low, *high);
+    for (&a, &b) in a.iter().zip(b.iter().rev()) {
+        let is_over;
+        (sum, is_over) = sum.overflowing_add(u128::from(a) * u128::from(b));
+        above += u64::from(is_over);
+    }
+    (*low, *high) = (sum, above);
+}
+
+/// The limbs below the point of a fraction divided by 2^`shift`.
+fn shifted_down(limb: &[u64], shift: i32, found: &mut [u64]) {
+    let (limbs, bits) = (shift.div_euclid(64), shift.rem_euclid(64));
+    let at = |i: i32| usize::try_from(i).ok().and_then(|i| limb.get(i)).copied().unwrap_or(0);
+    let mut above = at(-limbs - 1);
+    for (i, found) in found.iter_mut().enumerate() {
+        let here = at(i as i32 - limbs);
+        *found = (u128::from(above) << 64 | u128::from(here)).wrapping_shr(bits as u32) as u64;
+        above = here;
+    }
+}
+
+/// A number whose first limb is above the point, times 2^`bits`.
+fn raised<const W: usize>(is_negative: bool, sum: &[u64], bits: i32, limbs: usize) -> Digits<W> {
+    let (whole, bits) = (bits.div_euclid(64), bits.rem_euclid(64));
+    let mut found = [0; ROOM + 1];
+    let found = &mut found[..=sum.len()];
+    let mut below = 0;
+    for i in (0..found.len()).rev() {
+        let here = if i == 0 { 0 } else { sum[i - 1] };
+        found[i] = ((u128::from(here) << 64 | u128::from(below)) << bits >> 64) as u64;
+        below = here;
+    }
+    Digits::normalized(is_negative, whole + 2, limbs.min(W), found)
+}
+
+/// The negative of a number in two's complement.
+fn negate(number: &mut [u64]) {
+    let mut carry = true;
+    for limb in number.iter_mut().rev() {
+        (*limb, carry) = (!*limb).overflowing_add(u64::from(carry));
+    }
+}

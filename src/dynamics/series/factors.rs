@@ -1,0 +1,173 @@
+//! Series as factors of Cauchy products, for numbers whose products are more than a loop.
+//!
+//! Powers are handed over as they are found; products are asked for by their total power.  Doubles and
+//! double-doubles have nothing of this: the series of those are multiplied where they stand.
+
+use super::coefficient::SeriesNumber;
+use crate::arithmetic::{Complex, Real};
+use std::fmt::Debug;
+use std::ops::RangeInclusive;
+
+/// A series of numbers of one kind in the form in which it is multiplied.
+pub trait CauchyFactor<T>: Clone + Debug {
+    /// What all series of a step have in common.
+    type Scale: Clone + Debug + Default;
+
+    /// Room for powers up to `order`.
+    fn new(order: usize) -> Self;
+
+    /// Forgets all powers.
+    fn restart(&mut self, scale: &Self::Scale);
+
+    /// Takes the next power.
+    fn push(&mut self, scale: &Self::Scale, power: T);
+
+    /// `Σ_j a_j b_{total-j}` over the powers `of` the first.
+    fn product(&self, other: &Self, scale: &Self::Scale, total: usize, of: RangeInclusive<usize>) -> T;
+
+    /// False where the powers grow by more than products are made for.
+    fn is_sound(&self) -> bool;
+}
+
+/// Of numbers that are multiplied where they stand: there is nothing to hand over.
+impl<T: Real> CauchyFactor<T> for () {
+    type Scale = ();
+
+    fn new(_order: usize) -> Self {}
+
+    fn restart(&mut self, _scale: &()) {}
+
+    fn push(&mut self, _scale: &(), _power: T) {}
+
+    fn product(&self, _other: &(), _scale: &(), _total: usize, _of: RangeInclusive<usize>) -> T {
+        T::ZERO
+    }
+
+    fn is_sound(&self) -> bool {
+        true
+    }
+}
+
+/// What all series of a step have in common.
+pub type Scale<T> = <<T as SeriesNumber>::Factor as CauchyFactor<T>>::Scale;
+
+/// A series of vectors as a factor.
+#[derive(Clone, Debug)]
+pub struct VectorFactor<T: SeriesNumber> {
+    re: T::Factor,
+    im: T::Factor,
+}
+
+impl<T: SeriesNumber> VectorFactor<T> {
+    /// Room for powers up to `order`.
+    pub fn new(order: usize) -> Self {
+        Self { re: T::Factor::new(order), im: T::Factor::new(order) }
+    }
+
+    /// Forgets all powers.
+    pub fn restart(&mut self, scale: &Scale<T>) {
+        self.re.restart(scale);
+        self.im.restart(scale);
+    }
+
+    /// Takes the next power.
+    pub fn push(&mut self, scale: &Scale<T>, power: Complex<T>) {
+        self.re.push(scale, power.re);
+        self.im.push(scale, power.im);
+    }
+
+    /// The product with a series of numbers.
+    pub fn times(
+        &self,
+        other: &T::Factor,
+        scale: &Scale<T>,
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> Complex<T> {
+        Complex::new(
+            self.re.product(other, scale, total, of.clone()),
+            self.im.product(other, scale, total, of),
+        )
+    }
+
+    /// The dot product with a series of vectors.
+    pub fn dot(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
+        self.re.product(&other.re, scale, total, of.clone()) + self.im.product(&other.im, scale, total, of)
+    }
+
+    /// The cross product with a series of vectors.
+    pub fn cross(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
+        self.re.product(&other.im, scale, total, of.clone()) - self.im.product(&other.re, scale, total, of)
+    }
+
+    /// False where the powers grow by more than products are made for.
+    pub fn is_sound(&self) -> bool {
+        self.re.is_sound() && self.im.is_sound()
+    }
+}
+
+/// The series of a mechanism's bodies as factors: none of numbers that are multiplied where they stand.
+#[derive(Clone, Debug)]
+pub struct Factors<T: SeriesNumber> {
+    pub(super) scale: Scale<T>,
+    /// z, w, R, s' and torques of the bodies.
+    pub(super) z: Vec<VectorFactor<T>>,
+    pub(super) omega: Vec<T::Factor>,
+    pub(super) rest: Vec<VectorFactor<T>>,
+    pub(super) drive: Vec<T::Factor>,
+    pub(super) torque: Vec<T::Factor>,
+}
+
+impl<T: SeriesNumber> Factors<T> {
+    /// Room for so many bodies, up to power `order` of the rates.
+    pub fn new(bodies: usize, is_tied: bool, order: usize) -> Self {
+        let bodies = if T::IS_LONG { bodies } else { 0 };
+        let numbers = |count: usize| vec![T::Factor::new(order + 1); count];
+        let vectors = || vec![VectorFactor::new(order + 1); bodies];
+        let driven = if is_tied { bodies } else { 0 };
+        Self {
+            scale: Scale::<T>::default(),
+            z: vectors(),
+            omega: numbers(bodies),
+            rest: vectors(),
+            drive: numbers(driven),
+            torque: numbers(driven),
+        }
+    }
+
+    /// Power zero of the rates, powers zero and one of the unit vectors, of `n` elements each, and all powers
+    /// of s'.
+    pub fn begin(&mut self, n: usize, z: &[Complex<T>], omega: &[T], drive: &[T]) {
+        let scale = &self.scale;
+        for (i, factor) in self.z.iter_mut().enumerate() {
+            factor.restart(scale);
+            factor.push(scale, z[i]);
+            factor.push(scale, z[n + i]);
+        }
+        for (factor, &omega) in self.omega.iter_mut().zip(omega) {
+            factor.restart(scale);
+            factor.push(scale, omega);
+        }
+        self.rest.iter_mut().for_each(|factor| factor.restart(scale));
+        self.torque.iter_mut().for_each(|factor| factor.restart(scale));
+        for (i, factor) in self.drive.iter_mut().enumerate() {
+            factor.restart(scale);
+            drive[i..].iter().step_by(n).for_each(|&power| factor.push(scale, power));
+        }
+    }
+
+    /// The next powers of unit vectors, rates and R.
+    pub fn push(&mut self, z: &[Complex<T>], omega: &[T], rest: &[Complex<T>]) {
+        let scale = &self.scale;
+        self.z.iter_mut().zip(z).for_each(|(factor, &z)| factor.push(scale, z));
+        self.omega.iter_mut().zip(omega).for_each(|(factor, &omega)| factor.push(scale, omega));
+        self.rest.iter_mut().zip(rest).for_each(|(factor, &rest)| factor.push(scale, rest));
+    }
+
+    /// False where the powers of a series grow by more than products are made for.
+    pub fn are_sound(&self) -> bool {
+        let mut vectors = self.z.iter().chain(&self.rest);
+        let mut numbers = self.omega.iter().chain(&self.drive).chain(&self.torque);
+        vectors.all(VectorFactor::is_sound) && numbers.all(CauchyFactor::is_sound)
+    }
+}
