@@ -339,7 +339,9 @@ impl<T: SeriesNumber> Series<T> {
             let Factors { scale, z, omega, .. } = &self.factors;
             for i in 0..angles {
                 let sum = z[i].times(&omega[i], scale, m + 1, 1..=m + 1);
-                (turned[i], bend[i]) = (sum, sum.left().times(factor));
+                let left = sum.left();
+                let times = |x: T| x.scale((m + 1) as f64);
+                (turned[i], bend[i]) = (sum, Complex::new(times(left.re), times(left.im)));
             }
             return;
         }

@@ -23,7 +23,9 @@ const GROWTH: i32 = 10;
 const GUARD: usize = 2 * HEAD as usize + 4;
 /// Limbs at most, and room of sums: one limb above the point and one below the last column.
 const MOST: usize = super::MOST + 2;
-const ROOM: usize = MOST + 4;
+const ROOM: usize = MOST + 3;
+/// Limbs that there is smaller room for: it is cleared every time.
+const SMALL: usize = 9;
 
 /// The unit of time of a step's series, and the limbs that sums are formed from.
 #[derive(Clone, Debug, Default)]
@@ -140,7 +142,14 @@ impl<const W: usize> Factor<W> {
 
     /// V_m, and the sum up to it.
     fn place(&mut self, scale: &Scale, m: usize) {
-        let (limbs, power) = (scale.limbs(m), &self.powers[m]);
+        match scale.limbs(m) {
+            limbs @ ..=SMALL => self.place_in::<SMALL>(scale, m, limbs),
+            limbs => self.place_in::<MOST>(scale, m, limbs),
+        }
+    }
+
+    fn place_in<const ROOM: usize>(&mut self, scale: &Scale, m: usize, limbs: usize) {
+        let power = &self.powers[m];
         let mut found = [0; ROOM];
         let found = &mut found[..limbs];
         if let (Some(exponent), Kind::Positive | Kind::Negative) = (self.exponent, power.kind) {
@@ -162,13 +171,7 @@ impl<const W: usize> Factor<W> {
     }
 
     /// Σ_j a_j b_{total-j} over the powers `of` this series, rounded once.
-    pub fn product(
-        &self,
-        other: &Self,
-        scale: &Scale,
-        total: usize,
-        of: RangeInclusive<usize>,
-    ) -> Digits<W> {
+    pub fn product(&self, other: &Self, scale: &Scale, total: usize, of: RangeInclusive<usize>) -> Digits<W> {
         let (first, last) = of.into_inner();
         if first > last {
             return Digits::ZERO;
@@ -185,6 +188,22 @@ impl<const W: usize> Factor<W> {
             return Digits::ZERO;
         };
         let limbs = scale.limbs(total);
+        let bits = exponent + other_exponent - scale.unit * total as i32;
+        match limbs {
+            ..=SMALL => self.scaled::<{ SMALL + 3 }>(other, [first, last], [from, to], limbs, bits),
+            _ => self.scaled::<ROOM>(other, [first, last], [from, to], limbs, bits),
+        }
+    }
+
+    /// The same in fixed point, in room for three limbs more than are asked for.
+    fn scaled<const ROOM: usize>(
+        &self,
+        other: &Self,
+        [first, last]: [usize; 2],
+        [from, to]: [usize; 2],
+        limbs: usize,
+        bits: i32,
+    ) -> Digits<W> {
         let a = |i: usize| &self.limbs[i * self.room + first..=i * self.room + last];
         let b = |i: usize| &other.limbs[i * other.room + from..=i * other.room + to];
         // A limb above the point, which has the sign, and one more below it than there are columns.
@@ -209,34 +228,47 @@ impl<const W: usize> Factor<W> {
         if is_negative {
             negate(sum);
         }
-        let bits = exponent + other_exponent - scale.unit * total as i32;
-        raised(is_negative, sum, bits, limbs + 1)
+        raised::<ROOM, W>(is_negative, sum, bits, limbs + 1)
     }
 
     /// Takes half of Σ V off.
+    #[inline(always)]
     fn without_halves(&self, sum: &mut [u64], first: usize, last: usize) {
         let count = (sum.len() - 1).min(self.stride);
         let at = |m: usize| &self.sums[m * self.stride..][..count];
-        let mut part = [0; ROOM];
-        let part = &mut part[..count];
-        part.copy_from_slice(at(last + 1));
-        super::minus(part, at(first));
-        let mut above = 0;
-        for limb in part.iter_mut() {
-            (*limb, above) = (*limb >> 1 | above, *limb << 63);
+        let (from, to) = (at(first), at(last + 1));
+        let mut borrow = 0;
+        // 2⁶³ times the limbs of the difference, from the last on.
+        for i in (0..count).rev() {
+            let above = if i == 0 { [0; 2] } else { [to[i - 1], from[i - 1]] };
+            let [to, from] =
+                [(to[i], above[0]), (from[i], above[1])].map(|(limb, above)| limb >> 1 | above << 63);
+            let wide = i128::from(sum[i]) - i128::from(to) + i128::from(from) + borrow;
+            (sum[i], borrow) = (wide as u64, wide >> 64);
         }
-        super::minus(&mut sum[..count], part);
     }
 }
 
 /// Adds Σ a_j b_{n-1-j} to a number of 192 bits.
-#[inline]
+#[inline(always)]
 fn add_products(a: &[u64], b: &[u64], low: &mut u128, high: &mut u64) {
     let (mut sum, mut above) = (*low, *high);
-    for (&a, &b) in a.iter().zip(b.iter().rev()) {
+    let mut add = |a: u64, b: u64| {
         let is_over;
         (sum, is_over) = sum.overflowing_add(u128::from(a) * u128::from(b));
         above += u64::from(is_over);
+    };
+    // Four at a time, or registers are moved about for longer than numbers are multiplied.
+    let (a_blocks, a_rest) = a.as_chunks::<4>();
+    let (b_rest, b_blocks) = b.as_rchunks::<4>();
+    for (a, b) in a_blocks.iter().zip(b_blocks.iter().rev()) {
+        add(a[0], b[3]);
+        add(a[1], b[2]);
+        add(a[2], b[1]);
+        add(a[3], b[0]);
+    }
+    for (&a, &b) in a_rest.iter().zip(b_rest.iter().rev()) {
+        add(a, b);
     }
     (*low, *high) = (sum, above);
 }
@@ -254,9 +286,15 @@ fn shifted_down(limb: &[u64], shift: i32, found: &mut [u64]) {
 }
 
 /// A number whose first limb is above the point, times 2^`bits`.
-fn raised<const W: usize>(is_negative: bool, sum: &[u64], bits: i32, limbs: usize) -> Digits<W> {
+#[inline(always)]
+fn raised<const ROOM: usize, const W: usize>(
+    is_negative: bool,
+    sum: &[u64],
+    bits: i32,
+    limbs: usize,
+) -> Digits<W> {
     let (whole, bits) = (bits.div_euclid(64), bits.rem_euclid(64));
-    let mut found = [0; ROOM + 1];
+    let mut found = [0; ROOM];
     let found = &mut found[..=sum.len()];
     let mut below = 0;
     for i in (0..found.len()).rev() {

@@ -115,7 +115,8 @@ proptest! {
         let [a, b] = &powers;
         for total in first..=ORDER {
             let found = factors[0].product(&factors[1], &scale, total, first..=total);
-            let exact: BigInt = (first..=total).map(|j| integer(&a[j]) * integer(&b[total - j]) >> (64 * PLACES)).sum();
+            let term = |j: usize| (integer(&a[j]) * integer(&b[total - j])) >> (64 * PLACES);
+            let exact: BigInt = (first..=total).map(term).sum();
             let off = (integer(&found) - &exact).bits() as f64 - 64.0 * f64::from(PLACES) + total as f64 * step;
             let allowed = 2.0 * largest.max(0.0) - bits as f64;
             prop_assert!(off <= allowed || (integer(&found) - exact).bits() < 8, "{total}: 2^{off} > 2^{allowed}");

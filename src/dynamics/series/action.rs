@@ -38,13 +38,7 @@ struct ActionFactors<T: SeriesNumber> {
 impl<T: SeriesNumber> ActionFactors<T> {
     fn new(order: usize) -> Self {
         let (vectors, numbers) = (|| VectorFactor::new(order), || T::Factor::new(order));
-        Self {
-            turned: vectors(),
-            factor: numbers(),
-            force: vectors(),
-            velocity: vectors(),
-            rate: numbers(),
-        }
+        Self { turned: vectors(), factor: numbers(), force: vectors(), velocity: vectors(), rate: numbers() }
     }
 
     fn restart(&mut self, scale: &Scale<T>) {

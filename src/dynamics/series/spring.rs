@@ -65,7 +65,8 @@ impl<T: SeriesNumber> SpringFactors<T> {
     }
 
     fn are_sound(&self) -> bool {
-        let Self { span, square, weighted_square, inverse_length, inverse_square, closing, strain_rate } = self;
+        let Self { span, square, weighted_square, inverse_length, inverse_square, closing, strain_rate } =
+            self;
         let numbers = [square, weighted_square, inverse_length, inverse_square, closing, strain_rate];
         span.is_sound() && numbers.into_iter().all(CauchyFactor::is_sound)
     }
@@ -131,9 +132,8 @@ impl<T: SeriesNumber> SpringSeries<T> {
             } else {
                 let known = &self.inverse_length[..m];
                 let falling = known.iter().rev().zip(&square[1..]).enumerate();
-                let sum = falling.fold(T::ZERO, |sum, (j, (&s, &q))| {
-                    sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64)
-                });
+                let sum = falling
+                    .fold(T::ZERO, |sum, (j, (&s, &q))| sum + (q * s).scale(0.5 * (j + 1) as f64 - m as f64));
                 sum / square[0].scale(m as f64)
             };
             let stretched = product(span, &self.inverse_length[..=m], |a, b| a.times(b));
