@@ -283,33 +283,28 @@ impl<const W: usize> Motion<W> {
     /// Expands the state, and tells how long a step its series makes \[s\].
     ///
     /// Products are formed for the radius of convergence that the last step had, and steps may grow by a fifth.
-    /// Where powers turn out larger they are formed once more for the radius found, and then in full.
+    /// Where powers turn out larger, where there is no step before, and of mechanisms with loops, whose radius
+    /// changes too fast near singular positions, they are formed in full.
     fn expand(&mut self) -> f64 {
         let Precision { order, bits, .. } = self.precision;
         let far = -self.precision.tolerance() / order as f64;
-        let mut radius = self.state.radius;
-        for _ in 0..2 {
-            let Some(known) = radius else { break };
-            let scale = Scale::new(known, known - far + SLACK, order, bits);
+        let found = |wanted: f64| Some(libm::log2(wanted) + far).filter(|radius| radius.is_finite());
+        if let (Some(radius), Coordinates::Independent) = (self.state.radius, self.coordinates) {
+            let scale = Scale::new(radius, radius - far + SLACK, order, bits);
             let longest = scale.longest();
             self.series.rescale(scale);
             let wanted = self.expand_once();
-            radius = Some(libm::log2(wanted) + far).filter(|radius| radius.is_finite());
-            if wanted.is_nan() {
-                break;
-            }
             let step = short(wanted.min(longest).min(self.longest));
-            if self.series.is_sound() && self.is_enough(step) {
-                self.radius = radius;
+            if !wanted.is_nan() && self.series.is_sound() && self.is_enough(step) {
+                self.radius = found(wanted);
                 return step;
             }
         }
-        // Some power is larger than the last ones tell, or there is no step before.
         self.series.rescale(Scale::default());
         self.series.keep(Vec::new());
         let wanted = self.expand_once();
         self.series.keep(self.kept.clone());
-        self.radius = Some(libm::log2(wanted) + far).filter(|radius| radius.is_finite());
+        self.radius = found(wanted);
         if wanted.is_nan() { wanted } else { short(wanted.min(self.longest)) }
     }
 

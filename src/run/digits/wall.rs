@@ -127,5 +127,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
         *rate += after[k] - omega[k];
     }
     motion.state.impacts += 1;
+    // The next series is another one.
+    motion.state.radius = None;
     Ok(())
 }
