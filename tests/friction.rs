@@ -293,6 +293,42 @@ fn painleves_paradox_is_named() {
     }
 }
 
+/// Where 1 + 3 cos² = 3 mu sin |cos| the pressure on a uniform rod that is pushed over the floor grows without
+/// bound; the least such coefficient is 4/3, where tan phi = 2.
+#[test]
+fn the_paradox_begins_at_the_published_coefficient() {
+    let critical = |phi: f64| (1.0 + 3.0 * phi.cos().powi(2)) / (3.0 * phi.sin() * phi.cos().abs());
+    let steepest = PI - 2.0_f64.atan();
+    assert!((critical(steepest) - 4.0 / 3.0).abs() < 1e-15);
+    // Beyond omega² sin phi = 2 g the tip would lift off without a force.
+    let lifts = (2.0 * G / steepest.sin()).sqrt();
+    for phi in [steepest, PI - 0.9, PI - 1.35] {
+        for (share, omega) in [(1.0 - 1e-7, 0.0), (1.0 + 1e-7, 0.0), (1.0 + 1e-7, 1.5 * lifts)] {
+            for request in methods() {
+                let outcome = run(&scene(&rod(phi, omega, 1.0, critical(phi) * share, 1e-12)), &request);
+                let said = outcome.stop.map(|stop| stop.what);
+                match (share > 1.0, omega > 0.0) {
+                    (false, _) => assert_eq!(said, None, "{phi}"),
+                    (_, false) => assert!(
+                        said.as_ref().is_some_and(|said| said.contains("inconsistent")),
+                        "{phi}: {said:?}"
+                    ),
+                    (_, true) => assert!(
+                        said.as_ref().is_some_and(|said| said.contains("indeterminate")),
+                        "{phi}: {said:?}"
+                    ),
+                }
+            }
+        }
+    }
+    // Below 4/3 no angle has it.
+    for step in 1..60 {
+        let phi = PI * (0.5 + f64::from(step) / 120.0);
+        let outcome = run(&scene(&rod(phi, 0.0, 1.0, 4.0 / 3.0 * (1.0 - 1e-7), 1e-12)), &methods()[0]);
+        assert!(outcome.stop.is_none(), "{phi}: {:?}", outcome.stop);
+    }
+}
+
 /// A mechanism in absolute coordinates (x, y, phi of every centre), its joints by multipliers.
 pub struct Absolute {
     pub mass: Vec<[f64; 2]>,

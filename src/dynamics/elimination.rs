@@ -120,7 +120,8 @@ impl<const N: usize> Elimination<N> {
         for k in 0..n {
             power -= (load[k] - given[k]) * drive_rate[k];
         }
-        power += mechanism.force_power(t, Posture { phi: &self.phi, z: &kernel.z, omega });
+        let at = Posture { phi: &self.phi, z: &kernel.z, omega };
+        power += mechanism.force_power_beside(t, at, kernel.law_power);
         rate[..f].copy_from_slice(&u_rate[..f]);
         rate[f..2 * f].copy_from_slice(&acceleration[..f]);
         rate[2 * f] = power;

@@ -194,9 +194,10 @@ impl Mechanism {
         self.forces.iter().fold(sum, |sum, force| sum + force.energy(T::ZERO, Posture { phi, z, omega: &[] }))
     }
 
-    /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces.
+    /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces; returns the power of
+    /// those that are laws of their own \[W\], which their evaluation has at hand.
     #[inline(always)]
-    pub fn add_applied_forces<T: Real>(&self, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) {
+    pub fn add_applied_forces<T: Real>(&self, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) -> T {
         for (s, spring) in self.springs.iter().enumerate() {
             let force = match stretch.get(s) {
                 Some(&stretch) if spring.free_length > 0.0 => spring.stretched(stretch, at.z, at.omega),
@@ -214,9 +215,7 @@ impl Mechanism {
         for action in &self.actions {
             action.pull(action.factor(t), at.z, load);
         }
-        for force in &self.forces {
-            force.pull(moment(t), at, load);
-        }
+        self.forces.iter().fold(T::ZERO, |power, force| power + force.pull(moment(t), at, load))
     }
 
     /// Derivatives of all applied forces by the rates, column by column \[N·m·s\].
@@ -236,8 +235,14 @@ impl Mechanism {
     }
 
     /// Power of dampers and applied forces on the bodies \[W\].
+    pub fn force_power<T: Real>(&self, t: Time, at: Posture<T>) -> T {
+        let laws = self.forces.iter().fold(T::ZERO, |power, force| power + force.work_rate(moment(t), at));
+        self.force_power_beside(t, at, laws)
+    }
+
+    /// The same where the power of the [laws](Self::add_applied_forces) is known.
     #[inline(always)]
-    pub fn force_power<T: Real>(&self, t: Time, Posture { phi, z, omega }: Posture<T>) -> T {
+    pub fn force_power_beside<T: Real>(&self, t: Time, Posture { z, omega, .. }: Posture<T>, laws: T) -> T {
         let mut power = T::ZERO;
         for spring in self.springs.iter().filter(|spring| spring.damping != 0.0) {
             power += spring.drag_power(z, omega);
@@ -248,10 +253,7 @@ impl Mechanism {
         for action in &self.actions {
             power += action.power(action.factor(t), z, omega);
         }
-        for force in &self.forces {
-            power += force.work_rate(moment(t), Posture { phi, z, omega });
-        }
-        power
+        power + laws
     }
 
     /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start

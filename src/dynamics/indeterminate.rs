@@ -38,13 +38,23 @@ pub struct JointForces {
 type Unit = (Vec<f64>, Vec<f64>, Vec<Complex<f64>>);
 
 impl Mechanism {
+    /// How many independent joint forces move nothing.
+    fn open_forces(&self) -> usize {
+        (self.assembly.redundant.len() + self.assembly.singular.len()).min(self.constraints.len())
+    }
+
+    /// True where equilibrium leaves joint forces open.
+    pub(super) fn leaves_forces_open(&self) -> bool {
+        self.open_forces() > 0
+    }
+
     /// The joint forces of an evaluation of the equations at these angles \[rad\] and rates \[rad/s\]: its
     /// `load` must hold the accelerations and its `multiplier` those of all rows.  Those that redundant or
     /// singular rows leave open are the ones of least norm.
     pub fn joint_forces(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64]) -> JointForces {
         let (rows, joints) = (self.constraints.len(), self.joints.len());
         let hinges = self.hinge_forces(t, kernel, phi, omega);
-        let open = (self.assembly.redundant.len() + self.assembly.singular.len()).min(rows);
+        let open = self.open_forces();
         let is_known = if open == 0 { Some(true) } else { None };
         let mut found = JointForces {
             hinges,

@@ -78,6 +78,8 @@ pub struct Kernel<T> {
     /// The determinant of the equations of friction: 1 without it; where it is not positive, no tau follows
     /// from the state continuously.
     pub regularity: f64,
+    /// Power of forces that are laws of their own, of the last evaluation \[W\].
+    pub law_power: T,
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
     /// then.
     pub bodywise: Option<Box<Evaluation<T>>>,
@@ -144,6 +146,7 @@ impl<T: Scalar> Kernel<T> {
             friction: Vec::new(),
             friction_rows: Vec::new(),
             regularity: 1.0,
+            law_power: T::ZERO,
             bodywise: None,
             stretch: Vec::new(),
             vibration: Default::default(),
@@ -175,7 +178,8 @@ impl<T: Real> Kernel<T> {
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         mechanism.tree.mass_matrix::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         mechanism.tree.velocity_and_gravity_forces::<T, N>(&self.z, omega, &self.twist, &mut self.load);
-        mechanism.add_applied_forces(t, Posture { phi, z: &self.z, omega }, &self.stretch, &mut self.load);
+        let at = Posture { phi, z: &self.z, omega };
+        self.law_power = mechanism.add_applied_forces(t, at, &self.stretch, &mut self.load);
     }
 
     /// M and its twist at the elements in `z`, where there are such matrices.
@@ -213,7 +217,7 @@ impl<T: Real> Kernel<T> {
             && let Some(bodywise) = &mut self.bodywise
         {
             bodywise.unit_vectors(phi, &mut self.z);
-            bodywise.inward_pass(
+            self.law_power = bodywise.inward_pass(
                 mechanism,
                 t,
                 Posture { phi, z: &self.z, omega },
@@ -263,7 +267,7 @@ impl<T: Real> Kernel<T> {
         let Some(bodywise) = &mut self.bodywise else { return };
         bodywise.unit_vectors(phi, &mut self.z);
         let at = Posture { phi, z: &self.z, omega };
-        bodywise.inward_pass(mechanism, t, at, &self.stretch, &mut self.load);
+        self.law_power = bodywise.inward_pass(mechanism, t, at, &self.stretch, &mut self.load);
         if !mechanism.constraints.is_empty() {
             let found = (&mut self.rows[..], &mut self.multiplier[..], &mut self.correction[..]);
             self.weakest = bodywise.constrain(mechanism, t, at, bias, found);
@@ -304,7 +308,8 @@ impl<T: Real> Kernel<T> {
         if !self.friction.is_empty() {
             work -= self.friction_power(omega);
         }
-        (work + mechanism.force_power(t, Posture { phi, z: &self.z, omega }), stabilizer)
+        let at = Posture { phi, z: &self.z, omega };
+        (work + mechanism.force_power_beside(t, at, self.law_power), stabilizer)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::compile::CompileError;
 use super::configuration::{Configuration, Values};
-use super::constraint::{ConstraintEquation, Posture, Site};
+use super::constraint::{Aim, ConstraintEquation, Posture, Site};
 use super::forest::{Forest, turning_acceleration};
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
@@ -33,6 +33,19 @@ pub(crate) struct Outputs {
     parameters: Vec<f64>,
     /// True where joint forces are among them.
     needs_forces: bool,
+    /// True where accelerations of points are.
+    needs_accelerations: bool,
+}
+
+/// What the outputs of one moment share, and room for it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct OutputScratch {
+    /// Accelerations of the centres of mass \[m/s²\].
+    centres: Vec<Complex<f64>>,
+    forces: Forces,
+    needed: Vec<Complex<f64>>,
+    signals: Vec<f64>,
+    sources: Vec<f64>,
 }
 
 /// A moment of a motion: an evaluation of the equations there, with all multipliers.
@@ -52,6 +65,7 @@ pub(crate) struct Moment<'a> {
 }
 
 /// Joint forces and multipliers at a moment.
+#[derive(Clone, Debug, Default)]
 struct Forces {
     joints: Vec<Complex<f64>>,
     multipliers: Vec<f64>,
@@ -100,8 +114,12 @@ impl Outputs {
             )
         };
         let needs_forces = !list.iter().flat_map(|output| &output.expression.sources).all(is_state);
+        let is_acceleration =
+            |source: &Source<Site>| matches!(source, Source::Carried(Quantity::Acceleration(..)));
+        let named = list.iter().map(|output| &output.expression).chain(&signals);
+        let needs_accelerations = named.flat_map(|expression| &expression.sources).any(is_acceleration);
         let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
-        Ok(Some(Self { list, signals, parameters, needs_forces }))
+        Ok(Some(Self { list, signals, parameters, needs_forces, needs_accelerations }))
     }
 
     /// Names and units, in order.
@@ -110,38 +128,59 @@ impl Outputs {
     }
 
     /// Appends their values at a moment.
-    pub fn evaluate(&self, at: &Moment, values: &mut Vec<f64>) {
-        let Moment { mechanism, time, kernel, .. } = *at;
-        let forces = self.needs_forces.then(|| Forces::at(at));
+    pub fn evaluate(&self, at: &Moment, scratch: &mut OutputScratch, values: &mut Vec<f64>) {
+        let Moment { mechanism, time, omega, kernel, .. } = *at;
+        let OutputScratch { centres, forces, needed, signals, sources } = scratch;
+        if self.needs_forces || self.needs_accelerations {
+            mechanism.write_centre_accelerations(&kernel.z, omega, &kernel.load, centres);
+        }
+        if self.needs_forces {
+            forces.take(at, centres, needed);
+        }
+        let shared = Shared { centres, forces };
         let seen = Values { time: time.hi, phi: at.winding, z: &kernel.z, omega: at.omega };
         let configuration = Configuration::new(&seen);
         let parameters = mechanism.laws.as_ref().map_or(&self.parameters, |laws| &laws.parameters);
-        let (mut signals, mut sources) = (Vec::with_capacity(self.signals.len()), Vec::new());
+        signals.clear();
         let mut value = |expression: &Expression, signals: &[f64]| {
             let source = |source: &Source<Site>| match source {
                 Source::State(meaning) => meaning.value(&configuration, parameters, signals),
-                Source::Carried(quantity) => quantity.value(at, &configuration, forces.as_ref()),
+                Source::Carried(quantity) => quantity.value(at, &configuration, &shared),
             };
             sources.clear();
             sources.extend(expression.sources.iter().map(source));
             expression.formula.value(&sources)
         };
         for signal in &self.signals {
-            signals.push(value(signal, &signals));
+            signals.push(value(signal, signals));
         }
-        values.extend(self.list.iter().map(|output| value(&output.expression, &signals)));
+        values.extend(self.list.iter().map(|output| value(&output.expression, signals)));
     }
 }
 
 impl Forces {
-    fn at(&Moment { mechanism, time, phi, omega, kernel, .. }: &Moment) -> Self {
-        let found = mechanism.joint_forces(time, kernel, phi, omega);
-        let frictions = match mechanism.frictions.is_empty() {
-            true => Vec::new(),
-            false => kernel.friction_forces(mechanism, time, phi, omega),
-        };
-        Self { joints: found.hinges, multipliers: found.multipliers, frictions }
+    /// Takes those of a moment; `needed` is room for what bodies need.
+    fn take(&mut self, at: &Moment, centres: &[Complex<f64>], needed: &mut Vec<Complex<f64>>) {
+        let Moment { mechanism, time, phi, omega, kernel, .. } = *at;
+        if mechanism.leaves_forces_open() {
+            let found = mechanism.joint_forces(time, kernel, phi, omega);
+            (self.joints, self.multipliers) = (found.hinges, found.multipliers);
+        } else {
+            needed.clear();
+            needed.extend_from_slice(centres);
+            mechanism.write_hinge_forces(time, kernel, phi, omega, needed, &mut self.joints);
+            self.multipliers.clone_from(&kernel.multiplier);
+        }
+        if !mechanism.frictions.is_empty() {
+            self.frictions = kernel.friction_forces(mechanism, time, phi, omega);
+        }
     }
+}
+
+/// What quantities of a moment are read from.
+struct Shared<'a> {
+    centres: &'a [Complex<f64>],
+    forces: &'a Forces,
 }
 
 impl Component {
@@ -155,28 +194,32 @@ impl Component {
 }
 
 impl Quantity<Site> {
-    fn value(&self, at: &Moment, seen: &Configuration<f64>, forces: Option<&Forces>) -> f64 {
+    fn value(&self, at: &Moment, seen: &Configuration<f64>, shared: &Shared) -> f64 {
         let Moment { mechanism, time, omega, kernel, .. } = *at;
-        let (z, alpha) = (&kernel.z, &kernel.load);
+        let (z, alpha, forces) = (&kernel.z, &kernel.load, shared.forces);
         let row = |is_it: &dyn Fn(&ConstraintEquation) -> bool| {
             let number = mechanism.constraints[..mechanism.standing_rows()].iter().position(is_it)?;
-            Some((&mechanism.constraints[number], forces?.multipliers[number]))
+            Some((&mechanism.constraints[number], forces.multipliers[number]))
         };
-        let given = |name: &str| row(&|row| row.name == name && row.law.is_some());
+        let given = |name: &str| row(&|row| row.name == name && (row.law.is_some() || row.aim.is_some()));
         match self {
             Self::AngularAcceleration(body) => alpha[*body],
             Self::Acceleration(body, [x, y], component) => {
-                let centre = mechanism.centre_accelerations(z, omega, alpha)[*body];
+                let centre = shared.centres[*body];
                 let arm = z[*body].turn(Complex::new(*x, *y));
                 component.of(centre + turning_acceleration(arm, omega[*body], alpha[*body]))
             }
             Self::Joint(name, component) => {
                 let joint = mechanism.joints.iter().position(|joint| joint.name == *name);
-                joint.zip(forces).map_or(0.0, |(joint, forces)| component.of(forces.joints[joint]))
+                joint.map_or(0.0, |joint| component.of(forces.joints[joint]))
             }
             Self::Multiplier(name) => given(name).map_or(0.0, |(_, multiplier)| -multiplier),
             Self::Power(name) => given(name).map_or(0.0, |(row, multiplier)| {
-                let rate = row.law.as_ref().map_or(0.0, |law| law.rates::<f64>(time).0);
+                let drive = |aim: &Aim| aim.drive(time, Posture { phi: at.winding, z, omega });
+                let rate = match (&row.law, &row.aim) {
+                    (Some(law), _) => law.rates::<f64>(time).0,
+                    (None, aim) => aim.as_deref().map_or(0.0, drive),
+                };
                 -multiplier * rate
             }),
             Self::Push(name, component) => {
@@ -214,11 +257,11 @@ impl Quantity<Site> {
                 let wall = mechanism.contacts.iter().position(|contact| contact.row.name == *name);
                 let place = wall.and_then(|wall| mechanism.held.iter().position(|&held| held == wall));
                 let row = place.map(|place| mechanism.standing_rows() + place);
-                row.zip(forces).map_or(0.0, |(row, forces)| -forces.multipliers[row])
+                row.map_or(0.0, |row| -forces.multipliers[row])
             }
             Self::Friction(name) => {
                 let place = mechanism.frictions.iter().position(|friction| friction.name == *name);
-                place.zip(forces).map_or(0.0, |(place, forces)| -forces.frictions[place][0])
+                place.map_or(0.0, |place| -forces.frictions[place][0])
             }
         }
     }

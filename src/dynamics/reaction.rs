@@ -40,12 +40,25 @@ impl Mechanism {
         omega: &[T],
         alpha: &[T],
     ) -> Vec<Complex<T>> {
-        let mut found = vec![Complex::ZERO; self.bodies.len()];
-        self.forest.origin_accelerations(z, omega, alpha, &mut found);
+        let mut found = Vec::new();
+        self.write_centre_accelerations(z, omega, alpha, &mut found);
+        found
+    }
+
+    /// Writes them.
+    pub(super) fn write_centre_accelerations<T: Scalar>(
+        &self,
+        z: &[Complex<T>],
+        omega: &[T],
+        alpha: &[T],
+        found: &mut Vec<Complex<T>>,
+    ) {
+        found.clear();
+        found.resize(self.bodies.len(), Complex::ZERO);
+        self.forest.origin_accelerations(z, omega, alpha, found);
         for (k, (found, body)) in found.iter_mut().zip(&self.bodies).enumerate() {
             *found += turning_acceleration(z[k].turn(body.centre), omega[k], alpha[k]);
         }
-        found
     }
 
     /// Force \[N\] of the first body of each hinge on the second (in the scene's order), from an evaluation
@@ -58,11 +71,28 @@ impl Mechanism {
         phi: &[f64],
         omega: &[f64],
     ) -> Vec<Complex<f64>> {
-        let mut needed = self.needed_forces(t, &kernel.z, phi, omega, &kernel.load);
+        let mut needed = self.centre_accelerations(&kernel.z, omega, &kernel.load);
+        let mut forces = Vec::new();
+        self.write_hinge_forces(t, kernel, phi, omega, &mut needed, &mut forces);
+        forces
+    }
+
+    /// Writes them, of accelerations of the centres in `needed`.
+    pub(super) fn write_hinge_forces(
+        &self,
+        t: Time,
+        kernel: &Kernel<f64>,
+        phi: &[f64],
+        omega: &[f64],
+        needed: &mut [Complex<f64>],
+        forces: &mut Vec<Complex<f64>>,
+    ) {
+        self.turn_into_needed(t, Posture { phi, z: &kernel.z, omega }, needed);
         for ((friction, _), &tau) in self.sliding().zip(&kernel.friction) {
-            friction.tangent.add_force(&kernel.z, tau, &mut needed);
+            friction.tangent.add_force(&kernel.z, tau, needed);
         }
-        self.transmitted(&kernel.z, &kernel.multiplier, needed)
+        forces.clear();
+        self.transmit(&kernel.z, &kernel.multiplier, needed, forces);
     }
 
     /// The force \[N\] that every body needs from its joints and constraints at these accelerations.
@@ -75,6 +105,13 @@ impl Mechanism {
         alpha: &[T],
     ) -> Vec<Complex<T>> {
         let mut needed = self.centre_accelerations(z, omega, alpha);
+        self.turn_into_needed(t, Posture { phi, z, omega }, &mut needed);
+        needed
+    }
+
+    /// Replaces the acceleration of the centre of every body by the force that it needs.
+    fn turn_into_needed<T: Real>(&self, t: Time, at: Posture<T>, needed: &mut [Complex<T>]) {
+        let Posture { z, omega, .. } = at;
         for (needed, body) in needed.iter_mut().zip(&self.bodies) {
             *needed = (*needed - Complex::of(self.gravity)).times(T::of(body.mass));
         }
@@ -90,9 +127,8 @@ impl Mechanism {
             needed[action.body] -= action.force(action.factor(t), z);
         }
         for user in &self.forces {
-            user.forces(moment(t), Posture { phi, z, omega }, |body, force| needed[body] -= force);
+            user.forces(moment(t), at, |body, force| needed[body] -= force);
         }
-        needed
     }
 
     /// The share of accelerations in [`Mechanism::needed_forces`].
@@ -112,10 +148,22 @@ impl Mechanism {
         multipliers: &[T],
         mut needed: Vec<Complex<T>>,
     ) -> Vec<Complex<T>> {
+        let mut forces = Vec::with_capacity(self.joints.len());
+        self.transmit(z, multipliers, &mut needed, &mut forces);
+        forces
+    }
+
+    /// Appends them; what each body passes on takes the place of what it needs.
+    fn transmit<T: Scalar>(
+        &self,
+        z: &[Complex<T>],
+        multipliers: &[T],
+        carried: &mut [Complex<T>],
+        forces: &mut Vec<Complex<T>>,
+    ) {
         for (row, &multiplier) in self.constraints.iter().zip(multipliers) {
-            row.add_force(z, multiplier, &mut needed);
+            row.add_force(z, multiplier, carried);
         }
-        let mut carried = needed;
         for &body in self.forest.order.iter().rev() {
             if let Some(parent) = self.forest.hangs[body].origin_point.parent() {
                 let force = carried[body];
@@ -129,6 +177,6 @@ impl Mechanism {
             (None, Some(row)) => Complex::new(multipliers[row], multipliers[row + 1]),
             (None, None) => Complex::ZERO,
         };
-        self.joints.iter().map(force).collect()
+        forces.extend(self.joints.iter().map(force));
     }
 }

@@ -26,7 +26,7 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::Joint;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::Moment;
+use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -195,7 +195,11 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
         let winding: Vec<f64> = (0..phi.len()).map(|k| start.unwrapped(k)).collect();
         let (time, phi, winding, omega) = (start.time, &phi[..], &winding[..], &omega[..]);
         let mut values = Vec::new();
-        outputs.evaluate(&Moment { mechanism, time, phi, winding, omega, kernel: &kernel }, &mut values);
+        outputs.evaluate(
+            &Moment { mechanism, time, phi, winding, omega, kernel: &kernel },
+            &mut OutputScratch::default(),
+            &mut values,
+        );
         let named = outputs.heads().zip(values);
         found.outputs = named.map(|((name, unit), value)| (name.into(), unit.into(), value)).collect();
     }

@@ -17,18 +17,19 @@ use std::path::Path;
 /// the reference solution's, which is `trust_wall_s`.
 pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value {
     let Outcome { plan, statistics, drift, .. } = outcome;
-    let constraints: Map<String, Value> = (drift.constraints.iter().zip(&mechanism.constraints))
-        .map(|((name, [position, velocity]), row)| {
-            let levels = json!({
-                "position_max": position.max,
-                "velocity_max": velocity.max,
-                "position_slope": position.slope(),
-                "velocity_slope": velocity.slope(),
-                "unit": row.unit(),
-            });
-            (name.clone(), levels)
-        })
-        .collect();
+    let constraints: Map<String, Value> =
+        (drift.constraints.iter().zip(&mechanism.with_all_parts().constraints))
+            .map(|((name, [position, velocity]), row)| {
+                let levels = json!({
+                    "position_max": position.max,
+                    "velocity_max": velocity.max,
+                    "position_slope": position.slope(),
+                    "velocity_slope": velocity.slope(),
+                    "unit": row.unit(),
+                });
+                (name.clone(), levels)
+            })
+            .collect();
     let stabilizer = (!mechanism.constraints.is_empty())
         .then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
     let impacts = (!mechanism.contacts.is_empty())
@@ -190,7 +191,9 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     if drift.kind != "energy" {
         page.entry("", &format!("measured on {}", drift.kind));
     }
-    for ((name, [position, velocity]), row) in drift.constraints.iter().zip(&mechanism.constraints) {
+    for ((name, [position, velocity]), row) in
+        drift.constraints.iter().zip(&mechanism.with_all_parts().constraints)
+    {
         let unit = row.unit();
         page.entry(
             "constraint",

@@ -436,7 +436,7 @@ impl EventDetector {
     ) {
         let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
         let is_enough = |curve: &Chebyshev| curve.tail() <= self.resolved * curve.most();
-        let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, |_, curve| is_enough(curve));
+        let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));
         let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
         if !is_resolved && depth < HALVINGS {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);

@@ -9,7 +9,7 @@
 use super::inside::{Inside, StepWatcher};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::Moment;
+use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated};
 use serde::{Deserialize, Serialize};
@@ -18,6 +18,10 @@ use std::sync::Arc;
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
+/// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the degree
+/// are what the dense output is off, where its pieces join: neither a higher degree nor halves have less.
+const NOISE: f64 = 1e-6;
+const FALLS: f64 = 0.3;
 /// What an output may be beside its interpolant, over the largest value, for a step to be passed over, and
 /// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
@@ -118,6 +122,7 @@ pub(super) struct ExtremesDetector {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
     coordinates: [Vec<f64>; 3],
+    scratch: OutputScratch,
     pub memory: ExtremesMemory,
 }
 
@@ -129,6 +134,7 @@ impl ExtremesDetector {
             kernel: Kernel::new(mechanism),
             mechanism: Arc::clone(mechanism),
             coordinates: Default::default(),
+            scratch: OutputScratch::default(),
             memory: ExtremesMemory { found: vec![Found::default(); count], ..ExtremesMemory::default() },
         })
     }
@@ -168,7 +174,7 @@ impl ExtremesDetector {
 
     /// Appends the outputs at a motion.
     fn values(&mut self, motion: &Motion, values: &mut Vec<f64>) {
-        let Self { mechanism, kernel, coordinates: [phi, winding, omega], .. } = self;
+        let Self { mechanism, kernel, coordinates: [phi, winding, omega], scratch, .. } = self;
         for (to, from) in [(&mut *phi, &motion.phi), (&mut *omega, &motion.omega)] {
             to.clear();
             to.extend(from.iter().map(|value| value.hi));
@@ -178,7 +184,11 @@ impl ExtremesDetector {
         kernel.accelerate::<0>(mechanism, motion.time, phi, omega, Bias::default());
         mechanism.spread_multipliers(kernel);
         let Some(outputs) = &mechanism.outputs else { return };
-        outputs.evaluate(&Moment { mechanism, time: motion.time, phi, winding, omega, kernel }, values);
+        outputs.evaluate(
+            &Moment { mechanism, time: motion.time, phi, winding, omega, kernel },
+            scratch,
+            values,
+        );
     }
 
     /// True where no output comes near a new extreme, as the interpolants of a low degree tell, of which the
@@ -188,8 +198,10 @@ impl ExtremesDetector {
             self.memory.waits -= 1;
             return false;
         }
+        let known = self.memory.found.clone();
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
-        let Interpolants { curves, nodes, values, .. } = interpolated(&DEGREES[..1], at, |_, _| true);
+        let is_enough = |k: usize, curve: &Chebyshev, _: Option<&Chebyshev>| known[k].holds(curve);
+        let Interpolants { curves, nodes, values, .. } = interpolated(&DEGREES[..2], at, is_enough);
         let found = &mut self.memory.found;
         if !curves.iter().zip(&*found).all(|(curve, found)| found.holds(curve)) {
             self.memory.waits = WAITS;
@@ -204,7 +216,11 @@ impl ExtremesDetector {
 
     fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
-        let is_enough = |_: usize, curve: &Chebyshev| curve.tail() <= RESOLVED * curve.most();
+        let is_enough = |_: usize, curve: &Chebyshev, lower: Option<&Chebyshev>| {
+            let (tail, size) = (curve.tail(), curve.most());
+            let is_noise = lower.is_some_and(|lower| tail > FALLS * lower.tail());
+            tail <= RESOLVED * size || tail <= NOISE * size && is_noise
+        };
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
         if !is_resolved && depth < HALVINGS {
             self.look(inside, begin, 0.5 * span, depth + 1);

@@ -135,7 +135,7 @@ fn first_passage(
         let there = at(begin + share * span);
         row.extend((0..first.phi.len()).map(|bar| winding(bar, first, &there)));
     };
-    let angles = interpolated(&DEGREES, angles_at, |_, angle| angle.tail() < RESOLVED).values;
+    let angles = interpolated(&DEGREES, angles_at, |_, angle, _| angle.tail() < RESOLVED).values;
     let mut found: Option<(f64, usize, f64)> = None;
     for (bar, angles) in angles.iter().enumerate() {
         for side in [1.0, -1.0] {

@@ -7,7 +7,7 @@ use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::energy::Energy;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::Moment;
+use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -111,6 +111,7 @@ pub struct Sampler {
     /// Energy less work at the start, in full; impacts shift it.
     reference: Option<DoubleDouble>,
     sample: Sample,
+    scratch: OutputScratch,
 }
 
 impl Sampler {
@@ -134,6 +135,7 @@ impl Sampler {
                 motors: vec![[0.0; 2]; rows],
                 ..Sample::default()
             },
+            scratch: OutputScratch::default(),
             holding: Arc::clone(&mechanism),
             mechanism,
         }
@@ -236,7 +238,7 @@ impl Sampler {
                 kernel: &self.plain,
             };
             sample.outputs.clear();
-            outputs.evaluate(&moment, &mut sample.outputs);
+            outputs.evaluate(&moment, &mut self.scratch, &mut sample.outputs);
         }
         sample
     }

@@ -138,7 +138,7 @@ fn searched(
         let [here, _] = ends(spring, bodies, &at(share * span), z);
         row.extend([here.re / free, here.im / free]);
     };
-    let length = Length(interpolated(&DEGREES, ends_at, |_, part| part.tail() < RESOLVED).curves);
+    let length = Length(interpolated(&DEGREES, ends_at, |_, part, _| part.tail() < RESOLVED).curves);
     match crossing(&length, 1.0) {
         Crossing::At(share) => Some(share * span),
         Crossing::Inside(_) => Some(0.0),

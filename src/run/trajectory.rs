@@ -69,7 +69,7 @@ impl Recorder {
     }
 }
 
-fn is_enough(_: usize, curve: &Chebyshev) -> bool {
+fn is_enough(_: usize, curve: &Chebyshev, _: Option<&Chebyshev>) -> bool {
     curve.tail() <= RESOLVED * curve.most() || !curve.most().is_finite()
 }
 

@@ -286,7 +286,7 @@ impl Search {
             row.extend(opaque.iter().map(|&event| gaps[event]));
         };
         // What stays that far from zero need not be known better.
-        let is_enough = |_: usize, curve: &Chebyshev| {
+        let is_enough = |_: usize, curve: &Chebyshev, _: Option<&Chebyshev>| {
             curve.tail() <= RESOLVED * curve.most() || curve.least() > 10.0 * curve.tail()
         };
         let mut parts = vec![(0.0, 1.0, 0)];

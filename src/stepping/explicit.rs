@@ -100,6 +100,8 @@ pub struct Explicit<P> {
     has_extra: bool,
     /// Coefficients of that interpolation, for each unknown, where it was asked for.
     nested: Vec<[f64; NESTED]>,
+    /// The largest value of what its last coefficient is that of.
+    highest: f64,
     /// What makes shorter steps where the interpolation is too coarse.
     shorter: Option<Box<Self>>,
     pair: PhantomData<P>,
@@ -135,6 +137,7 @@ impl<P: Pair> Explicit<P> {
             length: 0.0,
             has_extra: false,
             nested: Vec::new(),
+            highest: highest::<P>(),
             shorter: None,
             pair: PhantomData,
         }
@@ -254,7 +257,7 @@ impl<P: Pair> Explicit<P> {
         inside.memory.clear();
         inside.time = time;
         let share = (time - from.time).hi / self.length;
-        let (most, mut off) = (highest::<P>() * <Self as Stride<F>>::off(share), 0.0_f64);
+        let (most, mut off) = (self.highest * <Self as Stride<F>>::off(share), 0.0_f64);
         for (i, nested) in self.nested.iter().enumerate() {
             let change = share * nest(&nested[..P::DEGREE], share);
             (inside.y[i], inside.low[i]) = two_sum(from.y[i], change + from.low[i]);

@@ -4,6 +4,87 @@ use super::double_double::{Dd, Vec2};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
+/// What the auditor judges of a scene: lists of parts with their keys, and plain keys.
+const PARTS: [(&str, &[&str]); 10] = [
+    ("bars", &["mass", "centre", "inertia", "length", "width", "thickness", "density"]),
+    ("hinges", &["between"]),
+    ("welds", &["between"]),
+    ("sliders", &["point", "rail", "angle"]),
+    ("locks", &["body", "relative_to", "angle"]),
+    ("motors", &["body", "relative_to", "slider", "law"]),
+    ("springs", &["between", "stiffness", "free_length", "damping", "model"]),
+    ("torsion_springs", &["body", "relative_to", "stiffness", "free_angle", "damping"]),
+    ("forces", &["body", "point", "force", "frame", "law"]),
+    ("torques", &["body", "relative_to", "torque", "law"]),
+];
+/// Those of walls.
+const WALL: [&str; 4] = ["body", "point", "line", "restitution"];
+/// Keys that change nothing of the motion.
+const ASIDE: [&str; 11] = [
+    "name",
+    "description",
+    "gravity",
+    "start",
+    "until",
+    "every",
+    "rows",
+    "points",
+    "outputs",
+    "method",
+    "walls",
+];
+
+/// What of a scene the auditor does not judge, by name: keys it does not know, as `events` or
+/// `walls.floor.friction`, and formulas, as `springs.s.tension`.  It must be nothing where a scene is read.
+pub fn unjudged(scene: &Value) -> Vec<String> {
+    let mut found = Vec::new();
+    for (key, value) in scene.as_object().into_iter().flatten() {
+        let known = PARTS.iter().find(|(list, _)| list == key).map(|(_, keys)| *keys);
+        let Some(known) = known.or((key == "walls").then_some(&WALL[..])) else {
+            match ASIDE.contains(&key.as_str()) {
+                true if holds_formula(value)
+                    && ["start", "gravity", "until", "every"].contains(&key.as_str()) =>
+                {
+                    found.push(key.clone());
+                }
+                true => {}
+                false => found.push(key.clone()),
+            }
+            continue;
+        };
+        for part in value.as_array().into_iter().flatten() {
+            for (inner, value) in part.as_object().into_iter().flatten() {
+                let is_own =
+                    known.contains(&inner.as_str()) || ["name", "description"].contains(&inner.as_str());
+                // Numbers alone; what stands in words there are names of bodies, frames and models.
+                let is_formula = !WORDS.contains(&inner.as_str()) && holds_formula(value);
+                let turns = key == "walls" && inner == "line" && value.get("body").is_some();
+                if !is_own || is_formula || turns {
+                    found.push(format!("{key}.{}.{inner}", part["name"].as_str().unwrap_or("?")));
+                }
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+/// Keys whose text is none of a formula.
+const WORDS: [&str; 9] =
+    ["name", "description", "body", "relative_to", "slider", "angle", "frame", "model", "inertia"];
+
+/// True where a number is given as text, in whatever depth.
+fn holds_formula(value: &Value) -> bool {
+    match value {
+        Value::String(_) => true,
+        Value::Array(list) => list.iter().any(holds_formula),
+        Value::Object(object) => {
+            object.iter().any(|(key, value)| !WORDS.contains(&key.as_str()) && holds_formula(value))
+        }
+        _ => false,
+    }
+}
+
 /// A scene as the auditor understands it.  Points of bodies are measured from their centres of mass.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -184,9 +265,11 @@ impl Law {
 }
 
 impl Scene {
-    /// Reads a scene that the program accepts.
+    /// Reads a scene that the program accepts, of which nothing is [`unjudged`].
     pub fn read(text: &str) -> Self {
         let json: Value = serde_json::from_str(text).expect("JSON");
+        let unjudged = unjudged(&json);
+        assert!(unjudged.is_empty(), "the auditor does not judge {}", unjudged.join(", "));
         let mut scene = Self { gravity: Vec2::of(pair(&json["gravity"])), ..Self::default() };
         scene.bodies = list(&json, "bars").map(|bar| body(bar, &json["start"])).collect();
         let names: Names = scene.bodies.iter().enumerate().map(|(k, body)| (body.name.clone(), k)).collect();

@@ -179,6 +179,29 @@ impl Tape {
         Self::new(&self.operations, &mut results.to_vec()).inputs().collect()
     }
 
+    /// Calls `then` with the results of all operations; up to 256 of them need no allocation.
+    #[inline]
+    pub fn results<S: Scalar, R>(&self, input: impl Fn(u32) -> S, then: impl FnOnce(&[S]) -> R) -> R {
+        match self.len() {
+            0..=16 => self.results_in([S::ZERO; 16], input, then),
+            17..=64 => self.results_in([S::ZERO; 64], input, then),
+            65..=256 => self.results_in([S::ZERO; 256], input, then),
+            count => self.results_in(vec![S::ZERO; count], input, then),
+        }
+    }
+
+    #[inline]
+    fn results_in<S: Scalar, R>(
+        &self,
+        mut room: impl AsMut<[S]>,
+        input: impl Fn(u32) -> S,
+        then: impl FnOnce(&[S]) -> R,
+    ) -> R {
+        let slots = &mut room.as_mut()[..self.len()];
+        self.evaluate(input, slots);
+        then(slots)
+    }
+
     /// Writes the results of all operations to `slots`, of which there must be [`Tape::len`].
     #[inline]
     pub fn evaluate<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut [S]) {

@@ -90,8 +90,7 @@ impl Aim {
         self.slopes.iter().map(|slope| slope.0)
     }
 
-    /// Takes it off a row.
-    pub fn subtract<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T], here: &mut Linearised<T>) {
+    fn results<T: Real, R>(&self, t: Time, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
         let input = |number: u32| match self.inputs[number as usize] {
             Input::Time => T::split(t).0,
             Input::Angle(k) | Input::Origin(k) => at.phi[k],
@@ -99,14 +98,24 @@ impl Aim {
             Input::Sine(k) => at.z[k].im,
             Input::Rate(k) => at.omega[k],
         };
-        let mut slots = vec![T::ZERO; self.tape.len()];
-        self.tape.evaluate(input, &mut slots);
-        here.position -= slots[self.value as usize];
-        here.drive -= slots[self.drive as usize];
-        here.convective -= slots[self.convective as usize];
-        for &(k, slope) in &self.slopes {
-            jacobian[k] -= slots[slope as usize];
-        }
+        self.tape.results(input, then)
+    }
+
+    /// Its explicit rate f_t.
+    pub fn drive(&self, t: Time, at: Posture<f64>) -> f64 {
+        self.results(t, at, |slots| slots[self.drive as usize])
+    }
+
+    /// Takes it off a row.
+    pub fn subtract<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T], here: &mut Linearised<T>) {
+        self.results(t, at, |slots| {
+            here.position -= slots[self.value as usize];
+            here.drive -= slots[self.drive as usize];
+            here.convective -= slots[self.convective as usize];
+            for &(k, slope) in &self.slopes {
+                jacobian[k] -= slots[slope as usize];
+            }
+        });
     }
 }
 

@@ -330,10 +330,7 @@ impl Formulas {
             return all;
         }
         let signals = self.signals(at, parameters, modes);
-        let laws = self.laws.iter().flat_map(Law::expressions);
-        let profiles =
-            self.profiles.iter().map(|profile| &profile.1).chain(self.aims.iter().map(|aim| &aim.2));
-        for expression in self.signals.iter().chain(laws).chain(profiles) {
+        for expression in self.switched() {
             if expression.formula.conditions() > 0 {
                 let values = expression.values(at, parameters, &signals);
                 expression.formula.condition_values(&values, expression.modes(modes), &mut all);
@@ -344,25 +341,38 @@ impl Formulas {
 
     /// The modes at a configuration, by the signs of the conditions there.
     pub fn modes(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<bool> {
-        let mut modes = vec![false; self.conditions.len()];
-        // A condition may contain what earlier ones choose.
-        for _ in 0..=modes.len() {
-            let next: Vec<bool> =
-                self.condition_values(at, parameters, &modes).iter().map(|value| *value > 0.0).collect();
-            if next == modes {
-                break;
+        let mut modes = Vec::with_capacity(self.conditions.len());
+        if self.conditions.is_empty() {
+            return modes;
+        }
+        let signals = self.signals_there(at, parameters);
+        for expression in self.switched() {
+            if expression.formula.conditions() > 0 {
+                modes.extend(expression.formula.modes(&expression.values(at, parameters, &signals)));
             }
-            modes = next;
         }
         modes
     }
 
-    fn value(&self, expression: &Expression, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
+    /// Every formula whose conditions count, in the order in which they are numbered.
+    fn switched(&self) -> impl Iterator<Item = &Expression> {
+        let laws = self.laws.iter().flat_map(Law::expressions);
+        let profiles = self.profiles.iter().map(|profile| &profile.1);
+        self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
+    }
+
+    /// The signals on the branches that hold at a configuration.
+    fn signals_there(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
         let mut signals = Vec::with_capacity(self.signals.len());
         for signal in &self.signals {
             let values = signal.values(at, parameters, &signals);
             signals.push(signal.formula.value(&values));
         }
+        signals
+    }
+
+    fn value(&self, expression: &Expression, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
+        let signals = self.signals_there(at, parameters);
         expression.formula.value(&expression.values(at, parameters, &signals))
     }
 

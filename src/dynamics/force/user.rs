@@ -331,8 +331,6 @@ impl UserForce {
     /// Evaluates a tape at `time` \[s\] and calls `then` with all results.
     #[inline]
     fn at<T: Scalar, R>(&self, tape: &Tape, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
-        /// So many results need no allocation.
-        const FEW: usize = 48;
         let input = |number: u32| match self.inputs[number as usize] {
             Input::Time => time,
             Input::Angle(body) => at.phi[body],
@@ -344,18 +342,11 @@ impl UserForce {
             Input::XRate(site) => self.sites[site].point.velocity(at.z, at.omega).re,
             Input::YRate(site) => self.sites[site].point.velocity(at.z, at.omega).im,
         };
-        if tape.len() <= FEW {
-            let mut slots = [T::ZERO; FEW];
-            tape.evaluate(input, &mut slots[..tape.len()]);
-            return then(&slots);
-        }
-        let mut slots = vec![T::ZERO; tape.len()];
-        tape.evaluate(input, &mut slots);
-        then(&slots)
+        tape.results(input, then)
     }
 
     /// Calls `force` with every site and the force \[N\] there, and `torque` with every body and the torque
-    /// \[N·m\] on it.
+    /// \[N·m\] on it; returns the power accounted as work \[W\].
     #[inline]
     fn each<T: Scalar>(
         &self,
@@ -364,9 +355,9 @@ impl UserForce {
         at: Posture<T>,
         mut force: impl FnMut(&Site, Complex<T>),
         mut torque: impl FnMut(usize, T),
-    ) {
+    ) -> T {
         if part.tape.is_empty() {
-            return;
+            return T::ZERO;
         }
         self.at(&part.tape, time, at, |slots| {
             for &(site, [x, y]) in &part.forces {
@@ -375,19 +366,20 @@ impl UserForce {
             for &(body, slot) in &part.torques {
                 torque(body, slots[slot as usize]);
             }
-        });
+            part.power.map_or(T::ZERO, |slot| slots[slot as usize])
+        })
     }
 
-    /// Adds the generalized forces \[N·m, N\] of a part.
-    fn pull_part<T: Scalar>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) {
+    /// Adds the generalized forces \[N·m, N\] of a part; returns its power accounted as work \[W\].
+    fn pull_part<T: Scalar>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) -> T {
         let load = std::cell::RefCell::new(load);
         let pull = |site: &Site, force| site.point.pull(force, at.z, &mut load.borrow_mut());
-        self.each(part, time, at, pull, |body, torque| load.borrow_mut()[body] += torque);
+        self.each(part, time, at, pull, |body, torque| load.borrow_mut()[body] += torque)
     }
 
-    /// Adds all its generalized forces \[N·m, N\].
-    pub fn pull<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) {
-        self.parts.iter().for_each(|part| self.pull_part(part, time, at, load));
+    /// Adds all its generalized forces \[N·m, N\]; returns the power accounted as work \[W\].
+    pub fn pull<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) -> T {
+        self.parts.iter().fold(T::ZERO, |power, part| power + self.pull_part(part, time, at, load))
     }
 
     /// Adds those of its potential.

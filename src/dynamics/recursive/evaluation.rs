@@ -91,7 +91,7 @@ impl<T: Real> Evaluation<T> {
     }
 
     /// The factors of M, and what is left of all forces, springs by their stretches where these are known;
-    /// overwrites `load`.
+    /// overwrites `load`.  Returns the power of the laws among them \[W\].
     #[inline]
     pub fn inward_pass(
         &mut self,
@@ -100,14 +100,16 @@ impl<T: Real> Evaluation<T> {
         at: Posture<T>,
         stretch: &[T],
         load: &mut [T],
-    ) {
+    ) -> T {
         self.trees.convect(&self.recursion.links, at.z, at.omega);
+        let mut law_power = T::ZERO;
         if mechanism.is_forced() {
             load.fill(T::ZERO);
-            mechanism.add_applied_forces(t, at, stretch, load);
+            law_power = mechanism.add_applied_forces(t, at, stretch, load);
             self.trees.burden(&self.recursion.links, load);
         }
         self.trees.inward_pass(&self.recursion.links);
+        law_power
     }
 
     /// Writes the accelerations \[rad/s², m/s²\].

@@ -29,13 +29,14 @@ pub fn overlay(scene: &Scene, mechanism: &Mechanism, outcomes: &[&Outcome]) -> R
     let moving: Vec<usize> = (0..mechanism.constraints.len())
         .filter(|&r| outcomes.iter().any(|outcome| is_off(outcome, r)))
         .collect();
+    let rows = &mechanism.with_all_parts().constraints;
     let panel = |unit: &str, level: usize| ResidualPanel {
         name: defect_name(level, unit),
         series: (outcomes.iter())
             .flat_map(|outcome| {
                 let kind = outcome.plan.stabilization.to_string();
                 (outcome.drift.constraints.iter().enumerate())
-                    .filter(|(r, _)| moving.contains(r) && mechanism.constraints[*r].unit() == unit)
+                    .filter(|(r, _)| moving.contains(r) && rows[*r].unit() == unit)
                     .map(move |(r, (constraint, _))| {
                         let several = outcome.drift.constraints.len() > 1;
                         let name =

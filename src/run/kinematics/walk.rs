@@ -4,7 +4,7 @@ use super::transmission::Transmission;
 use super::{FOUND, KinematicsError, Limit, Position};
 use crate::arithmetic::Scalar;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::Moment;
+use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::scene::Scene;
 use crate::stabilization::projection::project;
@@ -375,7 +375,7 @@ impl Walk {
                 omega: &self.state.y[n..2 * n],
                 kernel: &self.kernel,
             };
-            outputs.evaluate(&moment, &mut values);
+            outputs.evaluate(&moment, &mut OutputScratch::default(), &mut values);
         }
         values
     }

@@ -4,7 +4,7 @@ use super::super::event::SwitchFunction;
 use super::saltation::{Side, event_value, moved};
 use super::variation::Variation;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::Moment;
+use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::scene::Output;
 use std::fmt;
@@ -95,7 +95,11 @@ fn outputs_at(
     mechanism.spread_multipliers(kernel);
     let turned = |k: usize| motion.unwrapped(k) - motion.phi[k].hi;
     let winding: Vec<f64> = (0..phi.len()).map(|k| phi[k] + turned(k)).collect();
-    outputs.evaluate(&Moment { mechanism, time: t, phi, winding: &winding, omega, kernel }, &mut values);
+    outputs.evaluate(
+        &Moment { mechanism, time: t, phi, winding: &winding, omega, kernel },
+        &mut OutputScratch::default(),
+        &mut values,
+    );
     values
 }
 

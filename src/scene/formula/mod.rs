@@ -8,12 +8,14 @@
 //! [`conditions`](Formula::conditions) changes sign.  Which branches hold is said from outside, so that a
 //! method never steps across a corner unawares.
 
+mod branches;
 mod error;
 mod parse;
 mod table;
 pub mod unit;
 mod wave;
 
+use branches::{Branches, BySign, Given, Knots, Noted, Watched};
 pub use error::FormulaError;
 pub(crate) use error::meant;
 pub use table::{Interpolant, POINTS};
@@ -71,6 +73,8 @@ enum Node {
     Flip(usize, usize),
     /// a where the condition of this number is positive, else b.
     Select(usize, usize, usize),
+    /// The table of this number at a, on the piece that conditions from the second number on say.
+    Table(usize, usize, usize),
 }
 
 impl Node {
@@ -86,7 +90,8 @@ impl Node {
             | Self::Cosine(a)
             | Self::Tangent(a)
             | Self::HyperbolicTangent(a)
-            | Self::Flip(_, a) => [Some(a), None],
+            | Self::Flip(_, a)
+            | Self::Table(_, _, a) => [Some(a), None],
             Self::Sum(a, b)
             | Self::Difference(a, b)
             | Self::Product(a, b)
@@ -111,8 +116,10 @@ pub struct Formula {
     places: Vec<(u32, u32)>,
     /// Names and the byte each first stands at.
     names: Vec<(String, usize)>,
-    /// The nodes whose signs choose the branches.
+    /// The nodes whose signs choose the branches, or the arguments of tables.
     conditions: Vec<usize>,
+    /// The tables in it.
+    tables: Vec<Interpolant>,
 }
 
 impl Formula {
@@ -162,18 +169,18 @@ impl Formula {
     /// Its value in doubles, every branch as the conditions say there; `values` are those of
     /// [`names`](Self::names), in this order.  A missing one counts as zero.
     pub fn value(&self, values: &[f64]) -> f64 {
-        self.run(values, |_, condition| condition > 0.0)
+        self.run(values, &mut BySign)
     }
 
     /// Its value over any scalar, on the branches where the conditions whose bits are set are positive.
     pub fn evaluate<S: Scalar>(&self, values: &[S], bits: &[bool]) -> S {
-        self.run(values, |number, _| bits.get(number).copied().unwrap_or(false))
+        self.run(values, &mut Given(bits))
     }
 
     /// Its value over a scalar with an order, where `number` gives the numbers in its text as such scalars.
     #[cfg(feature = "digits")]
     pub(crate) fn exact_value<S: Real>(&self, values: &[S], number: impl Fn(f64) -> S) -> S {
-        self.run_over(values, &number, |_, condition| condition > S::ZERO)
+        self.run_over(values, &number, &mut branches::ByOrder)
     }
 
     /// True where a number in it is in degrees.
@@ -184,12 +191,9 @@ impl Formula {
 
     /// The branches that hold at these values, by the signs of the conditions there.
     pub fn modes(&self, values: &[f64]) -> Vec<bool> {
-        let mut modes = vec![false; self.conditions.len()];
-        self.run(values, |number, condition| {
-            modes[number] = condition > 0.0;
-            modes[number]
-        });
-        modes
+        let mut noted = Noted(vec![false; self.conditions.len()]);
+        self.run(values, &mut noted);
+        noted.0
     }
 
     /// The values of its conditions on the same branches.
@@ -199,21 +203,18 @@ impl Formula {
         }
         let begin = all.len();
         all.resize(begin + self.conditions.len(), S::ZERO);
-        self.run(values, |number, condition| {
-            all[begin + number] = condition;
-            bits.get(number).copied().unwrap_or(false)
-        });
+        self.run(values, &mut Watched { given: Given(bits), values: &mut all[begin..] });
     }
 
-    fn run<S: Scalar>(&self, values: &[S], is_positive: impl FnMut(usize, S) -> bool) -> S {
-        self.run_over(values, &S::of, is_positive)
+    fn run<S: Scalar>(&self, values: &[S], branches: &mut impl Branches<S>) -> S {
+        self.run_over(values, &S::of, branches)
     }
 
     fn run_over<S: Scalar>(
         &self,
         values: &[S],
         number: &impl Fn(f64) -> S,
-        mut is_positive: impl FnMut(usize, S) -> bool,
+        branches: &mut impl Branches<S>,
     ) -> S {
         if let [Node::Name(number)] = self.nodes[..] {
             return values.get(number).copied().unwrap_or(S::ZERO);
@@ -221,22 +222,29 @@ impl Formula {
         let mut results: Vec<S> = Vec::with_capacity(self.nodes.len());
         for &node in &self.nodes {
             let at = |node: usize| results[node];
-            let result =
-                match node {
-                    Node::Name(number) => values.get(number).copied().unwrap_or(S::ZERO),
-                    Node::Flip(condition, a) => {
-                        if is_positive(condition, at(self.conditions[condition])) {
-                            at(a)
-                        } else {
-                            -at(a)
-                        }
+            let result = match node {
+                Node::Name(number) => values.get(number).copied().unwrap_or(S::ZERO),
+                Node::Flip(condition, a) => {
+                    if branches.is_positive(condition, at(self.conditions[condition])) {
+                        at(a)
+                    } else {
+                        -at(a)
                     }
-                    Node::Select(condition, a, b) => {
-                        if is_positive(condition, at(self.conditions[condition])) { at(a) } else { at(b) }
+                }
+                Node::Select(condition, a, b) => {
+                    if branches.is_positive(condition, at(self.conditions[condition])) {
+                        at(a)
+                    } else {
+                        at(b)
                     }
-                    Node::Number(value) => number(value),
-                    node => self.smooth(node, at),
-                };
+                }
+                Node::Table(table, first, a) => {
+                    let table = &self.tables[table];
+                    table.value(branches.piece(first, &table.knots(), at(a)), at(a), number)
+                }
+                Node::Number(value) => number(value),
+                node => self.smooth(node, at),
+            };
             results.push(result);
         }
         results.last().copied().unwrap_or(S::ZERO)
@@ -260,14 +268,15 @@ impl Formula {
             Node::Tangent(a) => at(a).tan(),
             Node::HyperbolicTangent(a) => at(a).tanh(),
             Node::Angle(y, x) => at(y).atan2(at(x)),
-            Node::Name(_) | Node::Flip(..) | Node::Select(..) => S::ZERO,
+            Node::Name(_) | Node::Flip(..) | Node::Select(..) | Node::Table(..) => S::ZERO,
         }
     }
 
     /// Adds an operation that stands at bytes `place`, and what it comes to where all it takes is constant.
     fn push(&mut self, node: Node, place: (usize, usize)) -> usize {
-        let is_constant = !matches!(node, Node::Name(_) | Node::Flip(..) | Node::Select(..))
-            && node.operands().into_iter().flatten().all(|node| self.constants[node].is_some());
+        let is_open = matches!(node, Node::Name(_) | Node::Flip(..) | Node::Select(..) | Node::Table(..));
+        let is_constant =
+            !is_open && node.operands().into_iter().flatten().all(|node| self.constants[node].is_some());
         let value = is_constant.then(|| self.smooth(node, |node| self.constants[node].unwrap_or(0.0)));
         self.nodes.push(node);
         self.constants.push(value);
@@ -296,6 +305,7 @@ impl Formula {
             let dimension = match node {
                 Node::Number(_) => self.units.iter().find(|unit| unit.0 == number).map(|unit| unit.1),
                 Node::Name(name) => names.get(name).copied().flatten(),
+                Node::Table(..) => None,
                 Node::Negative(a) | Node::Flip(_, a) => of(a),
                 Node::Sum(a, b) | Node::Difference(a, b) | Node::Select(_, a, b) | Node::Angle(a, b) => {
                     let both = self.same(number, of(a), of(b))?;

@@ -23,6 +23,7 @@ pub(super) fn parse(text: &str, tables: &[Interpolant]) -> Result<Formula, Formu
         places: Vec::new(),
         names: Vec::new(),
         conditions: Vec::new(),
+        tables: Vec::new(),
     };
     let mut parser = Parser { text, at: 0, depth: 0, formula, tables };
     if text.len() > LONGEST {

@@ -1,15 +1,19 @@
 //! Tables of points as functions in formulas: `gust(t)`.
 //!
 //! A clamped cubic spline through the points, level at both ends and constant beyond them.  Its pieces are
-//! branches of the formula and the knots between them conditions, so that methods of high order end a step at
-//! every knot and see a polynomial in between.
+//! branches of the formula and the knots between them switches, so that methods of high order end a step at
+//! every knot and see a polynomial in between.  Pieces are found by bisection, and the [conditions](super::branches)
+//! of a table grow with the logarithm of its points.
 //!
 //! Source: C. de Boor, *A Practical Guide to Splines* (1978), chapter IV (complete cubic spline interpolation).
 
+use super::branches::Knots;
 use super::{Formula, Node};
+use crate::arithmetic::Scalar;
+use std::sync::Arc;
 
-/// Points of a table at least and at most.
-pub const POINTS: [usize; 2] = [2, 256];
+/// Points of a table at least and at most: every one of them ends a step.
+pub const POINTS: [usize; 2] = [2, 1_000_000];
 
 /// A table with its spline.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,47 +21,48 @@ pub struct Interpolant {
     /// Name, as formulas call it.
     pub name: String,
     /// Points (x, y), x ascending.
-    points: Vec<[f64; 2]>,
+    points: Arc<[[f64; 2]]>,
     /// Slopes of the spline there.
-    slopes: Vec<f64>,
+    slopes: Arc<[f64]>,
 }
 
 impl Interpolant {
     /// The spline through points with ascending x.
     pub fn new(name: &str, points: &[[f64; 2]]) -> Self {
-        Self { name: name.to_owned(), points: points.to_vec(), slopes: slopes(points) }
+        Self { name: name.to_owned(), points: points.into(), slopes: slopes(points).into() }
     }
 
-    /// Adds its operations at an argument to a formula; returns its result.
+    /// Its knots, one a point.
+    pub(super) fn knots(&self) -> Knots<'_> {
+        Knots(&self.points)
+    }
+
+    /// Adds it at an argument to a formula; returns its result.
     pub(super) fn emit(&self, formula: &mut Formula, argument: usize, place: (usize, usize)) -> usize {
-        let number = |formula: &mut Formula, value: f64| formula.push(Node::Number(value), place);
-        let mut result = match self.points.first() {
-            Some(point) => number(formula, point[1]),
-            None => return number(formula, 0.0),
+        let known = formula.tables.iter().position(|table| table.name == self.name);
+        let table = known.unwrap_or_else(|| {
+            formula.tables.push(self.clone());
+            formula.tables.len() - 1
+        });
+        let first = formula.conditions.len();
+        formula.conditions.extend(std::iter::repeat_n(argument, self.knots().bits()));
+        formula.push(Node::Table(table, first, argument), place)
+    }
+
+    /// Its value at `x` by the polynomial of a piece: 0 before the first point, one more after each; `number`
+    /// gives numbers as such scalars.
+    pub(super) fn value<S: Scalar>(&self, piece: usize, x: S, number: &impl Fn(f64) -> S) -> S {
+        let Some(k) = piece.checked_sub(1) else {
+            return self.points.first().map_or(S::ZERO, |point| number(point[1]));
         };
-        for (k, &[x, y]) in self.points.iter().enumerate() {
-            let knot = number(formula, x);
-            let from_knot = formula.push(Node::Difference(argument, knot), place);
-            let piece = match self.points.get(k + 1) {
-                None => number(formula, y),
-                Some(&[next, value]) => {
-                    let (h, b) = (next - x, self.slopes[k]);
-                    let chord = (value - y) / h;
-                    let (c, d) = (
-                        (3.0 * chord - 2.0 * b - self.slopes[k + 1]) / h,
-                        (b + self.slopes[k + 1] - 2.0 * chord) / (h * h),
-                    );
-                    [c, b, y].into_iter().fold(number(formula, d), |sum, coefficient| {
-                        let product = formula.push(Node::Product(sum, from_knot), place);
-                        let coefficient = formula.push(Node::Number(coefficient), place);
-                        formula.push(Node::Sum(product, coefficient), place)
-                    })
-                }
-            };
-            formula.conditions.push(from_knot);
-            result = formula.push(Node::Select(formula.conditions.len() - 1, piece, result), place);
-        }
-        result
+        let [knot, y] = self.points[k];
+        let Some(&[next, value]) = self.points.get(k + 1) else { return number(y) };
+        let (h, b) = (next - knot, self.slopes[k]);
+        let chord = (value - y) / h;
+        let c = (3.0 * chord - 2.0 * b - self.slopes[k + 1]) / h;
+        let d = (b + self.slopes[k + 1] - 2.0 * chord) / (h * h);
+        let from_knot = x - number(knot);
+        [c, b, y].into_iter().fold(number(d), |sum, coefficient| sum * from_knot + number(coefficient))
     }
 }
 

@@ -42,7 +42,7 @@ impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
         self.evaluate_extra_stages(field, state, h, statistics);
         let n = state.y.len();
         dense.begin(field.watched(), P::DEGREE + 1, state);
-        let most = highest::<P>();
+        let most = self.highest;
         for (i, (powers, off)) in dense.each().enumerate() {
             let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
             let nested = P::interpolate(h, change, &|stage| self.k[stage * n + i]);

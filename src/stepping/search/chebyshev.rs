@@ -77,14 +77,15 @@ impl Nodes {
 }
 
 /// Interpolates functions by one of the `degrees`, at most [`LARGEST`], after the other, until a degree is
-/// enough for each of them, of which `is_enough` is given the number.
+/// enough for each of them, of which `is_enough` is given the number and the curve, and that of the degree
+/// before.
 ///
 /// `at` appends the value of each function at a place in \[0, 1\]; it is asked once about a place, of which each
 /// degree that is twice the one before has every other already.
 pub fn interpolated(
     degrees: &[usize],
     mut at: impl FnMut(f64, &mut Vec<f64>),
-    is_enough: impl Fn(usize, &Chebyshev) -> bool,
+    is_enough: impl Fn(usize, &Chebyshev, Option<&Chebyshev>) -> bool,
 ) -> Interpolants {
     let mut found =
         Interpolants { curves: Vec::new(), nodes: Nodes::of(1), values: Vec::new(), is_resolved: false };
@@ -103,8 +104,10 @@ pub fn interpolated(
             found.values.resize_with(row.len(), || Vec::with_capacity(degree + 1));
             found.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
         }
+        let lower = std::mem::take(&mut found.curves);
         found.curves = found.values.iter().map(|values| found.nodes.through(values)).collect();
-        found.is_resolved = found.curves.iter().enumerate().all(|(k, curve)| is_enough(k, curve));
+        found.is_resolved =
+            (found.curves.iter().enumerate()).all(|(k, curve)| is_enough(k, curve, lower.get(k)));
         if found.is_resolved {
             break;
         }

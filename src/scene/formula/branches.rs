@@ -1,0 +1,175 @@
+//! Which branches of a formula hold, and pieces of tables among them.
+//!
+//! A table of n points has n + 1 pieces, and neighbours among them differ in one bit of their Gray numbers
+//! k ^ (k >> 1).  These bits are the conditions of a table: 20 for a million points.  Bit j changes at the
+//! knots whose numbers, from 1 on, are odd multiples of 2^j; its condition is a parabola with zeros at the two
+//! of them around the present piece,
+//!
+//! ```text
+//! ± (x - a) (b - x) / (b - a),    ± (x - a) or ± (b - x) where there is but one
+//! ```
+//!
+//! Source of the numbers: F. Gray, US patent 2 632 058 (1953).
+
+use crate::arithmetic::Scalar;
+
+/// Says which branches hold, as a formula is evaluated.
+pub(super) trait Branches<S> {
+    /// True where the condition of this number, with this value, chooses its first branch.
+    fn is_positive(&mut self, condition: usize, value: S) -> bool;
+
+    /// The piece of a table at `x`, whose conditions begin with number `first`.
+    fn piece(&mut self, first: usize, knots: &Knots, x: S) -> usize;
+}
+
+/// The knots of a table.
+pub(super) struct Knots<'a>(pub &'a [[f64; 2]]);
+
+impl Knots<'_> {
+    /// How many conditions tell its pieces apart.
+    pub fn bits(&self) -> usize {
+        (usize::BITS - self.0.len().leading_zeros()) as usize
+    }
+
+    /// The piece whose bits these are; a piece that there is not is the last one.
+    fn piece(&self, bits: &[bool]) -> usize {
+        let mut higher = false;
+        let piece = bits.iter().rev().fold(0, |piece, &bit| {
+            higher ^= bit;
+            2 * piece + usize::from(higher)
+        });
+        piece.min(self.0.len())
+    }
+
+    /// Bit `j` of a piece.
+    fn bit(piece: usize, j: usize) -> bool {
+        (piece ^ (piece >> 1)) >> j & 1 == 1
+    }
+
+    /// The condition of bit `j` on a piece.
+    fn condition<S: Scalar>(&self, piece: usize, j: usize, x: S) -> S {
+        let (first, period) = (1 << j, 2 << j);
+        // The least number of a knot above the piece at which the bit changes.
+        let above = if piece < first { first } else { first + (piece - first) / period * period + period };
+        let knot = |number: usize| self.0[number - 1][0];
+        let from = (above > first).then(|| knot(above - period));
+        let until = (above <= self.0.len()).then(|| knot(above));
+        let value = match (from, until) {
+            (Some(a), Some(b)) => ((x - S::of(a)) * (S::of(b) - x)).scale(1.0 / (b - a)),
+            (Some(a), None) => x - S::of(a),
+            (None, Some(b)) => S::of(b) - x,
+            (None, None) => S::ONE,
+        };
+        if Self::bit(piece, j) { value } else { -value }
+    }
+}
+
+/// By the signs of conditions in doubles.
+pub(super) struct BySign;
+
+impl Branches<f64> for BySign {
+    fn is_positive(&mut self, _: usize, value: f64) -> bool {
+        value > 0.0
+    }
+
+    fn piece(&mut self, _: usize, knots: &Knots, x: f64) -> usize {
+        knots.0.partition_point(|knot| x - knot[0] > 0.0)
+    }
+}
+
+/// The same over a scalar with an order.
+#[cfg(feature = "digits")]
+pub(super) struct ByOrder;
+
+#[cfg(feature = "digits")]
+impl<S: crate::arithmetic::Real> Branches<S> for ByOrder {
+    fn is_positive(&mut self, _: usize, value: S) -> bool {
+        value > S::ZERO
+    }
+
+    fn piece(&mut self, _: usize, knots: &Knots, x: S) -> usize {
+        knots.0.partition_point(|knot| x > S::of(knot[0]))
+    }
+}
+
+/// The same, noted.
+pub(super) struct Noted(pub Vec<bool>);
+
+impl Branches<f64> for Noted {
+    fn is_positive(&mut self, condition: usize, value: f64) -> bool {
+        self.0[condition] = value > 0.0;
+        self.0[condition]
+    }
+
+    fn piece(&mut self, first: usize, knots: &Knots, x: f64) -> usize {
+        let piece = BySign.piece(first, knots, x);
+        (0..knots.bits()).for_each(|j| self.0[first + j] = Knots::bit(piece, j));
+        piece
+    }
+}
+
+/// Those whose bits are set.
+pub(super) struct Given<'a>(pub &'a [bool]);
+
+impl<S> Branches<S> for Given<'_> {
+    fn is_positive(&mut self, condition: usize, _: S) -> bool {
+        self.0.get(condition).copied().unwrap_or(false)
+    }
+
+    fn piece(&mut self, first: usize, knots: &Knots, _: S) -> usize {
+        knots.piece(self.0.get(first..first + knots.bits()).unwrap_or(&[]))
+    }
+}
+
+/// Those whose bits are set; the values of all conditions are noted.
+pub(super) struct Watched<'a, S> {
+    pub given: Given<'a>,
+    pub values: &'a mut [S],
+}
+
+impl<S: Scalar> Branches<S> for Watched<'_, S> {
+    fn is_positive(&mut self, condition: usize, value: S) -> bool {
+        self.values[condition] = value;
+        self.given.is_positive(condition, value)
+    }
+
+    fn piece(&mut self, first: usize, knots: &Knots, x: S) -> usize {
+        let piece = self.given.piece(first, knots, x);
+        (0..knots.bits()).for_each(|j| self.values[first + j] = knots.condition(piece, j, x));
+        piece
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_condition_changes_at_every_knot_and_leads_to_the_next_piece() {
+        for count in [2, 3, 4, 5, 16, 31, 32, 33, 1000] {
+            let points: Vec<[f64; 2]> = (0..count).map(|k| [(k * (k + 3)) as f64, 0.0]).collect();
+            let knots = Knots(&points);
+            let bits = |piece| (0..knots.bits()).map(|j| Knots::bit(piece, j)).collect::<Vec<_>>();
+            for piece in 0..=count {
+                assert_eq!(knots.piece(&bits(piece)), piece);
+                let inside = match piece {
+                    0 => points[0][0] - 1.0,
+                    _ if piece == count => points[count - 1][0] + 1.0,
+                    _ => 0.5 * (points[piece - 1][0] + points[piece][0]),
+                };
+                assert_eq!(BySign.piece(0, &knots, inside), piece);
+                let condition = |j: usize, x: f64| knots.condition(piece, j, x);
+                for j in 0..knots.bits() {
+                    assert_eq!(condition(j, inside) > 0.0, bits(piece)[j], "{count} points, piece {piece}");
+                }
+                for (next, knot) in [(piece + 1, piece), (piece.wrapping_sub(1), piece.wrapping_sub(1))] {
+                    let Some(&[x, _]) = points.get(knot) else { continue };
+                    let zeros: Vec<usize> = (0..knots.bits()).filter(|&j| condition(j, x) == 0.0).collect();
+                    let changed: Vec<usize> =
+                        (0..knots.bits()).filter(|&j| bits(piece)[j] != bits(next)[j]).collect();
+                    assert_eq!((zeros.len(), zeros), (1, changed));
+                }
+            }
+        }
+    }
+}
