@@ -4,7 +4,7 @@
 use super::formulas::{adaptive, run, scene};
 use driftless::Mechanism;
 use driftless::run::{MethodId, Outcome, Plan, Request};
-use driftless::scene::{Scene, parse_scene};
+use driftless::scene::{Scene, parse_scene, read_scene};
 
 const G: f64 = 9.81;
 
@@ -161,6 +161,20 @@ fn corners_of_a_cam_are_switches() {
         near(outcome.last.phi[0], phi, "angle");
         near(outcome.last.omega[0], omega, "rate");
         near(outcome.last.phi[1], (phi - 1.0).powi(2), "angle of the wheel");
+    }
+}
+
+#[test]
+fn outputs_of_gears_and_cams_are_what_their_constraints_exert() {
+    let scene = read_scene("examples/scenes/gear_and_cam.json".as_ref(), &[]).expect("a scene");
+    let mechanism = Mechanism::new(&scene).expect("equations");
+    let [request, ..] = methods();
+    let outcome = finished(&scene, &Request { until: Some(0.7), ..request });
+    for (output, name) in ["gear", "cam"].into_iter().enumerate() {
+        let row = mechanism.constraints.iter().position(|row| row.name == name).expect("a row");
+        let (found, [force, power]) = (outcome.last.outputs[output], outcome.last.motors[row]);
+        assert!(force.abs() > 1e-3 && found.to_bits() == force.to_bits(), "{name}: {found} {force}");
+        assert_eq!(power, 0.0, "{name}: no law of time, no work");
     }
 }
 

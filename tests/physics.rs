@@ -71,6 +71,7 @@ mod singular;
 mod stabilization;
 mod stiff;
 mod switched_orders;
+mod tables;
 mod taylor;
 mod walls;
 mod work;

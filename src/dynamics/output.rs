@@ -147,9 +147,14 @@ impl Outputs {
                 Source::State(meaning) => meaning.value(&configuration, parameters, signals),
                 Source::Carried(quantity) => quantity.value(at, &configuration, &shared),
             };
+            if let [only] = &expression.sources[..]
+                && expression.formula.is_name()
+            {
+                return source(only);
+            }
             sources.clear();
             sources.extend(expression.sources.iter().map(source));
-            expression.formula.value(&sources)
+            expression.formula.value(sources)
         };
         for signal in &self.signals {
             signals.push(value(signal, signals));

@@ -3,8 +3,8 @@
 //!
 //! The outputs are interpolated at Chebyshev points of every step, by as high a degree as they ask for; the
 //! zeros of the interpolants' slopes are the extremes, their integrals the means.  Where all of them lie well
-//! between the extremes known so far, as in most steps of a long run, the lowest degree serves, and the
-//! cheapest interpolation of the motion.
+//! between the extremes known so far, as in most steps of a long run, one low degree serves, and the cheapest
+//! interpolation of the motion.
 
 use super::inside::{Inside, StepWatcher};
 use crate::arithmetic::DoubleDouble;
@@ -18,6 +18,8 @@ use std::sync::Arc;
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
+/// Degree by which a step is judged before anything else is done.
+const FIRST: usize = 12;
 /// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the degree
 /// are what the dense output is off, where its pieces join: neither a higher degree nor halves have less.
 const NOISE: f64 = 1e-6;
@@ -29,7 +31,7 @@ const PASSED: f64 = 1e-8;
 /// Variation up to which an output is constant, over its size.
 const CONSTANT: f64 = 1e-14;
 /// Steps until the next one is tried to be passed over, after one that was not.
-const WAITS: u8 = 3;
+const WAITS: u8 = 1;
 /// Halvings of a step that no interpolant resolves: an output may have corners.
 const HALVINGS: u32 = 6;
 /// Halvings of the bracket of an extreme.
@@ -198,10 +200,8 @@ impl ExtremesDetector {
             self.memory.waits -= 1;
             return false;
         }
-        let known = self.memory.found.clone();
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
-        let is_enough = |k: usize, curve: &Chebyshev, _: Option<&Chebyshev>| known[k].holds(curve);
-        let Interpolants { curves, nodes, values, .. } = interpolated(&DEGREES[..2], at, is_enough);
+        let Interpolants { curves, nodes, values, .. } = interpolated(&[FIRST], at, |_, _, _| true);
         let found = &mut self.memory.found;
         if !curves.iter().zip(&*found).all(|(curve, found)| found.holds(curve)) {
             self.memory.waits = WAITS;

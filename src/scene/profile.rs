@@ -69,9 +69,7 @@ impl Profile {
 
     /// The law and its first two derivatives at a time \[u, u/s, u/s²\].
     pub fn at<S: Scalar>(&self, t: S) -> [S; 3] {
-        let mut slots = vec![S::ZERO; self.tape.len()];
-        self.tape.evaluate(|_| t, &mut slots);
-        self.results.map(|result| slots[result as usize])
+        self.tape.results(|_| t, |slots| self.results.map(|result| slots[result as usize]))
     }
 
     /// Powers 0 … `order` of the law about a time \[u/s^m\].

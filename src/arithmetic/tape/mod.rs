@@ -147,7 +147,7 @@ impl Tape {
         Self { operations: kept }
     }
 
-    /// Number of operations, and of the numbers [`Tape::evaluate`] writes.
+    /// Number of operations, and of the [results](Tape::results).
     pub fn len(&self) -> usize {
         self.operations.len()
     }
@@ -183,31 +183,31 @@ impl Tape {
     #[inline]
     pub fn results<S: Scalar, R>(&self, input: impl Fn(u32) -> S, then: impl FnOnce(&[S]) -> R) -> R {
         match self.len() {
-            0..=16 => self.results_in([S::ZERO; 16], input, then),
-            17..=64 => self.results_in([S::ZERO; 64], input, then),
-            65..=256 => self.results_in([S::ZERO; 256], input, then),
-            count => self.results_in(vec![S::ZERO; count], input, then),
+            0..=16 => self.few::<S, R, 16>(input, then),
+            17..=32 => self.few::<S, R, 32>(input, then),
+            33..=64 => self.few::<S, R, 64>(input, then),
+            65..=256 => self.few::<S, R, 256>(input, then),
+            count => {
+                let mut slots = vec![S::ZERO; count];
+                self.write(input, &mut slots[..]);
+                then(&slots)
+            }
         }
     }
 
     #[inline]
-    fn results_in<S: Scalar, R>(
-        &self,
-        mut room: impl AsMut<[S]>,
-        input: impl Fn(u32) -> S,
-        then: impl FnOnce(&[S]) -> R,
-    ) -> R {
-        let slots = &mut room.as_mut()[..self.len()];
-        self.evaluate(input, slots);
-        then(slots)
+    fn few<S: Scalar, R, const N: usize>(&self, input: impl Fn(u32) -> S, then: impl FnOnce(&[S]) -> R) -> R {
+        let mut slots = [S::ZERO; N];
+        self.write(input, &mut slots);
+        then(&slots)
     }
 
-    /// Writes the results of all operations to `slots`, of which there must be [`Tape::len`].
+    /// Writes the results of all operations, of which there are [`Tape::len`].
     #[inline]
-    pub fn evaluate<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut [S]) {
+    fn write<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut (impl Room<S> + ?Sized)) {
         for (i, operation) in self.operations.iter().enumerate() {
-            let of = |slot: Slot| slots[slot as usize];
-            slots[i] = match *operation {
+            let of = |slot: Slot| slots.at(slot as usize);
+            let result = match *operation {
                 Operation::Input(number) => input(number),
                 Operation::Constant(value) => S::of(value),
                 Operation::Add(a, b) => of(a) + of(b),
@@ -222,17 +222,50 @@ impl Tape {
                 Operation::Angle(y, x, _) => of(y).atan2(of(x)),
                 Operation::Sine(a) => {
                     let (sin, cos) = of(a).sin_cos();
-                    slots[i + 1] = cos;
+                    slots.put(i + 1, cos);
                     sin
                 }
                 Operation::HyperbolicTangent(a) => {
                     let tangent = of(a).tanh();
-                    slots[i + 1] = S::ONE - tangent * tangent;
+                    slots.put(i + 1, S::ONE - tangent * tangent);
                     tangent
                 }
                 Operation::Beside => continue,
             };
+            slots.put(i, result);
         }
+    }
+}
+
+/// Where results of operations are written.
+trait Room<S> {
+    fn at(&self, slot: usize) -> S;
+    fn put(&mut self, slot: usize, value: S);
+}
+
+impl<S: Copy> Room<S> for [S] {
+    #[inline(always)]
+    fn at(&self, slot: usize) -> S {
+        self[slot]
+    }
+
+    #[inline(always)]
+    fn put(&mut self, slot: usize, value: S) {
+        self[slot] = value;
+    }
+}
+
+/// A power of two, so that no number of a slot needs a check.
+impl<S: Copy, const N: usize> Room<S> for [S; N] {
+    #[inline(always)]
+    fn at(&self, slot: usize) -> S {
+        const { assert!(N.is_power_of_two()) };
+        self[slot & (N - 1)]
+    }
+
+    #[inline(always)]
+    fn put(&mut self, slot: usize, value: S) {
+        self[slot & (N - 1)] = value;
     }
 }
 

@@ -23,9 +23,7 @@ fn recorded() -> (Tape, Slot, Vec<(u32, Slot)>) {
 }
 
 fn evaluated<S: Scalar>(tape: &Tape, at: [S; 2]) -> Vec<S> {
-    let mut slots = vec![S::ZERO; tape.len()];
-    tape.evaluate(|input| at[input as usize], &mut slots);
-    slots
+    tape.results(|input| at[input as usize], <[S]>::to_vec)
 }
 
 #[test]

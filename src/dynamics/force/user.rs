@@ -346,7 +346,7 @@ impl UserForce {
     }
 
     /// Calls `force` with every site and the force \[N\] there, and `torque` with every body and the torque
-    /// \[N·m\] on it; returns the power accounted as work \[W\].
+    /// \[N·m\] on it.
     #[inline]
     fn each<T: Scalar>(
         &self,
@@ -355,9 +355,9 @@ impl UserForce {
         at: Posture<T>,
         mut force: impl FnMut(&Site, Complex<T>),
         mut torque: impl FnMut(usize, T),
-    ) -> T {
+    ) {
         if part.tape.is_empty() {
-            return T::ZERO;
+            return;
         }
         self.at(&part.tape, time, at, |slots| {
             for &(site, [x, y]) in &part.forces {
@@ -366,15 +366,24 @@ impl UserForce {
             for &(body, slot) in &part.torques {
                 torque(body, slots[slot as usize]);
             }
-            part.power.map_or(T::ZERO, |slot| slots[slot as usize])
-        })
+        });
     }
 
     /// Adds the generalized forces \[N·m, N\] of a part; returns its power accounted as work \[W\].
     fn pull_part<T: Scalar>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) -> T {
-        let load = std::cell::RefCell::new(load);
-        let pull = |site: &Site, force| site.point.pull(force, at.z, &mut load.borrow_mut());
-        self.each(part, time, at, pull, |body, torque| load.borrow_mut()[body] += torque)
+        if part.tape.is_empty() {
+            return T::ZERO;
+        }
+        self.at(&part.tape, time, at, |slots| {
+            for &(site, [x, y]) in &part.forces {
+                let force = Complex::new(slots[x as usize], slots[y as usize]);
+                self.sites[site].point.pull(force, at.z, load);
+            }
+            for &(body, slot) in &part.torques {
+                load[body] += slots[slot as usize];
+            }
+            part.power.map_or(T::ZERO, |slot| slots[slot as usize])
+        })
     }
 
     /// Adds all its generalized forces \[N·m, N\]; returns the power accounted as work \[W\].

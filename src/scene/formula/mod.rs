@@ -15,7 +15,7 @@ mod table;
 pub mod unit;
 mod wave;
 
-use branches::{Branches, BySign, Given, Knots, Noted, Watched};
+use branches::{Branches, BySign, Given, Noted, Watched};
 pub use error::FormulaError;
 pub(crate) use error::meant;
 pub use table::{Interpolant, POINTS};
@@ -147,6 +147,11 @@ impl Formula {
     /// The names in it, each once, in the order in which they first stand.
     pub fn names(&self) -> impl Iterator<Item = &str> {
         self.names.iter().map(|name| name.0.as_str())
+    }
+
+    /// True for a name alone.
+    pub(crate) fn is_name(&self) -> bool {
+        matches!(self.nodes[..], [Node::Name(_)])
     }
 
     /// How many conditions choose its branches: 0 for a smooth formula.

@@ -302,7 +302,7 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> R
         let (bound, _) = judge(&at, aim, &scope, quantity_of("motors", "law", &part).as_ref())?;
         if let Some(name) = names.rate_in(&bound) {
             let problem = format!("depends on {name}");
-            let allowed = "the aim of a motor is a formula of time, angles and positions";
+            let allowed = "the aim of a motor is a formula of time, angles and positions; one of rates would be a non-holonomic constraint";
             let hint = "what acts on rates is a torque, as \"kp*(aim - arm.phi) - kd*arm.omega\" in torques";
             return Err(at.refuse(&problem, allowed, hint));
         }
