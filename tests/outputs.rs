@@ -159,7 +159,8 @@ impl Balance<'_> {
             let force = self.value(&format!("{}.force", wall.name));
             let at = self.position(&Place { bar: Some(wall.bar), point: wall.point });
             let [x, y] = wall.normal;
-            let gap = x * (at[0] - wall.through[0]) + y * (at[1] - wall.through[1]);
+            let moved = wall.law.as_ref().map_or(0.0, |law| law.value::<f64>(t.into()));
+            let gap = x * (at[0] - wall.through[0]) + y * (at[1] - wall.through[1]) - moved;
             assert!((self.value(&format!("{}.gap", wall.name)) - gap).abs() < 1e-13 * (1.0 + gap.abs()));
             self.push(Some(wall.bar), at, [force * x, force * y]);
         }

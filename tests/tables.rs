@@ -55,7 +55,7 @@ fn points_that_are_not_passed_cost_no_steps() {
     let far = |count: usize| {
         let mut text = String::from(r#""tables": {"f": [[-2, 1], [2, 1]"#);
         (0..count).for_each(|k| write!(text, ", [{}, 1]", 3 + k).expect("room"));
-        rotor("f(bar.phi) - 1 - bar.phi", &(text + "]},"))
+        rotor("1*(f(bar.phi) - 1 - bar.phi)", &(text + "]},"))
     };
     let [few, many] = [1, 100_000].map(|count| end(&far(count), MethodId::Dp8));
     assert_eq!(few.last.phi[0].to_bits(), many.last.phi[0].to_bits());

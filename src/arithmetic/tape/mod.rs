@@ -179,14 +179,16 @@ impl Tape {
         Self::new(&self.operations, &mut results.to_vec()).inputs().collect()
     }
 
-    /// Calls `then` with the results of all operations; up to 256 of them need no allocation.
+    /// Calls `then` with the results of all operations; up to 64 of them, of plain numbers 256, need no
+    /// allocation.
     #[inline]
     pub fn results<S: Scalar, R>(&self, input: impl Fn(u32) -> S, then: impl FnOnce(&[S]) -> R) -> R {
         match self.len() {
             0..=16 => self.few::<S, R, 16>(input, then),
             17..=32 => self.few::<S, R, 32>(input, then),
             33..=64 => self.few::<S, R, 64>(input, then),
-            65..=256 => self.few::<S, R, 256>(input, then),
+            // Long scalars, such as dual numbers of many unknowns, would take much of a thread's stack.
+            65..=256 if size_of::<S>() <= 16 => self.few::<S, R, 256>(input, then),
             count => {
                 let mut slots = vec![S::ZERO; count];
                 self.write(input, &mut slots[..]);
