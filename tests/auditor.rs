@@ -110,7 +110,7 @@ fn what_the_auditor_does_not_judge_has_a_name() {
         "clutch: inactive",
         "clutch: events",
         "gear_and_cam: motors.gear.law",
-        "duffing: springs.spring.potential",
+        "duffing: torsion_springs.coil.potential",
         "pid: integrals",
         "friction_pendulum: hinges.A.friction",
     ] {
