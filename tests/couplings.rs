@@ -166,7 +166,7 @@ fn corners_of_a_cam_are_switches() {
 
 #[test]
 fn outputs_of_gears_and_cams_are_what_their_constraints_exert() {
-    let scene = read_scene("examples/scenes/gear_and_cam.json".as_ref(), &[]).expect("a scene");
+    let scene = read_scene("tests/laws/gear_and_cam.json".as_ref(), &[]).expect("a scene");
     let mechanism = Mechanism::new(&scene).expect("equations");
     let [request, ..] = methods();
     let outcome = finished(&scene, &Request { until: Some(0.7), ..request });
