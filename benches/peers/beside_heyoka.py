@@ -12,26 +12,14 @@ every fourth coefficient, and heyoka 7.13 takes a first step of 0.74 s there, fa
 
 import json
 import math
-import os
 import subprocess
 import sys
 import time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-PLACE = os.path.join(ROOT, "target", "peers")
-PYTHON = os.path.join(PLACE, "bin", "python")
+from environment import ROOT, prepare
+
 BLOCKS = 15
 CASES = [("free", 1e-6), ("free", 1e-9), ("gentle", 1e-12), ("motor", 1e-9), ("chain3", 1e-7), ("chain6", 1e-8)]
-
-
-def prepare():
-    """Goes on inside the virtual environment."""
-    if os.path.abspath(sys.prefix) == PLACE:
-        return
-    if not os.path.exists(PYTHON):
-        subprocess.run([sys.executable, "-m", "venv", PLACE], check=True)
-        subprocess.run([PYTHON, "-m", "pip", "install", "--quiet", "heyoka", "numpy"], check=True)
-    os.execv(PYTHON, [PYTHON, os.path.abspath(__file__), *sys.argv[1:]])
 
 
 class Driftless:
@@ -158,7 +146,7 @@ def setting(code, target):
 
 
 def main():
-    prepare()
+    prepare(__file__)
     driftless = Driftless()
     print(f"{'scene':8} {'target':>6}  {'code':34} {'setting':>8} {'error':>8} {'min us/s':>9} {'median':>9}")
     for scene, target in CASES:

@@ -18,21 +18,10 @@ import sys
 import tempfile
 import time
 
-ROOT = os.path.dirname(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
-PLACE = os.path.join(ROOT, "target", "peers")
-PYTHON = os.path.join(PLACE, "bin", "python")
+from environment import ROOT, prepare
+
 PROGRAM = os.environ.get("DRIFTLESS", os.path.join(ROOT, "target", "release", "driftless"))
 RUNS = 5
-
-
-def prepare():
-    """Goes on inside the virtual environment."""
-    if os.path.abspath(sys.prefix) == PLACE:
-        return
-    if not os.path.exists(PYTHON):
-        subprocess.run([sys.executable, "-m", "venv", PLACE], check=True)
-        subprocess.run([PYTHON, "-m", "pip", "install", "--quiet", "heyoka", "numpy"], check=True)
-    os.execv(PYTHON, [PYTHON, os.path.abspath(__file__), *sys.argv[1:]])
 
 
 def ours(digits):
@@ -93,7 +82,7 @@ class Theirs:
 
 
 def main():
-    prepare()
+    prepare(__file__)
     for digits in [int(word) for word in sys.argv[1:]] or [33, 100]:
         theirs = Theirs(digits)
         pairs = [(ours(digits), theirs.run()) for _ in range(RUNS)]
