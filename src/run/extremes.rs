@@ -18,8 +18,9 @@ use std::sync::Arc;
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
-/// Degree by which a step is judged before anything else is done.
-const FIRST: usize = 12;
+/// Degrees by which a step is judged before anything else is done: short steps, as between close rows, by the
+/// lower one first.
+const FIRST: [usize; 2] = [6, 12];
 /// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the degree
 /// are what the dense output is off, where its pieces join: neither a higher degree nor halves have less.
 const NOISE: f64 = 1e-6;
@@ -117,6 +118,8 @@ pub(super) struct ExtremesMemory {
     found: Vec<Found>,
     /// Steps that are not tried to be passed over, as one before them was not.
     waits: u8,
+    /// True where the lower degree was enough for the last step that was passed over.
+    is_short: bool,
 }
 
 /// Looks at the outputs of every step.
@@ -200,8 +203,12 @@ impl ExtremesDetector {
             self.memory.waits -= 1;
             return false;
         }
+        let degrees = if self.memory.is_short { &FIRST[..] } else { &FIRST[1..] };
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
-        let Interpolants { curves, nodes, values, .. } = interpolated(&[FIRST], at, |_, _, _| true);
+        let is_known =
+            |_: usize, curve: &Chebyshev, _: Option<&Chebyshev>| curve.tail() <= PASSED * curve.most();
+        let Interpolants { curves, nodes, values, .. } = interpolated(degrees, at, is_known);
+        self.memory.is_short = curves.iter().all(|curve| curve.tail_of(FIRST[0]) <= PASSED * curve.most());
         let found = &mut self.memory.found;
         if !curves.iter().zip(&*found).all(|(curve, found)| found.holds(curve)) {
             self.memory.waits = WAITS;

@@ -66,6 +66,9 @@ pub fn product<const W: usize>(a: &Digits<W>, b: &Digits<W>) -> Digits<W> {
         return Digits::ZERO;
     }
     match a.limbs().min(b.limbs()) {
+        2 => product_in::<4, W>(a, b, 2),
+        3 => product_in::<5, W>(a, b, 3),
+        4 => product_in::<6, W>(a, b, 4),
         limbs @ ..=8 => product_in::<10, W>(a, b, limbs),
         limbs => product_in::<{ MOST + 2 }, W>(a, b, limbs),
     }

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! So no term of a sum has a sign or a place of its own: a column is a loop over limbs one after another in
-//! memory, added up in 192 bits, and the sums of V are differences of sums from the first power on.  A sum of
+//! memory, added up in two sums of 128 bits, and the sums of V are differences of sums from the first power on.  A sum of
 //! total power M contributes (step/U)^M to a step, and is formed from so many limbs of its factors as that
 //! leaves; columns below those are left out.  A power larger than there is room for makes the room larger.
 
@@ -143,11 +143,16 @@ impl<const W: usize> Factor<W> {
     /// V_m, and the sum up to it.
     fn place(&mut self, scale: &Scale, m: usize) {
         match scale.limbs(m) {
+            1 => self.place_in::<1>(scale, m, 1),
+            2 => self.place_in::<2>(scale, m, 2),
+            3 => self.place_in::<3>(scale, m, 3),
+            4 => self.place_in::<4>(scale, m, 4),
             limbs @ ..=SMALL => self.place_in::<SMALL>(scale, m, limbs),
             limbs => self.place_in::<MOST>(scale, m, limbs),
         }
     }
 
+    #[inline(always)]
     fn place_in<const ROOM: usize>(&mut self, scale: &Scale, m: usize, limbs: usize) {
         let power = &self.powers[m];
         let mut found = [0; ROOM];
@@ -189,13 +194,20 @@ impl<const W: usize> Factor<W> {
         };
         let limbs = scale.limbs(total);
         let bits = exponent + other_exponent - scale.unit * total as i32;
+        let (of, from) = ([first, last], [from, to]);
+        // Loops of a length that the compiler knows where there are few limbs.
         match limbs {
-            ..=SMALL => self.scaled::<{ SMALL + 3 }>(other, [first, last], [from, to], limbs, bits),
-            _ => self.scaled::<ROOM>(other, [first, last], [from, to], limbs, bits),
+            1 => self.scaled::<4>(other, of, from, 1, bits),
+            2 => self.scaled::<5>(other, of, from, 2, bits),
+            3 => self.scaled::<6>(other, of, from, 3, bits),
+            4 => self.scaled::<7>(other, of, from, 4, bits),
+            ..=SMALL => self.scaled::<{ SMALL + 3 }>(other, of, from, limbs, bits),
+            _ => self.scaled::<ROOM>(other, of, from, limbs, bits),
         }
     }
 
     /// The same in fixed point, in room for three limbs more than are asked for.
+    #[inline(always)]
     fn scaled<const ROOM: usize>(
         &self,
         other: &Self,
@@ -211,12 +223,12 @@ impl<const W: usize> Factor<W> {
         let sum = &mut sum[..limbs + 2];
         let mut carry = 0_u128;
         for column in (0..limbs).rev() {
-            let (mut low, mut high) = (carry, 0);
+            let (mut low, mut high) = (u128::from(carry as u64), carry >> 64);
             for i in 0..=column {
                 add_products(a(i), b(column - i), &mut low, &mut high);
             }
             sum[column + 2] = low as u64;
-            carry = low >> 64 | u128::from(high) << 64;
+            carry = high + (low >> 64);
         }
         (sum[1], sum[0]) = (carry as u64, (carry >> 64) as u64);
         self.without_halves(sum, first, last);
@@ -249,14 +261,15 @@ impl<const W: usize> Factor<W> {
     }
 }
 
-/// Adds Σ a_j b_{n-1-j} to a number of 192 bits.
+/// Adds the lower and the upper limbs of Σ a_j b_{n-1-j} to sums of their own: a carry of each product into
+/// a third limb is gathered by slow vector code.
 #[inline(always)]
-fn add_products(a: &[u64], b: &[u64], low: &mut u128, high: &mut u64) {
-    let (mut sum, mut above) = (*low, *high);
+fn add_products(a: &[u64], b: &[u64], low: &mut u128, high: &mut u128) {
+    let (mut lower, mut upper) = (*low, *high);
     let mut add = |a: u64, b: u64| {
-        let is_over;
-        (sum, is_over) = sum.overflowing_add(u128::from(a) * u128::from(b));
-        above += u64::from(is_over);
+        let product = u128::from(a) * u128::from(b);
+        lower += u128::from(product as u64);
+        upper += product >> 64;
     };
     // Four at a time, or registers are moved about for longer than numbers are multiplied.
     let (a_blocks, a_rest) = a.as_chunks::<4>();
@@ -270,7 +283,7 @@ fn add_products(a: &[u64], b: &[u64], low: &mut u128, high: &mut u64) {
     for (&a, &b) in a_rest.iter().zip(b_rest.iter().rev()) {
         add(a, b);
     }
-    (*low, *high) = (sum, above);
+    (*low, *high) = (lower, upper);
 }
 
 /// The limbs below the point of a fraction divided by 2^`shift`.

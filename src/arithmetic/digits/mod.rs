@@ -30,6 +30,9 @@ pub use self::factor::{Factor, Scale};
 /// Exponents beyond this many limbs count as infinite.
 const FARTHEST: i32 = 1 << 28;
 
+/// Room that is small enough to be copied limb by limb.
+const FEW: usize = 8;
+
 /// A number of up to `W` limbs; `W` is at least 3.
 #[derive(Clone, Copy)]
 pub struct Digits<const W: usize> {
@@ -170,7 +173,14 @@ impl<const W: usize> Digits<W> {
         }
         let mut limb = [0; W];
         let count = limbs.min(found.len() - first);
-        limb[..count].copy_from_slice(&found[first..first + count]);
+        if W <= FEW {
+            // One by one: to call for so few to be copied takes longer.
+            for (i, limb) in limb.iter_mut().enumerate().filter(|(i, _)| *i < count) {
+                *limb = found[first + i];
+            }
+        } else {
+            limb[..count].copy_from_slice(&found[first..first + count]);
+        }
         let kind = if is_negative { Kind::Negative } else { Kind::Positive };
         Self { exponent, limbs: limbs as u32, kind, limb }
     }
@@ -198,6 +208,9 @@ impl<const W: usize> Digits<W> {
         }
         // Room on the stack is cleared every time: no more than there is use for.
         match a.limbs().min(b.limbs()) {
+            2 => Self::sum_in::<4>(a, b, is_difference, 2),
+            3 => Self::sum_in::<5>(a, b, is_difference, 3),
+            4 => Self::sum_in::<6>(a, b, is_difference, 4),
             limbs @ ..=8 => Self::sum_in::<10>(a, b, is_difference, limbs),
             limbs => Self::sum_in::<{ MOST + 2 }>(a, b, is_difference, limbs),
         }
@@ -205,7 +218,7 @@ impl<const W: usize> Digits<W> {
 
     /// The same of two numbers that are neither zero nor infinite, in room for two more limbs than are asked
     /// for.
-    #[inline]
+    #[inline(always)]
     fn sum_in<const ROOM: usize>(a: &Self, b: &Self, is_difference: bool, limbs: usize) -> Self {
         let b_negative = b.is_negative() != is_difference;
         let (large, small, is_negative) = match a.cmp_magnitude(b) {

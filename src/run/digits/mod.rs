@@ -140,7 +140,7 @@ pub trait LongRun: Send {
 /// The scene is not carried in many digits, or its start cannot be brought onto its constraints.
 pub fn long_run(source: &Source, precision: Precision) -> Result<Box<dyn LongRun>, LongError> {
     match precision.room() {
-        4 => Ok(Box::new(Runner::<4>::new(source, precision)?)),
+        5 => Ok(Box::new(Runner::<5>::new(source, precision)?)),
         8 => Ok(Box::new(Runner::<8>::new(source, precision)?)),
         16 => Ok(Box::new(Runner::<16>::new(source, precision)?)),
         32 => Ok(Box::new(Runner::<32>::new(source, precision)?)),

@@ -142,7 +142,13 @@ impl Chebyshev {
 
     /// What the last coefficients say it may be off.
     pub fn tail(&self) -> f64 {
-        self.coefficients.iter().rev().take(3).fold(0.0, |most, c| f64::max(most, c.abs()))
+        self.tail_of(self.coefficients.len() - 1)
+    }
+
+    /// The same of the interpolant of a lower degree, of which about the last coefficients are those here.
+    pub fn tail_of(&self, degree: usize) -> f64 {
+        let last = self.coefficients.iter().skip((degree + 1).saturating_sub(3));
+        last.fold(0.0, |most, c| f64::max(most, c.abs()))
     }
 
     /// Its integral from 0 to 1.
