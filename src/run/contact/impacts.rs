@@ -224,13 +224,19 @@ impl ContactDriver {
         let mut motion = self.motion();
         let before = self.jumps.is_some().then(|| motion.clone());
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
+        let new: Vec<usize> = contacts.iter().copied().filter(|c| !self.mechanism.held.contains(c)).collect();
+        let bounces: Vec<f64> =
+            new.iter().map(|&contact| self.bounces_last(contact, &contacts, &modes, &motion)).collect();
         self.record(&contacts, motion.time.hi, outcome);
+        for (&contact, last) in new.iter().zip(bounces) {
+            self.begin_later(contact, last, outcome);
+        }
         self.record_modes(&modes, motion.time.hi, outcome);
         let mut plan = outcome.plan.clone();
         self.mechanism = in_modes(&self.free, &contacts, &modes);
         if self.mechanism.constraints.len() > self.free.constraints.len() {
             plan.stabilization = Stabilization::Projection;
-            self.put_on(&mut motion, outcome)?;
+            self.put_on(&mut motion, &new, outcome)?;
         }
         if let Some(events) = &mut self.events {
             events.watch_friction(&self.mechanism);
@@ -263,9 +269,22 @@ impl ContactDriver {
     }
 
     /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to
-    /// rebound with.
-    pub(super) fn put_on(&mut self, motion: &mut Motion, outcome: &mut Outcome) -> Result<(), StepError> {
+    /// rebound with, at the walls that are held anew with the friction of their impulses.
+    pub(super) fn put_on(
+        &mut self,
+        motion: &mut Motion,
+        new: &[usize],
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
         let before = self.sampler.balance(motion);
+        let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
+        if self.mechanism.sliding().any(|(friction, _)| is_new(friction.normal)) {
+            let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+            let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+            if let Some(omega) = self.mechanism.without_normal_rates(motion.time, &phi, &omega) {
+                motion.omega = omega.into_iter().map(DoubleDouble::from).collect();
+            }
+        }
         let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
         let mut state = form.state(motion);
         let mut kernel = Kernel::new(&self.mechanism);
@@ -287,9 +306,10 @@ impl ContactDriver {
         self.held.retain(|held| {
             let stays = contacts.contains(&held.contact);
             if !stays {
-                outcome.persistent_contact_time += t - held.since;
+                let until = t.max(held.since);
+                outcome.persistent_contact_time += until - held.since;
                 if let Some(kept) = held.kept {
-                    outcome.holds[kept].until = Some(t);
+                    outcome.holds[kept].until = Some(until);
                 }
             }
             stays
@@ -319,7 +339,8 @@ impl ContactDriver {
 
     /// Books the time of the holds that last to the end of the run, `t` \[s\].
     pub(in crate::run) fn end(&mut self, t: f64, outcome: &mut Outcome) {
-        outcome.persistent_contact_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
+        outcome.persistent_contact_time +=
+            self.held.iter().map(|held| (t - held.since).max(0.0)).sum::<f64>();
     }
 
     /// The present motion in doubles.
