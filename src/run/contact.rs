@@ -7,6 +7,7 @@
 
 mod impacts;
 mod rest;
+mod several;
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
 use super::event::{EventDetector, Memory, SwitchFunction};

@@ -52,6 +52,9 @@ impl ContactDriver {
     /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would
     /// have to pull are let go.
     pub(super) fn impact_at(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
+        if let Some(touching) = self.met_together(contact) {
+            return self.impact_at_several(&touching, outcome);
+        }
         let t = self.motion().time;
         let Posture { phi, omega, .. } = self.posture();
         let (impact, striking) = loop {
@@ -92,7 +95,10 @@ impl ContactDriver {
         if impact.approach >= 0.0 {
             return Ok(0.0);
         }
-        self.check_single(contact, &impact, &striking, outcome)?;
+        if Self::presses_friction(&impact, &striking) {
+            let touching = self.touching_with(contact);
+            return self.impact_at_several(&touching, outcome);
+        }
         // Letting others go may have moved it by rounding.
         let last = self.motion();
         let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
@@ -141,28 +147,6 @@ impl ContactDriver {
             });
         }
         Ok(-impact.approach)
-    }
-
-    /// Impulses at several walls with friction at once do not follow from the laws of impact.
-    fn check_single(
-        &mut self,
-        contact: usize,
-        impact: &Impact,
-        striking: &Mechanism,
-        outcome: &Outcome,
-    ) -> Result<(), StepError> {
-        let pressed = striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]);
-        let mut pressed = pressed.filter(|(_, impulse)| -**impulse > 1e-9 * impact.impulse);
-        let Some((&held, _)) = pressed.find(|(held, _)| striking.friction_at(**held).is_some()) else {
-            return Ok(());
-        };
-        let what = format!(
-            "an impact at wall {} presses a point on wall {}, which has dry friction: impulses at several walls are not determined",
-            self.name(contact),
-            self.name(held)
-        );
-        let hint = "leave friction out where points rest, or end the run before";
-        Err(StepError { cause: Cause::Friction, ..self.stopped(&outcome.plan, what, hint) })
     }
 
     /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection
@@ -344,7 +328,7 @@ impl ContactDriver {
     }
 
     /// The present motion in doubles.
-    fn posture(&mut self) -> Posture {
+    pub(super) fn posture(&mut self) -> Posture {
         let motion = self.motion();
         let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
         Posture {
@@ -365,9 +349,9 @@ pub(in crate::run) fn in_modes(free: &Arc<Mechanism>, contacts: &[usize], modes:
 }
 
 /// Time, elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
-struct Posture {
-    t: Time,
-    z: Vec<Complex<f64>>,
-    phi: Vec<f64>,
-    omega: Vec<f64>,
+pub(super) struct Posture {
+    pub t: Time,
+    pub z: Vec<Complex<f64>>,
+    pub phi: Vec<f64>,
+    pub omega: Vec<f64>,
 }
