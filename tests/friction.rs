@@ -11,14 +11,14 @@ use std::sync::Arc;
 
 const G: f64 = 9.81;
 /// How far a run may be from the truth, and its balance from zero.
-const CLOSE: f64 = 2e-8;
+const CLOSE: f64 = 1e-10;
 
 fn methods() -> [Request; 4] {
     [
-        adaptive(MethodId::Dp5, 1e-11),
-        adaptive(MethodId::Dp8, 1e-12),
-        adaptive(MethodId::Radau(3), 1e-11),
-        adaptive(MethodId::Radau(5), 1e-12),
+        adaptive(MethodId::Dp5, 1e-14),
+        adaptive(MethodId::Dp8, 1e-14),
+        adaptive(MethodId::Radau(3), 1e-13),
+        adaptive(MethodId::Radau(5), 1e-13),
     ]
 }
 
@@ -213,11 +213,10 @@ fn a_ball_bounces_to_rest_and_slides_to_a_stop_in_closed_form() {
         let stops = ends + slides / (mu * G);
         x += 0.5 * slides * slides / (mu * G);
         for outcome in runs(&ball(law, e, [u, v], stops + 0.5)) {
-            // What is left of the bounces below the height of rest.
-            assert!((outcome.last.phi[1] - x).abs() < 1e-5, "{} {x}", outcome.last.phi[1]);
+            assert!((outcome.last.phi[1] - x).abs() < 1e-10, "{} {x}", outcome.last.phi[1]);
             assert!(outcome.last.omega.iter().all(|rate| rate.abs() < 1e-15));
             let last = outcome.frictions.last().expect("it sticks");
-            assert!(last.mode == "sticks" && (last.t - stops).abs() < 1e-5, "{last:?} {stops}");
+            assert!(last.mode == "sticks" && (last.t - stops).abs() < 1e-10, "{last:?} {stops}");
             let lost = outcome.last.friction + outcome.impact_loss;
             assert!((lost - (u * u + v * v)).abs() < 1e-8, "{lost}");
         }

@@ -226,8 +226,7 @@ fn a_point_pressed_against_its_wall_is_held_there() {
         let last =
             lively.impacts.iter().rev().find(|strike| strike.approach < -1e-4).expect("a small bounce");
         let rest = last.t + 2.0 * -last.approach / (PENDULUM_SQUARED * 0.5f64.sin());
-        // Bounces of less than 1e-11 m are not resolved: sqrt(8e-11 / 7.2) s before the end of all of them.
-        assert!((lively.holds[0].t - rest).abs() < 1e-5, "{:?}, not {rest} s", lively.holds[0]);
+        assert!((lively.holds[0].t - rest).abs() < 1e-9, "{:?}, not {rest} s", lively.holds[0]);
     }
 }
 

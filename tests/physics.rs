@@ -38,6 +38,7 @@ mod fit;
 mod forces;
 mod formulas;
 mod friction;
+mod friction_impacts;
 mod gauss;
 mod identities;
 mod impact;

@@ -11,16 +11,16 @@ const G: f64 = 9.81;
 
 fn methods() -> [Request; 5] {
     [
-        adaptive(MethodId::Dp5, 1e-11),
-        adaptive(MethodId::Dp8, 1e-12),
-        adaptive(MethodId::Dop853, 1e-12),
-        adaptive(MethodId::Taylor, 1e-13),
-        adaptive(MethodId::Radau(5), 1e-12),
+        adaptive(MethodId::Dp5, 1e-14),
+        adaptive(MethodId::Dp8, 1e-14),
+        adaptive(MethodId::Dop853, 1e-14),
+        adaptive(MethodId::Taylor, 1e-15),
+        adaptive(MethodId::Radau(5), 1e-13),
     ]
 }
 
 fn near(found: f64, expected: f64, what: &str) {
-    assert!((found - expected).abs() < 2e-8, "{what}: {found} and not {expected}");
+    assert!((found - expected).abs() < 1e-10, "{what}: {found} and not {expected}");
 }
 
 /// A pendulum that is let go at an angle.

@@ -110,7 +110,7 @@ fn a_ball_bounces_to_rest_as_in_the_textbook() {
                 (1, None),
                 "{method} e = {e}"
             );
-            close(outcome.holds[0].t, rest, 1e-4 * rest, "rest");
+            close(outcome.holds[0].t, rest, 1e-9 * rest, "rest");
             close(outcome.impact_loss, G * height, 1e-8 * G * height, "all of the height");
         }
     }

@@ -19,6 +19,7 @@
 
 pub mod impact;
 pub mod modes;
+pub mod simultaneous;
 
 pub use modes::{Moment, Paradox, Transition};
 

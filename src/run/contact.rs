@@ -1,11 +1,13 @@
 //! A run at its walls: impacts, points that come to rest there and stay, and their release.
 //!
 //! A point stays where its wall presses it and it does not move along the normal, or would rebound to less
-//! than [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so.  What is left
-//! of its normal velocity is taken off it and booked as lost in impacts.  From then on the wall is a row kept
-//! by projection, until its force would have to pull.
+//! than [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so, see `rest`.
+//! What is left of its normal velocity is taken off it and booked as lost in impacts.  From then on the wall is
+//! a row kept by projection, until its force would have to pull.
 
 mod impacts;
+mod rest;
+mod several;
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
 use super::event::{EventDetector, Memory, SwitchFunction};
@@ -45,11 +47,11 @@ pub struct ImpactRecord {
 /// A time a point stayed on its wall.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct PersistentContact {
-    /// Beginning \[s\].
+    /// Beginning \[s\]: after bounces that accumulate, the time at which infinitely many of them have ended.
     pub t: f64,
     /// Name of the wall.
     pub wall: String,
-    /// End \[s\]; `None`: held to the end of the run.
+    /// End \[s\], no earlier than the beginning; `None`: held to the end of the run.
     pub until: Option<f64>,
 }
 

@@ -148,7 +148,7 @@ impl ContactDriver {
         })
     }
 
-    fn paradox(&mut self, outcome: &Outcome, what: String) -> StepError {
+    pub(super) fn paradox(&mut self, outcome: &Outcome, what: String) -> StepError {
         StepError {
             cause: Cause::Friction,
             method: outcome.plan.method.to_string(),

@@ -13,6 +13,10 @@
 //! body; the mass matrix, in whose terms impacts are found, is not used. Source: E. T. Whittaker, *A Treatise
 //! on the Analytical Dynamics of Particles and Rigid Bodies*, 4th ed. (1937), sections 106 to 108.
 
+mod several;
+
+pub(super) use several::check_several;
+
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::{Measure, Posture};
 use crate::dynamics::contact::scale::magnitudes;

@@ -333,6 +333,11 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
                 self.factor(h, d);
             }
             self.predict(h, control.accepted, false);
+            // A work integral follows the motion and not the reverse: two iterations make it exact, and their
+            // contraction says nothing of the first one of stages that no polynomial predicts.
+            if control.accepted == 0.0 {
+                control.contraction = 1.0;
+            }
             let solved = self.solve(field, state, h, &mut control.contraction, statistics);
             let (theta, sweeps) = match solved {
                 Solved::Converged(theta, sweeps) => (theta, sweeps),

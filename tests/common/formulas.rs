@@ -85,18 +85,56 @@ pub fn is_consistent(text: &str) {
     }
 }
 
-/// Where a rotor is after a while under a torque by this formula; `None` where a method stops.
-fn moved(text: &str, method: MethodId, potential: bool) -> Option<[f64; 3]> {
-    let law = if potential {
-        format!(r#""potentials": [{{"name": "V", "energy": "1*({text})"}}]"#)
-    } else {
-        format!(r#""torques": [{{"name": "T", "body": "bar", "torque": "1*({text})"}}]"#)
+/// The mechanisms that laws act in, and what they act by.
+const MECHANISMS: usize = 3;
+const LAWS: usize = 3;
+
+/// A pendulum, on the ground, on another one or on a cart on a rail, under a law by this formula: a potential,
+/// or a torque, a force at a point or the tension of a spring.
+fn acted_on(text: &str, potential: bool, kind: usize) -> String {
+    let law = match (potential, kind / MECHANISMS) {
+        (true, _) => format!(r#""potentials": [{{"name": "V", "energy": "1*({text})"}}]"#),
+        (_, 0) => format!(r#""torques": [{{"name": "T", "body": "bar", "torque": "1*({text})"}}]"#),
+        (_, 1) => format!(
+            r#""forces": [{{"name": "F", "body": "bar", "point": [0.4, 0.1], "force": ["0.7*({text})", "-1*({text})"]}}]"#
+        ),
+        _ => format!(
+            r#""springs": [{{"name": "S", "between": [{{"body": "ground", "point": [0.2, -1.1]}}, {{"body": "bar", "point": [0.5, 0]}}],
+            "tension": "1*({text}) + 3*rate + 5*(length - 0.6)"}}]"#
+        ),
     };
-    let scene = format!(
-        r#"{{"name": "r", "gravity": [0, -9.81], "bars": [{{"name": "bar", "mass": 0.5, "centre": [0.3, 0], "inertia": 0.2}}],
-        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
-        "start": {{"bar": {{"phi": 0.7, "omega": -1.3}}}}, "until": 0.4, "every": 0.4, {law}}}"#
-    );
+    let bar = r#"{"name": "bar", "mass": 0.5, "centre": [0.3, 0], "inertia": 0.2}"#;
+    let hinge = |name: &str, below: &str, x: f64, above: &str| {
+        format!(
+            r#"{{"name": "{name}", "between": [{{"body": "{below}", "point": [{x}, 0]}}, {{"body": "{above}", "point": [0, 0]}}]}}"#
+        )
+    };
+    let start = r#""bar": {"phi": 0.7, "omega": -1.3}"#;
+    let (bars, hinges, more, starts) = match kind % MECHANISMS {
+        0 => (bar.to_owned(), hinge("A", "ground", 0.0, "bar"), "", start.to_owned()),
+        1 => (
+            format!(r#"{{"name": "first", "mass": 1, "centre": [0.2, 0.1], "inertia": 0.1}}, {bar}"#),
+            [hinge("A", "ground", 0.0, "first"), hinge("B", "first", 0.4, "bar")].join(", "),
+            "",
+            format!(r#""first": {{"phi": -1.1, "omega": 0.4}}, {start}"#),
+        ),
+        _ => (
+            format!(r#"{{"name": "cart", "mass": 1, "centre": [0, 0], "inertia": 0.1}}, {bar}"#),
+            hinge("B", "cart", 0.0, "bar"),
+            r#""sliders": [{"name": "R", "point": {"body": "cart", "point": [0, 0]}, "angle": "locked",
+                "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0.2]}}],"#,
+            format!(r#""cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0.5, 0.1]}}, {start}"#),
+        ),
+    };
+    format!(
+        r#"{{"name": "r", "gravity": [0, -9.81], "bars": [{bars}], "hinges": [{hinges}], {more}
+        "start": {{{starts}}}, "until": 0.4, "every": 0.4, {law}}}"#
+    )
+}
+
+/// Where it is after a while; `None` where a method stops.
+fn moved(text: &str, method: MethodId, potential: bool, kind: usize) -> Option<[f64; 3]> {
+    let scene = acted_on(text, potential, kind);
     let scene = parse_scene(&scene, "random", &[]).unwrap_or_else(|error| panic!("{error}"));
     let mechanism = Arc::new(Mechanism::new(&scene).unwrap_or_else(|error| panic!("{text}: {error}")));
     let request = Request {
@@ -110,20 +148,25 @@ fn moved(text: &str, method: MethodId, potential: bool) -> Option<[f64; 3]> {
     let mut running = Running::new(Run::new(mechanism, plan, Limits::default(), &start).expect("a run"));
     running.go(&mut |_: &Sample| Ok(()), &mut || false).expect("samples");
     let outcome = running.finish();
-    outcome.stop.is_none().then(|| [outcome.last.phi[0], outcome.last.omega[0], outcome.drift.energy.max])
+    let bar = scene.bars.iter().position(|bar| bar.name == "bar")?;
+    outcome.stop.is_none().then(|| [outcome.last.phi[bar], outcome.last.omega[bar], outcome.drift.energy.max])
 }
 
-/// Asserts that the series and Dormand–Prince move a rotor alike under a torque by a formula, with its work
-/// accounted for.
-pub fn moves_alike(text: &str, potential: bool) -> bool {
-    let (Some(a), Some(b)) =
-        (moved(text, MethodId::Taylor, potential), moved(text, MethodId::Dp8, potential))
+/// Asserts that the series, Dormand–Prince, which takes values alone, and Radau, which takes the Jacobian, move a
+/// mechanism alike under a law by a formula, with its work accounted for; false where one of them stops.
+pub fn moves_alike(text: &str, potential: bool, draw: &mut Draw) -> bool {
+    let kind = draw.below(MECHANISMS * LAWS);
+    let [Some(a), Some(b), Some(c)] = [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)]
+        .map(|method| moved(text, method, potential, kind))
     else {
         return false;
     };
-    let apart = (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
-    assert!(apart < 1e-7 * (1.0 + a[1].abs()), "{text}: {a:?} and {b:?}");
+    for other in [b, c] {
+        let apart = (a[0] - other[0]).abs().max((a[1] - other[1]).abs());
+        assert!(apart < 1e-7 * (1.0 + a[1].abs()), "{text} ({kind}): {a:?} and {other:?}");
+    }
     // Of the energy at the start, which a law that feeds the motion leaves far below.
-    assert!(a[2].max(b[2]) < 1e-7 * (1.0 + a[1] * a[1]), "{text}: drift {:e} and {:e}", a[2], b[2]);
+    let drift = a[2].max(b[2]).max(c[2]);
+    assert!(drift < 1e-7 * (1.0 + a[1] * a[1]), "{text} ({kind}): drift {drift:e}");
     true
 }

@@ -567,13 +567,14 @@ pub fn physics(bytes: &[u8]) -> u64 {
     }
 }
 
-/// A text as a formula, and a random formula as value, derivative, torque or potential by two methods.
+/// A text as a formula, and a random formula as value, derivative, force or potential in random scenes by three
+/// methods.
 pub fn formula(bytes: &[u8]) -> u64 {
     let mut draw = Draw::new(bytes);
     let (depth, corners, potential) = (draw.below(4), draw.chance(40), draw.chance(30));
     let text = formulas::expression(&mut draw, depth, corners, potential);
     formulas::is_consistent(&text);
-    let moved = u64::from(formulas::moves_alike(&text, potential));
+    let moved = u64::from(formulas::moves_alike(&text, potential, &mut draw));
     let noise = String::from_utf8_lossy(draw.rest()).into_owned();
     let told = match Formula::parse(&noise) {
         Ok(formula) => {

@@ -81,6 +81,11 @@ impl Metric {
         omega.component_mul(&self.scale).iter().copied().collect()
     }
 
+    /// The rows that count, by their numbers.
+    pub fn counting(&self) -> &[usize] {
+        &self.counting
+    }
+
     /// What the constraints leave of a column.
     pub fn free(&self, column: &DVector<f64>) -> DVector<f64> {
         self.basis.rest(column)

@@ -13,6 +13,12 @@
 //! Source: E. J. Routh, *Dynamics of a System of Rigid Bodies*, 7th ed. (1905), section 187 ff.; Y. Wang,
 //! M. Mason, *Two-dimensional rigid-body collisions with friction*, J. Appl. Mech. 59 (1992).
 
+use super::super::constraint::Posture;
+use super::super::contact::metric::{Gradient, Metric};
+use super::super::{Mechanism, Time};
+use super::{Normal, solve};
+use nalgebra::DVector;
+
 /// What an impact is decided by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shock {
@@ -77,6 +83,39 @@ impl Shock {
             }
         }
         None
+    }
+}
+
+impl Mechanism {
+    /// Rates \[rad/s, m/s\] without those along the normals of the contacts that are held, which impulses of
+    /// their walls take off with the friction of those that slide; `None` where there are no such impulses.
+    ///
+    /// They may pull: see `rest` in the room `run`.
+    pub(crate) fn without_normal_rates(&self, t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<f64>> {
+        let metric = Metric::at(self, t, phi, omega)?;
+        let (before, z) = (metric.velocity(omega), self.elements(phi));
+        let columns: Vec<DVector<f64>> = metric.rows.iter().map(|row| metric.column(&row.along)).collect();
+        let mut pushes = columns.clone();
+        for (friction, sign) in self.sliding() {
+            let Normal::Contact(_) = friction.normal else { continue };
+            let along = Gradient::of(&friction.tangent, t, Posture { phi, z: &z, omega }).along;
+            pushes[self.normal_row(friction)?].axpy(-sign * friction.kinetic, &metric.column(&along), 1.0);
+        }
+        let counting = metric.counting();
+        let mut impulses: Vec<f64> =
+            counting.iter().map(|&r| -metric.rows[r].row.drive - columns[r].dot(&before)).collect();
+        let mut matrix: Vec<f64> = counting
+            .iter()
+            .flat_map(|&r| counting.iter().map(|&s| columns[r].dot(&pushes[s])).collect::<Vec<_>>())
+            .collect();
+        solve(&mut matrix, &mut impulses);
+        let mut change = DVector::zeros(omega.len());
+        for (&s, impulse) in counting.iter().zip(impulses) {
+            change.axpy(impulse, &pushes[s], 1.0);
+        }
+        let change = metric.rates(&change);
+        let is_finite = change.iter().all(|x| x.is_finite());
+        is_finite.then(|| change.iter().zip(omega).map(|(change, omega)| omega + change).collect())
     }
 }
 

@@ -52,6 +52,9 @@ impl ContactDriver {
     /// Lets the impact at a wall take effect, and returns the approach \[m/s\]; points that the others would
     /// have to pull are let go.
     pub(super) fn impact_at(&mut self, contact: usize, outcome: &mut Outcome) -> Result<f64, StepError> {
+        if let Some(touching) = self.met_together(contact) {
+            return self.impact_at_several(&touching, outcome);
+        }
         let t = self.motion().time;
         let Posture { phi, omega, .. } = self.posture();
         let (impact, striking) = loop {
@@ -92,7 +95,10 @@ impl ContactDriver {
         if impact.approach >= 0.0 {
             return Ok(0.0);
         }
-        self.check_single(contact, &impact, &striking, outcome)?;
+        if Self::presses_friction(&impact, &striking) {
+            let touching = self.touching_with(contact);
+            return self.impact_at_several(&touching, outcome);
+        }
         // Letting others go may have moved it by rounding.
         let last = self.motion();
         let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
@@ -141,28 +147,6 @@ impl ContactDriver {
             });
         }
         Ok(-impact.approach)
-    }
-
-    /// Impulses at several walls with friction at once do not follow from the laws of impact.
-    fn check_single(
-        &mut self,
-        contact: usize,
-        impact: &Impact,
-        striking: &Mechanism,
-        outcome: &Outcome,
-    ) -> Result<(), StepError> {
-        let pressed = striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]);
-        let mut pressed = pressed.filter(|(_, impulse)| -**impulse > 1e-9 * impact.impulse);
-        let Some((&held, _)) = pressed.find(|(held, _)| striking.friction_at(**held).is_some()) else {
-            return Ok(());
-        };
-        let what = format!(
-            "an impact at wall {} presses a point on wall {}, which has dry friction: impulses at several walls are not determined",
-            self.name(contact),
-            self.name(held)
-        );
-        let hint = "leave friction out where points rest, or end the run before";
-        Err(StepError { cause: Cause::Friction, ..self.stopped(&outcome.plan, what, hint) })
     }
 
     /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection
@@ -224,13 +208,19 @@ impl ContactDriver {
         let mut motion = self.motion();
         let before = self.jumps.is_some().then(|| motion.clone());
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
+        let new: Vec<usize> = contacts.iter().copied().filter(|c| !self.mechanism.held.contains(c)).collect();
+        let bounces: Vec<f64> =
+            new.iter().map(|&contact| self.bounces_last(contact, &contacts, &modes, &motion)).collect();
         self.record(&contacts, motion.time.hi, outcome);
+        for (&contact, last) in new.iter().zip(bounces) {
+            self.begin_later(contact, last, outcome);
+        }
         self.record_modes(&modes, motion.time.hi, outcome);
         let mut plan = outcome.plan.clone();
         self.mechanism = in_modes(&self.free, &contacts, &modes);
         if self.mechanism.constraints.len() > self.free.constraints.len() {
             plan.stabilization = Stabilization::Projection;
-            self.put_on(&mut motion, outcome)?;
+            self.put_on(&mut motion, &new, outcome)?;
         }
         if let Some(events) = &mut self.events {
             events.watch_friction(&self.mechanism);
@@ -263,9 +253,22 @@ impl ContactDriver {
     }
 
     /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to
-    /// rebound with.
-    pub(super) fn put_on(&mut self, motion: &mut Motion, outcome: &mut Outcome) -> Result<(), StepError> {
+    /// rebound with, at the walls that are held anew with the friction of their impulses.
+    pub(super) fn put_on(
+        &mut self,
+        motion: &mut Motion,
+        new: &[usize],
+        outcome: &mut Outcome,
+    ) -> Result<(), StepError> {
         let before = self.sampler.balance(motion);
+        let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
+        if self.mechanism.sliding().any(|(friction, _)| is_new(friction.normal)) {
+            let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+            let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+            if let Some(omega) = self.mechanism.without_normal_rates(motion.time, &phi, &omega) {
+                motion.omega = omega.into_iter().map(DoubleDouble::from).collect();
+            }
+        }
         let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
         let mut state = form.state(motion);
         let mut kernel = Kernel::new(&self.mechanism);
@@ -287,9 +290,10 @@ impl ContactDriver {
         self.held.retain(|held| {
             let stays = contacts.contains(&held.contact);
             if !stays {
-                outcome.persistent_contact_time += t - held.since;
+                let until = t.max(held.since);
+                outcome.persistent_contact_time += until - held.since;
                 if let Some(kept) = held.kept {
-                    outcome.holds[kept].until = Some(t);
+                    outcome.holds[kept].until = Some(until);
                 }
             }
             stays
@@ -319,11 +323,12 @@ impl ContactDriver {
 
     /// Books the time of the holds that last to the end of the run, `t` \[s\].
     pub(in crate::run) fn end(&mut self, t: f64, outcome: &mut Outcome) {
-        outcome.persistent_contact_time += self.held.iter().map(|held| t - held.since).sum::<f64>();
+        outcome.persistent_contact_time +=
+            self.held.iter().map(|held| (t - held.since).max(0.0)).sum::<f64>();
     }
 
     /// The present motion in doubles.
-    fn posture(&mut self) -> Posture {
+    pub(super) fn posture(&mut self) -> Posture {
         let motion = self.motion();
         let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
         Posture {
@@ -344,9 +349,9 @@ pub(in crate::run) fn in_modes(free: &Arc<Mechanism>, contacts: &[usize], modes:
 }
 
 /// Time, elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
-struct Posture {
-    t: Time,
-    z: Vec<Complex<f64>>,
-    phi: Vec<f64>,
-    omega: Vec<f64>,
+pub(super) struct Posture {
+    pub t: Time,
+    pub z: Vec<Complex<f64>>,
+    pub phi: Vec<f64>,
+    pub omega: Vec<f64>,
 }

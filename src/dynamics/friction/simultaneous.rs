@@ -1,0 +1,336 @@
+//! Impulses of one impact at several walls at once, with dry friction.
+//!
+//! ```text
+//! v⁺ = v⁻ + A p,   p = (n_1 … n_k, s_1 … s_k)         along the normals and the walls
+//! least_i <= n_i,  w_i <= v⁺_ni,  (n_i - least_i)(v⁺_ni - w_i) = 0
+//! |s_i| <= mu0_i n_i,  v⁺_ti = 0      or      s_i = -sign(v⁺_ti) mu_i n_i
+//!
+//! Poisson:  compression  least = 0, w = 0;   expansion  least_i = e_i n_i of the compression, w = 0
+//! Newton:   at once      least = 0, w_i = -e_i v⁻_ni
+//! ```
+//!
+//! A complementarity problem of both phases, solved as that of [`modes`](super::modes) by looking at every
+//! combination.  Among those that fit, points that slide on come before those that stop, and those that stick
+//! before those that turn.  A wall whose point does not approach has no restitution.  Impulses that the motion
+//! does not determine, as at two corners of one body that both stick, are shared in any way that fits.
+//!
+//! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), sections 8.2 and 8.3.
+
+use super::super::constraint::Posture;
+use super::super::contact::metric::{Gradient, Metric};
+use super::super::{Mechanism, Time};
+use nalgebra::DVector;
+
+/// Combinations that are looked at.
+const MOST: usize = 20_000;
+/// Share of the largest velocity, impulse or entry of A that rounding makes.
+const ROUNDING: f64 = 1e-11;
+
+/// What the impulses at several walls are decided by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shocks {
+    /// A \[1/kg\], row by row: velocities that unit impulses make (2k, 2k).
+    pub response: Vec<f64>,
+    /// v⁻ \[m/s\] (2k).
+    pub velocity: Vec<f64>,
+    /// e (k), without those of points that do not approach.
+    pub restitution: Vec<f64>,
+    /// mu and mu0 (k); zeros without friction.
+    pub coefficients: Vec<[f64; 2]>,
+    /// True for Newton's law of impact, else Poisson's.
+    pub is_newton: bool,
+}
+
+/// What the impulse at one wall does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Way {
+    /// True where the point takes the least normal velocity, else the least impulse.
+    is_pressed: bool,
+    /// Sign of the velocity of what slides, 0 of what sticks.
+    slides: f64,
+}
+
+impl Shocks {
+    /// Normal and tangential impulses \[N·s\] of all walls; `None` where no combination fits, or there are too
+    /// many.
+    pub fn impulses(&self) -> Option<Vec<[f64; 2]>> {
+        let count = self.restitution.len();
+        let nothing = vec![0.0; count];
+        let first = if self.is_newton {
+            let rebound: Vec<f64> =
+                self.restitution.iter().zip(&self.velocity).map(|(e, v)| -e * v).collect();
+            self.phase(&self.velocity, &nothing, &rebound)?
+        } else {
+            self.phase(&self.velocity, &nothing, &nothing)?
+        };
+        let mut all = first.clone();
+        if !self.is_newton && self.restitution.iter().any(|&e| e != 0.0) {
+            let least: Vec<f64> = self.restitution.iter().zip(&first).map(|(e, n)| e * n).collect();
+            let second = self.phase(&self.after(&self.velocity, &first), &least, &nothing)?;
+            all.iter_mut().zip(second).for_each(|(all, more)| *all += more);
+        }
+        Some((0..count).map(|i| [all[i], all[count + i]]).collect())
+    }
+
+    /// Velocities after impulses.
+    fn after(&self, velocity: &[f64], impulse: &[f64]) -> Vec<f64> {
+        let rows = self.response.chunks_exact(velocity.len());
+        rows.zip(velocity)
+            .map(|(row, v)| v + row.iter().zip(impulse).map(|(a, p)| a * p).sum::<f64>())
+            .collect()
+    }
+
+    /// The impulses of a phase from these velocities on.
+    fn phase(&self, from: &[f64], least: &[f64], rebound: &[f64]) -> Option<Vec<f64>> {
+        let ways: Vec<Vec<Way>> = (0..least.len()).map(|i| self.ways(i, from, least[i])).collect();
+        let total = ways.iter().try_fold(1_usize, |all, of| all.checked_mul(of.len()));
+        let total = total.filter(|&total| total <= MOST)?;
+        (0..total).find_map(|mut number| {
+            let way: Vec<Way> = (ways.iter())
+                .map(|of| {
+                    let own = of[number % of.len()];
+                    number /= of.len();
+                    own
+                })
+                .collect();
+            let impulse = self.impulses_of(from, least, rebound, &way)?;
+            self.fits(from, least, rebound, &way, &impulse).then_some(impulse)
+        })
+    }
+
+    /// What a wall may do, first what changes least.
+    fn ways(&self, i: usize, from: &[f64], least: f64) -> Vec<Way> {
+        let ahead = from[from.len() / 2 + i];
+        let still = ROUNDING * self.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let slides: &[f64] = match self.coefficients[i] {
+            [_, 0.0] => &[0.0],
+            _ if ahead > still => &[1.0, 0.0, -1.0],
+            _ if ahead < -still => &[-1.0, 0.0, 1.0],
+            _ => &[0.0, 1.0, -1.0],
+        };
+        let way = |is_pressed| slides.iter().map(move |&slides| Way { is_pressed, slides });
+        // Without an impulse there is no friction.
+        let few = if least > 0.0 { slides.len() } else { 1 };
+        way(true).chain(way(false).take(few)).collect()
+    }
+
+    /// The impulses that go these ways, wherever they lead; `None` where there are none.
+    fn impulses_of(&self, from: &[f64], least: &[f64], rebound: &[f64], way: &[Way]) -> Option<Vec<f64>> {
+        let (count, size) = (way.len(), from.len());
+        let mut impulse = vec![0.0; size];
+        let mut unknown = Vec::new();
+        for (i, way) in way.iter().enumerate() {
+            if way.is_pressed {
+                unknown.push(i);
+            } else {
+                impulse[i] = least[i];
+                impulse[count + i] = -way.slides * self.coefficients[i][0] * least[i];
+            }
+            if way.slides == 0.0 && self.coefficients[i][1] > 0.0 && (way.is_pressed || least[i] > 0.0) {
+                unknown.push(count + i);
+            }
+        }
+        let known = self.after(from, &impulse);
+        // A unit of a normal impulse has its friction with it.
+        let effect = |row: usize, column: usize| {
+            let own = self.response[row * size + column];
+            match way.get(column) {
+                Some(way) => {
+                    own - way.slides
+                        * self.coefficients[column][0]
+                        * self.response[row * size + count + column]
+                }
+                None => own,
+            }
+        };
+        let mut matrix: Vec<f64> = unknown
+            .iter()
+            .flat_map(|&row| unknown.iter().map(move |&column| (row, column)))
+            .map(|(r, c)| effect(r, c))
+            .collect();
+        let mut values: Vec<f64> =
+            unknown.iter().map(|&row| if row < count { rebound[row] } else { 0.0 } - known[row]).collect();
+        let still = ROUNDING * self.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        solve(&mut matrix, &mut values, still)?;
+        for (&column, value) in unknown.iter().zip(values) {
+            impulse[column] = value;
+            if let Some(way) = way.get(column).filter(|way| way.slides != 0.0) {
+                impulse[count + column] = -way.slides * self.coefficients[column][0] * value;
+            }
+        }
+        impulse.iter().all(|p| p.is_finite()).then_some(impulse)
+    }
+
+    /// Whether impulses and velocities after them are such as these ways claim.
+    fn fits(&self, from: &[f64], least: &[f64], rebound: &[f64], way: &[Way], impulse: &[f64]) -> bool {
+        let count = way.len();
+        let after = self.after(from, impulse);
+        let speed = ROUNDING * self.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let push = ROUNDING * impulse.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
+        (0..count).all(|i| {
+            let [normal, along] = [impulse[i], impulse[count + i]];
+            let is_kept = normal >= least[i] - push && after[i] >= rebound[i] - speed;
+            let is_rough = if way[i].slides == 0.0 {
+                along.abs() <= self.coefficients[i][1] * normal.max(0.0) * (1.0 + ROUNDING) + push
+            } else {
+                way[i].slides * after[count + i] >= -speed
+            };
+            is_kept && is_rough
+        })
+    }
+}
+
+/// Solves a small system that may be singular, by elimination with exchange of rows and columns; what is left
+/// open is zero.  `None` where an equation cannot be, by more than `open`.
+fn solve(matrix: &mut [f64], x: &mut [f64], open: f64) -> Option<()> {
+    let d = x.len();
+    let mut order: Vec<usize> = (0..d).collect();
+    let size = matrix.iter().fold(0.0_f64, |most, a| most.max(a.abs()));
+    let mut rank = 0;
+    while rank < d {
+        let entries = (rank..d).flat_map(|i| (rank..d).map(move |j| (i, j)));
+        let (i, j) = entries
+            .max_by(|a, b| matrix[a.0 * d + a.1].abs().total_cmp(&matrix[b.0 * d + b.1].abs()))
+            .unwrap_or((rank, rank));
+        if matrix[i * d + j].abs() <= ROUNDING * size {
+            break;
+        }
+        (0..d).for_each(|k| matrix.swap(rank * d + k, i * d + k));
+        (0..d).for_each(|k| matrix.swap(k * d + rank, k * d + j));
+        x.swap(rank, i);
+        order.swap(rank, j);
+        for i in rank + 1..d {
+            let share = matrix[i * d + rank] / matrix[rank * d + rank];
+            for k in rank..d {
+                matrix[i * d + k] -= share * matrix[rank * d + k];
+            }
+            x[i] -= share * x[rank];
+        }
+        rank += 1;
+    }
+    if x[rank..].iter().any(|left| left.abs() > open || left.is_nan()) {
+        return None;
+    }
+    let mut found = vec![0.0; d];
+    for k in (0..rank).rev() {
+        let sum = (k + 1..rank).fold(x[k], |sum, j| sum - matrix[k * d + j] * found[order[j]]);
+        found[order[k]] = sum / matrix[k * d + k];
+    }
+    x.copy_from_slice(&found);
+    Some(())
+}
+
+/// The impulses at one of several walls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blow {
+    /// The contact.
+    pub contact: usize,
+    /// Normal velocities of the point before and after \[m/s\].
+    pub normal_rates: [f64; 2],
+    /// The same along the wall, the normal turned clockwise; zeros without friction.
+    pub tangential_rates: [f64; 2],
+    /// Impulse along the normal \[N·s\], not negative.
+    pub impulse: f64,
+    /// Impulse of friction along the wall \[N·s\].
+    pub tangential: f64,
+}
+
+impl Blow {
+    /// Energy that the impulses take off the mechanism \[J\].
+    pub fn energy_lost(&self) -> f64 {
+        let [before, after] = self.normal_rates;
+        let [slid, slides] = self.tangential_rates;
+        -0.5 * (self.impulse * (before + after) + self.tangential * (slid + slides))
+    }
+}
+
+/// What an impact at several walls did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Impacts {
+    /// Rates of all coordinates after it \[rad/s, m/s\].
+    pub omega: Vec<f64>,
+    /// The walls that took part.
+    pub blows: Vec<Blow>,
+    /// Impulsive work of the motors and of walls that move, which hold their rates \[J\].
+    pub motor_work: f64,
+}
+
+impl Mechanism {
+    /// The jump at these contacts at once, none of which is held by the mechanism itself; `None` where no
+    /// impulses fit, see [`Shocks::impulses`].
+    ///
+    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] at the moment of impact.  Newton's law is that of
+    /// impacts all of whose walls with friction have it.
+    pub fn impact_at_several(
+        &self,
+        contacts: &[usize],
+        t: Time,
+        phi: &[f64],
+        omega: &[f64],
+    ) -> Option<Impacts> {
+        let (metric, z) = (Metric::at(self, t, phi, omega)?, self.elements(phi));
+        let at = Posture { phi, z: &z, omega };
+        let before = metric.velocity(omega);
+        let kept = metric.kept(&before);
+        let normals: Vec<Gradient> =
+            contacts.iter().map(|&contact| Gradient::of(&self.contacts[contact].row, t, at)).collect();
+        let frictions: Vec<_> = contacts.iter().map(|&contact| self.friction_at(contact)).collect();
+        let along = frictions.iter().map(|friction| match friction {
+            Some(friction) => metric.column(&Gradient::of(&friction.tangent, t, at).along),
+            None => DVector::zeros(omega.len()),
+        });
+        let columns: Vec<DVector<f64>> =
+            normals.iter().map(|normal| metric.column(&normal.along)).chain(along).collect();
+        let free: Vec<DVector<f64>> = columns.iter().map(|column| metric.free(column)).collect();
+        let count = contacts.len();
+        let drive = |i: usize| normals.get(i).map_or(0.0, |normal| normal.row.drive);
+        let rates = |v: &DVector<f64>| -> Vec<f64> {
+            columns.iter().enumerate().map(|(i, column)| column.dot(v) + drive(i)).collect()
+        };
+        let velocity = rates(&kept);
+        let still = ROUNDING * velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let restitution = |(i, &contact): (usize, &usize)| match velocity[i] < -still {
+            true => self.contacts[contact].restitution,
+            false => 0.0,
+        };
+        let known = frictions.iter().flatten();
+        let shocks = Shocks {
+            response: free.iter().flat_map(|row| free.iter().map(|other| row.dot(other))).collect(),
+            restitution: contacts.iter().enumerate().map(restitution).collect(),
+            coefficients: (frictions.iter())
+                .map(|friction| friction.map_or([0.0; 2], |friction| [friction.kinetic, friction.stiction]))
+                .collect(),
+            is_newton: known.clone().count() > 0 && known.clone().all(|friction| friction.is_newton),
+            velocity,
+        };
+        let impulses = shocks.impulses()?;
+        let (mut push, mut change) = (DVector::zeros(omega.len()), &kept - &before);
+        for (i, [normal, tangential]) in impulses.iter().enumerate() {
+            for (column, impulse) in [(i, normal), (count + i, tangential)] {
+                push.axpy(*impulse, &columns[column], 1.0);
+                change.axpy(*impulse, &free[column], 1.0);
+            }
+        }
+        let row_impulses = metric.multipliers(&(&push - &change));
+        let of_rows = row_impulses.iter().zip(&metric.rows).map(|(impulse, row)| impulse * row.row.drive);
+        let of_walls = impulses.iter().enumerate().map(|(i, [normal, _])| normal * drive(i));
+        let motor_work = of_rows.sum::<f64>() - of_walls.sum::<f64>();
+        let (first, last) = (rates(&before), rates(&(&before + &change)));
+        let most = impulses.iter().fold(0.0_f64, |most, impulse| most.max(impulse[0]));
+        let blows = (impulses.iter().enumerate())
+            .filter(|(_, impulse)| impulse[0] > ROUNDING * most)
+            .map(|(i, &[impulse, tangential])| Blow {
+                contact: contacts[i],
+                normal_rates: [first[i], last[i]],
+                tangential_rates: [first[count + i], last[count + i]],
+                impulse,
+                tangential,
+            })
+            .collect();
+        change.iter().all(|x| x.is_finite()).then(|| Impacts {
+            blows,
+            motor_work,
+            omega: metric.rates(&change).iter().zip(omega).map(|(change, omega)| omega + change).collect(),
+        })
+    }
+}

@@ -1,0 +1,109 @@
+//! Impacts at several walls at one moment, where friction makes the order of impacts matter.
+
+use super::super::impact_monitor;
+use super::super::running::Outcome;
+use super::impacts::Posture;
+use super::{ContactDriver, ImpactRecord, Jump, KEPT, NO_SPEED, in_modes};
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::Mechanism;
+use crate::dynamics::friction::Mode;
+use crate::dynamics::impact::Impact;
+use crate::stepping::{Cause, StepError};
+use std::sync::Arc;
+
+impl ContactDriver {
+    /// The walls whose points touch at the impact of one of them.
+    pub(super) fn touching_with(&mut self, contact: usize) -> Vec<usize> {
+        let Posture { t, z, .. } = self.posture();
+        let touches = |&other: &usize| {
+            other == contact
+                || self.mechanism.held.contains(&other)
+                || self.free.contacts[other].touches(t, &z)
+        };
+        (0..self.free.contacts.len()).filter(touches).collect()
+    }
+
+    /// The walls that touch, where several of them are met at once and one has dry friction.
+    pub(super) fn met_together(&mut self, contact: usize) -> Option<Vec<usize>> {
+        if self.free.frictions.is_empty() {
+            return None;
+        }
+        let touching = self.touching_with(contact);
+        let Posture { t, z, omega, .. } = self.posture();
+        let approach = |number: usize| -self.free.contacts[number].gap_rate(t, &z, &omega);
+        let hardest = approach(contact);
+        let is_met = |&&number: &&usize| {
+            let size = self.free.contacts[number].step_size(&omega).max(hardest);
+            !self.mechanism.held.contains(&number) && approach(number) > NO_SPEED * size
+        };
+        let met: Vec<usize> = touching.iter().filter(is_met).copied().collect();
+        let is_rough = met.iter().any(|&number| self.free.friction_at(number).is_some());
+        (met.len() > 1 && is_rough).then_some(touching)
+    }
+
+    /// True where an impact at one wall presses a point that rests on another one with dry friction.
+    pub(super) fn presses_friction(impact: &Impact, striking: &Mechanism) -> bool {
+        let pressed = striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]);
+        let mut pressed = pressed.filter(|(_, impulse)| -**impulse > 1e-9 * impact.impulse);
+        pressed.any(|(&held, _)| striking.friction_at(held).is_some())
+    }
+
+    /// Lets the impact at these walls take effect at once, and returns the hardest approach \[m/s\].
+    pub(super) fn impact_at_several(
+        &mut self,
+        contacts: &[usize],
+        outcome: &mut Outcome,
+    ) -> Result<f64, StepError> {
+        let Posture { t, phi, omega, .. } = self.posture();
+        let modes = vec![Mode::Open; self.free.frictions.len()];
+        let striking = in_modes(&self.free, &[], &modes);
+        let Some(impacts) = striking.impact_at_several(contacts, t, &phi, &omega) else {
+            let what =
+                format!("no impulses fit the laws of impact and friction at walls {}", self.names(contacts));
+            return Err(self.paradox(outcome, what));
+        };
+        let last = self.motion();
+        let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
+        motion.omega = impacts.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
+        motion.work = motion.work + impacts.motor_work;
+        self.driver.jump(&motion);
+        let change = self.sampler.balance(&motion) - before;
+        self.sampler.shift(change);
+        let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
+        let after = self.motion();
+        let checked =
+            impact_monitor::check_several(&striking, tolerance, [&last, &after], &impacts.blows, -change.hi);
+        if let Err(what) = checked {
+            let what = format!("impact at walls {}: {what}", self.names(contacts));
+            let stop = self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method dp8");
+            return Err(StepError { cause: Cause::ImpactCheckFailed, ..stop });
+        }
+        if let Some(jumps) = &self.jumps {
+            let mechanism = Arc::clone(&self.mechanism);
+            jumps.push(Jump {
+                contact: contacts.first().copied(),
+                switch: None,
+                before: last,
+                after,
+                mechanism,
+            });
+        }
+        outcome.impact_loss -= change.hi;
+        let mut hardest = 0.0_f64;
+        for blow in &impacts.blows {
+            hardest = hardest.max(-blow.normal_rates[0]);
+            outcome.impact_count += 1;
+            if outcome.impacts.len() < KEPT {
+                outcome.impacts.push(ImpactRecord {
+                    t: motion.time.hi,
+                    wall: self.name(blow.contact).into(),
+                    impulse: blow.impulse,
+                    friction_impulse: blow.tangential,
+                    approach: blow.normal_rates[0],
+                    energy_lost: blow.energy_lost(),
+                });
+            }
+        }
+        Ok(hardest)
+    }
+}

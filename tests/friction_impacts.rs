@@ -1,0 +1,234 @@
+//! Impacts at several walls at once with dry friction: against closed forms.
+
+use super::formulas::{adaptive, run, scene};
+use driftless::Mechanism;
+use driftless::run::{MethodId, Outcome};
+
+const G: f64 = 9.81;
+
+fn runs(text: &str) -> Vec<Outcome> {
+    let scene = scene(text);
+    [(MethodId::Dp5, 1e-12), (MethodId::Dp8, 1e-12), (MethodId::Radau(5), 1e-12)]
+        .map(|(method, tolerance)| {
+            let outcome = run(&scene, &adaptive(method, tolerance));
+            assert!(outcome.stop.is_none(), "{method}: {:?}", outcome.stop);
+            assert!(outcome.drift.energy.max < 1e-10, "{method}: {:e}", outcome.drift.energy.max);
+            outcome
+        })
+        .into()
+}
+
+fn near(found: f64, expected: f64, what: &str) {
+    assert!((found - expected).abs() < 1e-10, "{what}: {found} and not {expected}");
+}
+
+/// A body of 2 kg that slides along a rough floor under a wall that leans over it.
+#[test]
+fn a_sliding_body_jams_under_a_wall_that_leans_over() {
+    let (mass, mu, lean, from, speed) = (2.0, 0.3, 0.5_f64, 0.5, 2.2_f64);
+    let (sin, cos) = lean.sin_cos();
+    // On the way there it loses mu g.
+    let u = (speed * speed - 2.0 * mu * G * from).sqrt();
+    let met = (speed - u) / (mu * G);
+    for e in [0.0, 0.5, 0.8] {
+        for law in ["poisson", "newton"] {
+            let text = format!(
+                r#"{{"name": "wedge", "gravity": [0, -{G}], "bars": [{{"name": "b", "mass": {mass}, "centre": [0, 0], "inertia": 0.1}}],
+                "walls": [{{"name": "floor", "body": "b", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}},
+                        "restitution": 0.4, "friction": {{"kinetic": {mu}, "impact": "{law}"}}}},
+                    {{"name": "roof", "body": "b", "point": [0, 0], "line": {{"through": [0, 0], "normal": [{}, {}]}}, "restitution": {e}}}],
+                "start": {{"b": {{"phi": 0, "omega": 0, "origin": [-{from}, 0], "velocity": [{speed}, 0]}}}}, "until": 1, "every": 1}}"#,
+                -cos, -sin
+            );
+            // The roof gives n along its normal, the floor n sin upwards and mu n sin against the sliding: ahead
+            // until that ends, then back.
+            let (back, impulse) = if law == "poisson" {
+                let compression = mass * u / (cos + mu * sin);
+                (e * compression * (cos - mu * sin) / mass, (1.0 + e) * compression)
+            } else {
+                (e * u, (1.0 + e) * mass * u / (cos - mu * sin))
+            };
+            let impulse = if e == 0.0 { mass * u / (cos + mu * sin) } else { impulse };
+            let rest = 1.0 - met;
+            let x = if back > mu * G * rest {
+                -back * rest + 0.5 * mu * G * rest * rest
+            } else {
+                -0.5 * back * back / (mu * G)
+            };
+            for outcome in runs(&text) {
+                near(outcome.last.phi[1], x, "x");
+                near(outcome.last.phi[2], 0.0, "y");
+                let roof = outcome.impacts.iter().find(|hit| hit.wall == "roof").expect("an impact");
+                let floor = outcome.impacts.iter().find(|hit| hit.wall == "floor").expect("an impact");
+                near(roof.t, met, "meets");
+                near(roof.approach, -u * cos, "approach");
+                near(roof.impulse, impulse, "impulse of the roof");
+                near(floor.impulse, impulse * sin, "impulse of the floor");
+                near(roof.energy_lost + floor.energy_lost, 0.5 * mass * (u * u - back * back), "lost");
+            }
+        }
+    }
+}
+
+/// A box whose lower corners meet a rough floor at the same moment: (mass, width, height of the centre, inertia).
+const BOX: [f64; 4] = [1.5, 0.8, 0.2, 0.3];
+const FALL: f64 = 0.4;
+
+fn falling_box(slide: f64, mu: f64, e: f64, law: &str, after: f64) -> Vec<Outcome> {
+    let [mass, width, height, inertia] = BOX;
+    let corner = |name: &str, x: f64| {
+        format!(
+            r#"{{"name": "{name}", "body": "box", "point": [{x}, -{height}], "line": {{"through": [0, 0], "normal": [0, 1]}},
+            "restitution": {e}, "friction": {{"kinetic": {mu}, "impact": "{law}"}}}}"#
+        )
+    };
+    let until = (2.0 * FALL / G).sqrt() + after;
+    runs(&format!(
+        r#"{{"name": "box", "gravity": [0, -{G}], "bars": [{{"name": "box", "mass": {mass}, "centre": [0, 0], "inertia": {inertia}}}],
+        "walls": [{}, {}], "start": {{"box": {{"phi": 0, "omega": 0, "origin": [0, {}], "velocity": [{slide}, 0]}}}},
+        "until": {until}, "every": {until}}}"#,
+        corner("left", -0.5 * width),
+        corner("right", 0.5 * width),
+        height + FALL,
+    ))
+}
+
+fn leaves(outcome: &Outcome, [x, y, spin]: [f64; 3]) {
+    near(outcome.last.omega[1], x, "velocity along the floor");
+    near(outcome.last.omega[2], y - 0.05 * G, "velocity upwards");
+    near(outcome.last.omega[0], spin, "spin");
+}
+
+#[test]
+fn a_box_that_lands_flat_and_slides_stays_flat() {
+    let [mass, width, height, _] = BOX;
+    let v = (2.0 * G * FALL).sqrt();
+    for (e, mu) in [(0.5, 0.4), (0.8, 1.2)] {
+        for law in ["poisson", "newton"] {
+            let normal = (1.0 + e) * mass * v;
+            for outcome in falling_box(20.0, mu, e, law, 0.05) {
+                leaves(&outcome, [20.0 - mu * normal / mass, e * v, 0.0]);
+                let share = |sign: f64| normal * (0.5 + sign * mu * height / width);
+                for (name, expected) in [("left", share(-1.0)), ("right", share(1.0))] {
+                    let hit = outcome.impacts.iter().find(|hit| hit.wall == name).expect("an impact");
+                    near(hit.impulse, expected, name);
+                    near(hit.friction_impulse, -mu * expected, name);
+                }
+            }
+        }
+    }
+}
+
+/// Where friction would tip it the rear corner gets nothing, and leaves the floor.
+#[test]
+fn a_box_that_lands_flat_and_tips_turns_about_its_front_corner() {
+    let [mass, width, height, inertia] = BOX;
+    let (v, mu, e, x) = ((2.0 * G * FALL).sqrt(), 2.6, 0.5, 0.5 * width);
+    let response = 1.0 / mass + x * (x - mu * height) / inertia;
+    let normal = (1.0 + e) * v / response;
+    let spin = normal * (x - mu * height) / inertia;
+    assert!(spin < 0.0 && -v + normal / mass - x * spin > 0.0);
+    for outcome in falling_box(30.0, mu, e, "poisson", 0.05) {
+        assert_eq!(outcome.impacts.len(), 1, "{:?}", outcome.impacts);
+        near(outcome.impacts[0].impulse, normal, "impulse");
+        leaves(&outcome, [30.0 - mu * normal / mass, -v + normal / mass, spin]);
+    }
+}
+
+/// Both corners stop within the compression; what was pressed unevenly expands unevenly, and turns the box
+/// about a point above corners that stick.
+#[test]
+fn a_box_that_lands_flat_and_sticks_rebounds_with_a_spin() {
+    let [mass, _, height, inertia] = BOX;
+    let (v, u, e) = ((2.0 * G * FALL).sqrt(), 0.5, 0.6);
+    let spin = e * height * mass * u / (inertia + mass * height * height);
+    for outcome in falling_box(u, 0.9, e, "poisson", 0.05) {
+        leaves(&outcome, [-height * spin, e * v, spin]);
+        let along: f64 = outcome.impacts.iter().map(|hit| hit.friction_impulse).sum();
+        near(along, -mass * (u + height * spin), "friction of both");
+    }
+}
+
+/// Without restitution it stays on the floor, slides to a stop and sticks at both corners.
+#[test]
+fn a_box_that_lands_flat_slides_to_a_stop() {
+    let (v, mu, u) = ((2.0 * G * FALL).sqrt(), 0.4, 3.0);
+    let (falls, slides) = (v / G, u - mu * v);
+    let stops = slides / (mu * G);
+    for outcome in falling_box(u, mu, 0.0, "poisson", 1.0) {
+        near(outcome.last.phi[1], u * falls + 0.5 * slides * stops, "x");
+        near(outcome.last.phi[2], BOX[2], "y");
+        near(outcome.last.friction, 0.5 * BOX[0] * slides * slides, "lost in sliding");
+        let last: Vec<_> = outcome.frictions.iter().rev().take(2).collect();
+        for transition in last {
+            assert_eq!(transition.mode, "sticks");
+            near(transition.t, falls + stops, "sticks at");
+        }
+    }
+}
+
+/// A ball falls straight into a corner of two equal rough walls.
+#[test]
+fn a_ball_in_a_corner_rebounds_the_way_it_came() {
+    let (v, e, mu, lean) = ((2.0 * G * FALL).sqrt(), 0.6, 0.3, 0.7_f64);
+    let (sin, cos) = lean.sin_cos();
+    // Friction brakes the way in as well as the way out.
+    let back = e * v * (cos - mu * sin) / (cos + mu * sin);
+    let wall = |name: &str, side: f64| {
+        format!(
+            r#"{{"name": "{name}", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [{}, {cos}]}},
+            "restitution": {e}, "friction": {{"kinetic": {mu}}}}}"#,
+            side * sin
+        )
+    };
+    let until = (2.0 * FALL / G).sqrt() + 0.05;
+    let text = format!(
+        r#"{{"name": "corner", "gravity": [0, -{G}], "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1}}],
+        "walls": [{}, {}], "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {FALL}], "velocity": [0, 0]}}}},
+        "until": {until}, "every": {until}}}"#,
+        wall("left", 1.0),
+        wall("right", -1.0)
+    );
+    for outcome in runs(&text) {
+        near(outcome.last.omega[1], 0.0, "aside");
+        near(outcome.last.omega[2], back - 0.05 * G, "upwards");
+        assert_eq!(outcome.impact_count, 2);
+        near(outcome.impact_loss, v * v - back * back, "lost");
+    }
+}
+
+/// At one wall the complementarity problem gives what Routh's method gives, which follows the impulse as it grows,
+/// wherever the sliding does not turn.
+#[test]
+fn one_wall_alone_is_met_as_by_rouths_method() {
+    let (mut slid, mut stuck) = (0, 0);
+    for k in 0..240_u32 {
+        let of = |salt: u32| {
+            f64::from(k.wrapping_mul(2_654_435_761).wrapping_mul(2 * salt + 1) >> 8) / f64::from(1_u32 << 24)
+        };
+        let (angle, spin, slide, mu, e) =
+            (0.2 + 2.6 * of(1), 4.0 * of(2) - 2.0, 6.0 * of(3) - 3.0, 0.9 * of(4), of(5));
+        let text = format!(
+            r#"{{"name": "rod", "gravity": [0, -{G}], "bars": [{{"name": "rod", "mass": 1, "centre": [0.5, 0], "inertia": 0.08333333333333333}}],
+            "walls": [{{"name": "floor", "body": "rod", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}},
+                "restitution": {e}, "friction": {{"kinetic": {mu}, "static": {}}}}}],
+            "start": {{"rod": {{"phi": {angle}, "omega": {spin}, "origin": [0, 0], "velocity": [{slide}, -2]}}}}, "until": 1, "every": 1}}"#,
+            1.3 * mu
+        );
+        let mechanism = Mechanism::new(&scene(&text)).expect("equations");
+        let (phi, omega) = ([angle, 0.0, 0.0], [spin, slide, -2.0]);
+        let single = mechanism.impact_at(0, Default::default(), &phi, &omega).expect("an end");
+        let turned = single.omega[1] * slide < -1e-9;
+        if turned {
+            continue;
+        }
+        let several = mechanism.impact_at_several(&[0], Default::default(), &phi, &omega).expect("impulses");
+        for (one, other) in single.omega.iter().zip(&several.omega) {
+            near(*other, *one, "rate");
+        }
+        near(several.blows[0].impulse, single.impulse, "impulse");
+        near(several.blows[0].tangential, single.tangential, "friction");
+        if single.omega[1].abs() < 1e-9 { stuck += 1 } else { slid += 1 }
+    }
+    assert!(slid > 30 && stuck > 30, "{slid} slide on, {stuck} stick");
+}
