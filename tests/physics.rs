@@ -37,6 +37,8 @@ mod extremes;
 mod fit;
 mod forces;
 mod formulas;
+#[cfg(feature = "digits")]
+mod formulas_in_digits;
 mod friction;
 mod friction_impacts;
 mod gauss;

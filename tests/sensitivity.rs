@@ -285,6 +285,60 @@ fn spectra_add_up_to_what_the_dissipation_says() {
     assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
 }
 
+/// Over a thousand seconds; the divergence of the driven Duffing oscillator is -c/I = -0.2 /s everywhere.
+#[test]
+fn spectra_add_up_over_a_thousand_seconds() {
+    let damped = Template::read(
+        "examples/scenes/spring.json".as_ref(),
+        &["springs.spring.damping=0.02".parse().expect("an override")],
+    )
+    .expect("a scene");
+    for (template, sum) in [(example("free"), Some(0.0)), (example("duffing"), Some(-0.2)), (damped, None)] {
+        let found = lyapunov(&template, Some(1000.0), None, &mut || false).expect("a spectrum");
+        let sum = sum.unwrap_or(found.expected_sum);
+        let largest = found.exponents.iter().fold(0.0, |most: f64, exponent| most.max(exponent.abs()));
+        assert!(found.lost.is_none() && sum <= 0.0);
+        assert!((found.sum - sum).abs() < 1e-11 * largest, "{} {sum} {:?}", found.sum, found.exponents);
+    }
+}
+
+/// What a number near zero does shows in changes of its unit; over itself there is nothing but rounding.
+#[test]
+fn numbers_that_are_zero_but_for_rounding_have_the_derivatives_of_zero() {
+    let at = |rate: &str| {
+        let set = [format!("bar1.omega={rate}").parse().expect("an override")];
+        let template = Template::read("examples/scenes/free.json".as_ref(), &set).expect("a scene");
+        derived(&template, &["bar2.phi", "bar2.omega"], &["bar1.omega"], 1.0)
+    };
+    let (zero, tiny) = (at("0"), at("-1.7e-17"));
+    for (zero, tiny) in zero.measures.iter().zip(&tiny.measures) {
+        assert_near(tiny.slopes[0], zero.slopes[0], 1e-10, "beside zero");
+    }
+    // A rate of the law that the start contradicts as soon as it is more than rounding.
+    let driven = template(
+        r#"{"name": "driven", "gravity": [9.81, 0],
+            "bars": [{"name": "b", "mass": 0.56, "centre": [0.52, 0], "inertia": 0.031, "length": 1.08}],
+            "sliders": [{"name": "rail", "point": {"body": "b", "point": [0, 0]},
+                         "rail": {"body": "ground", "point": [1.3, 1.4], "direction": [0.22, 0.17]}}],
+            "torsion_springs": [{"name": "coil", "body": "b", "stiffness": 4.4, "free_angle": -2.5}],
+            "motors": [{"name": "drive", "slider": "rail",
+                        "law": {"start": 0.06, "rate": -1.7e-17, "sines": [{"amplitude": 0.08, "frequency": 3.6, "phase": 1.5707963267948966}]}}],
+            "start": {"b": {"phi": -1.96, "omega": 0, "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#,
+    );
+    let request = SensitivityRequest {
+        of: vec!["b.phi".parse().expect("a measure")],
+        to: vec!["motors.drive.law.rate".into()],
+        at: Some(1.0),
+        ..SensitivityRequest::default()
+    };
+    match sensitivity(&driven, &request, &mut || false) {
+        Ok(found) => panic!("{:?}", found.measures),
+        Err(error) => {
+            assert!(error.to_string().contains("no derivative by motors.drive.law.rate"), "{error}")
+        }
+    }
+}
+
 #[test]
 fn chaos_is_told_from_regular_motion() {
     let regime = |name: &str, until: f64| {

@@ -10,10 +10,10 @@ use crate::arithmetic::{Complex, Scalar};
 /// Bodies are named by their number in the order of the scene's bars ([`Mechanism::body`]), points by a
 /// [`Site`] ([`Mechanism::site`]).
 #[derive(Clone, Copy)]
-pub struct Configuration<'a, S>(&'a dyn Source<S>);
+pub struct Configuration<'a, S, C = f64>(&'a dyn Source<S, C>);
 
 /// What a configuration is read from.
-pub trait Source<S> {
+pub trait Source<S, C = f64> {
     /// Time \[s\].
     fn time(&self) -> S;
     /// Angle of a body \[rad\], winding.
@@ -23,14 +23,16 @@ pub trait Source<S> {
     /// Its unit vector (cos, sin).
     fn direction(&self, body: usize) -> Complex<S>;
     /// Position of a point \[m\].
-    fn position(&self, site: &Site) -> Complex<S>;
+    fn position(&self, site: &Site<C>) -> Complex<S>;
     /// Its velocity \[m/s\].
-    fn velocity(&self, site: &Site) -> Complex<S>;
+    fn velocity(&self, site: &Site<C>) -> Complex<S>;
+    /// A number of a formula.
+    fn constant(&self, value: C) -> S;
 }
 
-impl<'a, S: Scalar> Configuration<'a, S> {
+impl<'a, S: Scalar, C> Configuration<'a, S, C> {
     /// That of a source.
-    pub fn new(source: &'a dyn Source<S>) -> Self {
+    pub fn new(source: &'a dyn Source<S, C>) -> Self {
         Self(source)
     }
 
@@ -58,13 +60,18 @@ impl<'a, S: Scalar> Configuration<'a, S> {
     }
 
     /// Position of a point of a body or of the ground \[m\].
-    pub fn position(&self, site: &Site) -> [S; 2] {
+    pub fn position(&self, site: &Site<C>) -> [S; 2] {
         pair(self.0.position(site))
     }
 
     /// Velocity of that point \[m/s\].
-    pub fn velocity(&self, site: &Site) -> [S; 2] {
+    pub fn velocity(&self, site: &Site<C>) -> [S; 2] {
         pair(self.0.velocity(site))
+    }
+
+    /// A number of a formula.
+    pub(in crate::dynamics) fn constant(&self, value: C) -> S {
+        self.0.constant(value)
     }
 }
 
@@ -107,6 +114,10 @@ impl<S: Scalar> Source<S> for Values<'_, S> {
 
     fn velocity(&self, site: &Site) -> Complex<S> {
         site.point.velocity(self.z, self.omega)
+    }
+
+    fn constant(&self, value: f64) -> S {
+        S::of(value)
     }
 }
 

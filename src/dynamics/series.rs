@@ -35,6 +35,7 @@ mod long;
 pub mod polynomial;
 mod rows;
 mod spring;
+mod tape;
 mod user;
 mod work_integral;
 
@@ -172,6 +173,7 @@ impl<T: SeriesNumber> Series<T> {
         self.factors.are_sound()
             && self.springs.iter().all(SpringSeries::is_sound)
             && self.actions.iter().all(ActionSeries::is_sound)
+            && self.forces.iter().all(UserSeries::is_sound)
     }
 
     /// Highest power of the rates.
@@ -429,7 +431,7 @@ impl<T: SeriesNumber> Series<T> {
             }
             let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
             for (force, series) in terms.forces.iter().zip(&mut self.forces) {
-                series.act(force, m, at, rest, applied);
+                series.act(force, m, at, (&mut *rest, &mut *applied), &self.factors.scale);
             }
             for (load, &applied) in self.load.iter_mut().zip(applied.iter()) {
                 *load += applied;

@@ -1,38 +1,20 @@
 //! The numbers of a scene exactly as written: 0.6 is 3/5, not the double nearest to it.
 //!
 //! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
-//! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  What a
-//! formula takes from a table, a unit of angle, or a law of time as a formula has no such digits and is
-//! refused by name.
+//! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  Formulas of
+//! time and state are kept as texts and read as exactly when the mechanism is compiled.  What a formula takes
+//! from a table has no such digits, and what has corners no series; both are refused by name.
 
+mod laws;
 mod parts;
 
 use super::Scene;
 use super::error::SceneError;
 use super::formula::Formula;
 use super::locate::{Node, Source, Value, push_index, push_key};
+use super::number::Decimal;
 use super::read::put_together;
 use super::template::Template;
-use crate::arithmetic::Real;
-
-/// A number that decimal text can be read as.
-pub trait Decimal: Real {
-    /// The decimal number, to all digits there is room for; `None` where the text is none.
-    fn parse(text: &str) -> Option<Self>;
-
-    /// π.
-    fn pi() -> Self;
-}
-
-impl<const W: usize> Decimal for crate::arithmetic::digits::Digits<W> {
-    fn parse(text: &str) -> Option<Self> {
-        Self::from_decimal(text)
-    }
-
-    fn pi() -> Self {
-        crate::arithmetic::digits::pi()
-    }
-}
 
 /// The times of a scene.
 #[derive(Clone, Copy, Debug)]
@@ -56,11 +38,12 @@ impl Template {
         let (source, tree) = put_together(text, source, overrides)?;
         let mut reader = Reader {
             source: &source,
+            plain: &plain,
             root: Cursor { node: &tree, path: String::new() },
             typed,
             parameters: Vec::new(),
         };
-        reader.refuse_formulas(&plain)?;
+        reader.refuse_parts(&plain)?;
         reader.parameters = reader.known_parameters(&plain)?;
         let times = Times {
             until: reader.number(&reader.root, "until", plain.until)?,
@@ -127,6 +110,8 @@ impl<'a> Cursor<'a> {
 
 struct Reader<'a, C> {
     source: &'a Source,
+    /// The scene in doubles.
+    plain: &'a Scene,
     root: Cursor<'a>,
     typed: &'a [String],
     parameters: Vec<(String, C)>,
@@ -141,30 +126,21 @@ impl<'a, C: Decimal> Reader<'a, C> {
     /// An error about a part that has no series in many digits.
     fn refuse_part(&self, at: &Cursor, why: &str) -> SceneError {
         let problem = format!("cannot be carried in many digits: {why}");
-        let allowed = "parts are carried whose numbers are constant or sums of powers and sines of time";
+        let allowed = "parts are carried whose numbers are constant, or smooth formulas of time and state";
         let hint = "without --digits it runs in doubles, and --trust estimates the error";
         self.source.refusal(at.node.span, &at.path, &problem, allowed, hint)
     }
 
     /// Parts that are not carried in many digits.
-    fn refuse_formulas(&self, scene: &Scene) -> Result<(), SceneError> {
+    fn refuse_parts(&self, scene: &Scene) -> Result<(), SceneError> {
         let parts = [
-            ("integrals", !scene.integrals.is_empty(), "an integral is a formula of time and state"),
             ("events", !scene.events.is_empty(), "events change what acts"),
             ("inactive", !scene.inactive.is_empty(), "events change what acts"),
-            ("potentials", self.root.child("potentials").is_some(), "a potential is a formula of the state"),
         ];
         for (key, is_there, why) in parts {
             if is_there && let Some(at) = self.root.child(key) {
                 return Err(self.refuse_part(&at, why));
             }
-        }
-        if let Some(law) = scene.laws.first() {
-            let lists = ["springs", "torsion_springs", "forces", "torques"];
-            let mut items = lists.iter().flat_map(|list| self.root.items(list));
-            let at = items.find(|at| super::set::name(at.node) == Some(&law.name));
-            let at = at.unwrap_or_else(|| self.root.clone());
-            return Err(self.refuse_part(&at, "its law is a formula of time and state"));
         }
         if !scene.frictions.is_empty() {
             let mut items = ["hinges", "sliders", "walls"].iter().flat_map(|list| self.root.items(list));
@@ -187,7 +163,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             return Err(self
                 .refuse_part(at.unwrap_or(&self.root), "a rigid spring has the mean force of a vibration"));
         }
-        Ok(())
+        self.refuse_corners()
     }
 
     fn known_parameters(&self, scene: &Scene) -> Result<Vec<(String, C)>, SceneError> {
@@ -225,18 +201,11 @@ impl<'a, C: Decimal> Reader<'a, C> {
                 let formula = Formula::parse(text).map_err(|error| {
                     self.refuse(at, &format!("has no exact value: {}", error.problem), "give the number")
                 })?;
-                if formula.has_angle_units() {
-                    return Err(self.refuse(
-                        at,
-                        "is in degrees, which are no decimals",
-                        "write it by pi, as in pi/6",
-                    ));
-                }
                 let value = |name: &str| known.iter().find(|one| one.0 == name).map(|one| one.1);
                 let Some(values) = formula.names().map(value).collect::<Option<Vec<C>>>() else {
                     return Ok(None);
                 };
-                Ok(Some(formula.exact_value(&values, shortest)))
+                Ok(Some(formula.exact_value(&values)))
             }
             _ => Err(self.refuse(at, "is no number", "give the number")),
         }

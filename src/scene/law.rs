@@ -4,26 +4,27 @@
 
 use super::formula::unit::Dimension;
 use super::formula::{Formula, FormulaError, Interpolant};
-use super::{Place, Scene};
+use super::{Bar, Given, Hinge, Place, Scene, Start};
+use crate::arithmetic::Real;
 use serde::Serialize;
 use std::collections::HashMap;
 
 /// A number with a name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Parameter {
+pub struct Parameter<C = f64> {
     /// Name, unique among parameters and signals.
     pub name: String,
     /// Value, in SI units.
-    pub value: f64,
+    pub value: C,
 }
 
 /// A place with a name: `tip` makes `tip.x`, `tip.y`, `tip.vx` and `tip.vy` known to formulas.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct NamedPoint {
+pub struct NamedPoint<C = f64> {
     /// Name, unique among points.
     pub name: String,
     /// The place.
-    pub place: Place,
+    pub place: Place<C>,
 }
 
 /// A function given by points, interpolated smoothly.
@@ -62,26 +63,45 @@ impl Integral {
     /// Mass and moment of inertia of the rotor, a power of two so small that its energy counts nothing
     /// \[kg, kg·m²\].
     pub const INERTIA: f64 = 1.0 / (1_u64 << 60) as f64;
+    /// The same in formulas, exactly.
+    pub(super) const INERTIA_AS_FORMULA: &str = "2^(-60)";
+}
+
+impl<C: Real> Scene<C> {
+    /// Adds the rotors of the integrals with their hinges, torques and starts.
+    pub(super) fn with_rotors(mut self) -> Self {
+        for Integral { name, formula, bar } in self.integrals.clone() {
+            let place = |bar| Place { bar, point: [C::ZERO; 2] };
+            let (mass, inertia) = (C::of(Integral::INERTIA), C::of(Integral::INERTIA));
+            self.bars.push(Bar { name: name.clone(), length: C::ZERO, mass, centre: [C::ZERO; 2], inertia });
+            self.hinges.push(Hinge { name: name.clone(), between: [place(None), place(Some(bar))] });
+            self.start.push(Start { phi: C::ZERO, omega: C::ZERO });
+            self.given.push(Given::ANGLE_AND_RATE);
+            let torque = format!("{}*({formula})", Integral::INERTIA_AS_FORMULA);
+            self.laws.push(LoadLaw { name, load: Load::Torque { bar, relative_to: None, torque } });
+        }
+        self
+    }
 }
 
 /// A force, torque or spring whose law is a formula of time and state.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LoadLaw {
+pub struct LoadLaw<C = f64> {
     /// Name, unique among the parts of its kind.
     pub name: String,
     /// Where it acts and by what law.
-    pub load: Load,
+    pub load: Load<C>,
 }
 
 /// Where a [`LoadLaw`] acts, and its formulas.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub enum Load {
+pub enum Load<C = f64> {
     /// A force at a point of a bar.
     Force {
         /// The bar.
         bar: usize,
         /// The point of the bar, in its frame \[m\].
-        point: [f64; 2],
+        point: [C; 2],
         /// The force, x and y \[N\].
         force: [String; 2],
         /// True where its directions are those of the bar.
@@ -99,7 +119,7 @@ pub enum Load {
     /// A spring: formulas may use `length` and `rate`.
     Spring {
         /// Its two ends.
-        between: [Place; 2],
+        between: [Place<C>; 2],
         /// Energy stored \[J\].
         potential: Option<String>,
         /// Force that pulls the ends together \[N\], beside that of the potential.
@@ -190,7 +210,7 @@ pub enum Meaning<P = Place> {
     RelativeRate(usize, Option<usize>),
 }
 
-impl Meaning {
+impl<P> Meaning<P> {
     /// True for rates and velocities.
     fn is_rate(&self) -> bool {
         matches!(
@@ -200,7 +220,7 @@ impl Meaning {
     }
 
     /// Its unit, as the format writes units; `rad` for angles.
-    pub(super) fn unit_in_words(self) -> &'static str {
+    pub(super) fn unit_in_words(&self) -> &'static str {
         match self {
             Self::Angle(_) | Self::RelativeAngle(..) => "rad",
             _ => self.unit(),
@@ -208,7 +228,7 @@ impl Meaning {
     }
 
     /// Its unit, as the format writes units.
-    fn unit(self) -> &'static str {
+    fn unit(&self) -> &'static str {
         match self {
             Self::Time => "s",
             Self::X(_) | Self::Y(_) | Self::Length(_) => "m",
@@ -219,7 +239,7 @@ impl Meaning {
     }
 
     /// The same with points given otherwise.
-    pub fn with_points<P>(self, point: impl Fn(Place) -> P) -> Meaning<P> {
+    pub fn with_points<Q>(self, point: impl Fn(P) -> Q) -> Meaning<Q> {
         match self {
             Self::Time => Meaning::Time,
             Self::Parameter(number) => Meaning::Parameter(number),
@@ -242,17 +262,17 @@ impl Meaning {
 
 /// A formula whose names have found what they stand for.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bound {
+pub struct Bound<C = f64> {
     /// The formula.
     pub formula: Formula,
     /// What its names stand for, in their order.
-    pub meanings: Vec<Meaning>,
+    pub meanings: Vec<Meaning<Place<C>>>,
 }
 
 /// The names that the formulas of a scene know.
 #[derive(Clone, Debug, Default)]
-pub struct Names {
-    known: HashMap<String, (Meaning, Option<Dimension>)>,
+pub struct Names<C = f64> {
+    known: HashMap<String, (Meaning<Place<C>>, Option<Dimension>)>,
     /// Tables, as functions.
     tables: Vec<Interpolant>,
     /// For every signal what of time and rates is in it, and what of rates alone.
@@ -261,9 +281,9 @@ pub struct Names {
     order: Vec<String>,
 }
 
-impl Names {
+impl<C: Real> Names<C> {
     /// Those of a scene: time, bars, points, springs and parameters; signals are added one by one.
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &Scene<C>) -> Self {
         let tables = scene.tables.iter().map(|table| Interpolant::new(&table.name, &table.points));
         let mut names = Self { tables: tables.collect(), ..Self::default() };
         names.add("t".into(), Meaning::Time);
@@ -298,7 +318,7 @@ impl Names {
     }
 
     /// The same with the signals of a scene that was judged.
-    pub(super) fn with_signals(scene: &Scene) -> Self {
+    pub(super) fn with_signals(scene: &Scene<C>) -> Self {
         let mut names = Self::of(scene);
         for signal in &scene.signals {
             if let Ok((bound, dimension)) = names.alone().bind(&signal.formula) {
@@ -309,7 +329,7 @@ impl Names {
     }
 
     /// What a name stands for, and its dimension where that is known.
-    pub(super) fn find(&self, name: &str) -> Option<(Meaning, Option<Dimension>)> {
+    pub(super) fn find(&self, name: &str) -> Option<(Meaning<Place<C>>, Option<Dimension>)> {
         self.known.get(name).copied()
     }
 
@@ -324,11 +344,11 @@ impl Names {
     }
 
     /// Adds a name.
-    pub(super) fn add(&mut self, name: String, meaning: Meaning) {
+    pub(super) fn add(&mut self, name: String, meaning: Meaning<Place<C>>) {
         self.insert(name, meaning, Some(Dimension::of(meaning.unit())));
     }
 
-    fn insert(&mut self, name: String, meaning: Meaning, dimension: Option<Dimension>) {
+    fn insert(&mut self, name: String, meaning: Meaning<Place<C>>, dimension: Option<Dimension>) {
         if self.known.insert(name.clone(), (meaning, dimension)).is_none() {
             self.order.push(name);
         }
@@ -342,7 +362,7 @@ impl Names {
     }
 
     /// Adds the next signal.
-    pub fn signal(&mut self, name: &str, bound: &Bound, dimension: Option<Dimension>) {
+    pub fn signal(&mut self, name: &str, bound: &Bound<C>, dimension: Option<Dimension>) {
         let number = self.changing.len();
         let found = [self.changing(bound), self.rate_in(bound)];
         self.changing.push(found.map(|what| what.map(|what| format!("{name}, which depends on {what}"))));
@@ -350,17 +370,22 @@ impl Names {
     }
 
     /// The name in a formula that depends on time or rates, if any.
-    pub fn changing(&self, bound: &Bound) -> Option<String> {
+    pub fn changing(&self, bound: &Bound<C>) -> Option<String> {
         self.first(bound, 0, |meaning| matches!(meaning, Meaning::Time) || meaning.is_rate())
     }
 
     /// The name in a formula that depends on rates, if any.
-    pub(super) fn rate_in(&self, bound: &Bound) -> Option<String> {
+    pub(super) fn rate_in(&self, bound: &Bound<C>) -> Option<String> {
         self.first(bound, 1, Meaning::is_rate)
     }
 
     /// The first name of that kind, `which` of what is known of signals.
-    fn first(&self, bound: &Bound, which: usize, is_kind: impl Fn(&Meaning) -> bool) -> Option<String> {
+    fn first(
+        &self,
+        bound: &Bound<C>,
+        which: usize,
+        is_kind: impl Fn(&Meaning<Place<C>>) -> bool,
+    ) -> Option<String> {
         bound.formula.names().zip(&bound.meanings).find_map(|(name, meaning)| match meaning {
             Meaning::Signal(number) => self.changing[*number][which].clone(),
             meaning => is_kind(meaning).then(|| name.to_owned()),
@@ -368,7 +393,7 @@ impl Names {
     }
 
     /// The same with the names that the formulas of a load have beside.
-    pub fn within(&self, load: &Load) -> Scope<'_> {
+    pub fn within(&self, load: &Load<C>) -> Scope<'_, C> {
         let own = match *load {
             Load::Spring { between, .. } => {
                 vec![("length", Meaning::Length(between)), ("rate", Meaning::LengthRate(between))]
@@ -383,20 +408,20 @@ impl Names {
     }
 
     /// Names without any beside.
-    pub fn alone(&self) -> Scope<'_> {
+    pub fn alone(&self) -> Scope<'_, C> {
         Scope { names: self, own: Vec::new() }
     }
 }
 
 /// The names of a scene, and those that one formula has beside.
 #[derive(Clone, Debug)]
-pub struct Scope<'a> {
-    names: &'a Names,
-    own: Vec<(&'static str, Meaning)>,
+pub struct Scope<'a, C = f64> {
+    names: &'a Names<C>,
+    own: Vec<(&'static str, Meaning<Place<C>>)>,
 }
 
-impl Scope<'_> {
-    fn find(&self, name: &str) -> Option<(Meaning, Option<Dimension>)> {
+impl<C: Real> Scope<'_, C> {
+    fn find(&self, name: &str) -> Option<(Meaning<Place<C>>, Option<Dimension>)> {
         let own = self.own.iter().find(|own| own.0 == name);
         own.map(|own| (own.1, Some(Dimension::of(own.1.unit())))).or_else(|| self.names.find(name))
     }
@@ -405,7 +430,7 @@ impl Scope<'_> {
     ///
     /// # Errors
     /// It is none, has a name that nothing has, or puts together what has different units.
-    pub fn bind(&self, text: &str) -> Result<(Bound, Option<Dimension>), FormulaError> {
+    pub fn bind(&self, text: &str) -> Result<(Bound<C>, Option<Dimension>), FormulaError> {
         let formula = Formula::parse_with(text, &self.names.tables)?;
         let mut meanings = Vec::new();
         let mut dimensions = Vec::new();

@@ -36,6 +36,7 @@ pub use law::{
     Bound, Direction, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
     Scope, Signal,
 };
+pub(crate) use number::Decimal;
 pub use number::{number, range};
 pub use output::{BoundOutput, Component, Output, OutputNames, Quantity, Source};
 pub use profile::Profile;
@@ -47,6 +48,7 @@ pub use set::{Override, OverrideError};
 pub use stays::points_that_stay;
 pub use template::{StartValue, Template, Variable};
 
+use crate::arithmetic::Real;
 use serde::Serialize;
 
 /// True for an angle a bar may start at \[rad\].
@@ -101,10 +103,10 @@ pub struct Scene<C = f64> {
     pub frictions: Vec<Friction>,
     /// Numbers with names, for formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub parameters: Vec<Parameter>,
+    pub parameters: Vec<Parameter<C>>,
     /// Places with names, for formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub points: Vec<NamedPoint>,
+    pub points: Vec<NamedPoint<C>>,
     /// Functions given by points.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub tables: Vec<PointTable>,
@@ -116,7 +118,7 @@ pub struct Scene<C = f64> {
     pub integrals: Vec<Integral>,
     /// Forces, torques and springs by formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub laws: Vec<LoadLaw>,
+    pub laws: Vec<LoadLaw<C>>,
     /// Events.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub events: Vec<SceneEvent>,
@@ -150,7 +152,7 @@ impl<C> Scene<C> {
     }
 }
 
-impl Scene {
+impl<C: Real> Scene<C> {
     /// How many of the bars the scene names itself; the rest are the rotors of its integrals.
     pub fn own_bars(&self) -> usize {
         self.integrals.first().map_or(self.bars.len(), |integral| integral.bar.min(self.bars.len()))
@@ -162,24 +164,9 @@ impl Scene {
     }
 
     /// The laws that the scene names itself: not those of the rotors of integrals.
-    pub fn acting_laws(&self) -> impl Iterator<Item = &LoadLaw> {
+    pub fn acting_laws(&self) -> impl Iterator<Item = &LoadLaw<C>> {
         let own = self.own_bars();
         self.laws.iter().filter(move |law| !matches!(law.load, Load::Torque { bar, .. } if bar >= own))
-    }
-
-    /// Adds the rotors of the integrals with their hinges, torques and starts.
-    fn with_rotors(mut self) -> Self {
-        for Integral { name, formula, bar } in self.integrals.clone() {
-            let place = |bar| Place { bar, point: [0.0, 0.0] };
-            let (mass, inertia) = (Integral::INERTIA, Integral::INERTIA);
-            self.bars.push(Bar { name: name.clone(), length: 0.0, mass, centre: [0.0, 0.0], inertia });
-            self.hinges.push(Hinge { name: name.clone(), between: [place(None), place(Some(bar))] });
-            self.start.push(Start { phi: 0.0, omega: 0.0 });
-            self.given.push(Given::ANGLE_AND_RATE);
-            let torque = format!("{:?}*({formula})", Integral::INERTIA);
-            self.laws.push(LoadLaw { name, load: Load::Torque { bar, relative_to: None, torque } });
-        }
-        self
     }
 }
 
@@ -388,7 +375,7 @@ pub struct Law<C = f64> {
     /// Sines on top.
     pub sines: Vec<Sine<C>>,
     /// Any other formula of time, of which the law is the sum with the rest; motors and walls have one.
-    pub profile: Option<Profile>,
+    pub profile: Option<Profile<C>>,
 }
 
 /// One sine of a [`Law`].
@@ -445,7 +432,7 @@ pub struct Given<C = f64> {
     pub velocity: Option<[C; 2]>,
 }
 
-impl Given {
+impl<C> Given<C> {
     /// Angle and rate are given, and nothing else.
     pub const ANGLE_AND_RATE: Self = Self { phi: true, omega: true, origin: None, velocity: None };
 }

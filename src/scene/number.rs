@@ -1,6 +1,37 @@
 //! Numbers as people type them on a command line.
 
+use crate::arithmetic::Real;
 use std::f64::consts::PI;
+
+/// A number that decimal text can be read as.
+pub trait Decimal: Real {
+    /// The decimal number, to all digits there is room for; `None` where the text is none.
+    fn parse(text: &str) -> Option<Self>;
+
+    /// π.
+    fn pi() -> Self;
+}
+
+impl Decimal for f64 {
+    fn parse(text: &str) -> Option<Self> {
+        text.trim().parse().ok()
+    }
+
+    fn pi() -> Self {
+        PI
+    }
+}
+
+#[cfg(feature = "digits")]
+impl<const W: usize> Decimal for crate::arithmetic::digits::Digits<W> {
+    fn parse(text: &str) -> Option<Self> {
+        Self::from_decimal(text)
+    }
+
+    fn pi() -> Self {
+        crate::arithmetic::digits::pi()
+    }
+}
 
 /// A finite number: a decimal (`0.1`, `1e-3`), a multiple of pi (`pi`, `-0.5pi`, `2*pi`), or a fraction of
 /// two such (`1/64`, `pi/2`).

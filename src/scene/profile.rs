@@ -5,8 +5,10 @@
 //! a zero of one of its conditions records it anew, as it does with laws of forces.
 
 use super::formula::Formula;
-use crate::arithmetic::tape::{Slot, Symbol, Tape, TapeSeries};
-use crate::arithmetic::{DoubleDouble, Real, Scalar};
+use super::number::Decimal;
+use crate::arithmetic::tape::{Slot, Symbol, Tape, TapeSeries, number_of};
+use crate::arithmetic::{DoubleDouble, Over, Real, Scalar};
+use std::cell::RefCell;
 use std::sync::Arc;
 
 /// Times at which the pace of a law is looked at, an eighth of a second apart.
@@ -14,11 +16,13 @@ const LOOKS: usize = 65;
 
 /// A formula of time, on the branches of one time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Profile {
+pub struct Profile<C = f64> {
     text: String,
     tape: Arc<Tape>,
     /// The law and its first two derivatives.
     results: [Slot; 3],
+    /// Numbers that may be no doubles: inputs of the tape, after the time.
+    numbers: Vec<C>,
     /// The largest rate and acceleration in the first seconds, roughly \[u/s, u/s²\].
     peaks: [f64; 2],
 }
@@ -33,14 +37,7 @@ impl Profile {
 
     /// The same on the branches where the conditions whose `modes` are set are positive.
     pub(crate) fn on_branch(formula: &Formula, values: &[Option<f64>], modes: &[bool]) -> Self {
-        let [(tape, results)] = Symbol::record(|| {
-            let slope = |of: Symbol| of.gradient().first().map_or(Symbol::ZERO, |part| part.1);
-            let t = Symbol::input(0);
-            let values: Vec<Symbol> = values.iter().map(|value| value.map_or(t, Symbol::of)).collect();
-            let law = formula.evaluate(&values, modes);
-            let rate = slope(law);
-            [vec![law, rate, slope(rate)]]
-        });
+        let law = Self::recorded(formula, values, modes);
         let looks = (0..LOOKS).map(|look| {
             let t = look as f64 / 8.0;
             formula.value(&values.iter().map(|value| value.unwrap_or(t)).collect::<Vec<f64>>())
@@ -53,23 +50,7 @@ impl Profile {
             8.0 * most(&mut looks.windows(2).map(|pair| pair[1] - pair[0])),
             64.0 * most(&mut looks.windows(3).map(|three| three[0] - 2.0 * three[1] + three[2])),
         ];
-        let results = [results[0], results[1], results[2]];
-        Self { text: formula.text().to_owned(), tape: Arc::new(tape), results, peaks }
-    }
-
-    /// Its formula.
-    pub fn text(&self) -> &str {
-        &self.text
-    }
-
-    /// The largest rate and acceleration in the first eight seconds, as seen at 65 times \[u/s, u/s²\].
-    pub fn peaks(&self) -> [f64; 2] {
-        self.peaks
-    }
-
-    /// The law and its first two derivatives at a time \[u, u/s, u/s²\].
-    pub fn at<S: Scalar>(&self, t: S) -> [S; 3] {
-        self.tape.results(|_| t, |slots| self.results.map(|result| slots[result as usize]))
+        Self { peaks, ..law }
     }
 
     /// Powers 0 … `order` of the law about a time \[u/s^m\].
@@ -84,6 +65,66 @@ impl Profile {
             series.advance(&self.tape, m, |_| power);
         }
         series.of(self.results[0]).to_vec()
+    }
+}
+
+impl<C> Profile<C> {
+    /// Its formula.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The largest rate and acceleration in the first eight seconds, as seen at 65 times \[u/s, u/s²\].
+    pub fn peaks(&self) -> [f64; 2] {
+        self.peaks
+    }
+}
+
+impl<C: Decimal> Profile<C> {
+    /// The law on these branches, without its peaks; `values` are those of its names, `None` for t.
+    pub(crate) fn recorded(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
+        let inputs = RefCell::new(Vec::new());
+        let constant = |value: C| match C::IS_LONG {
+            // The tape folds constants in doubles.
+            true => Symbol::input(1 + number_of(&inputs, &value) as u32),
+            false => Symbol::of(value.value()),
+        };
+        let numbers = if C::IS_LONG { formula.numbers() } else { Vec::new() };
+        let [(tape, results)] = Symbol::record(|| {
+            let slope = |of: Symbol| {
+                of.gradient().iter().find(|part| part.0 == 0).map_or(Symbol::ZERO, |part| part.1)
+            };
+            let t = Symbol::input(0);
+            let values: Vec<Symbol> = values.iter().map(|value| value.map_or(t, constant)).collect();
+            let law = match C::IS_LONG {
+                true => formula.evaluate_over(&values, modes, |node| constant(numbers[node])),
+                false => formula.evaluate(&values, modes),
+            };
+            let rate = slope(law);
+            [vec![law, rate, slope(rate)]]
+        });
+        Self {
+            text: formula.text().to_owned(),
+            tape: Arc::new(tape),
+            results: [results[0], results[1], results[2]],
+            numbers: inputs.into_inner(),
+            peaks: [0.0; 2],
+        }
+    }
+
+    /// The law and its first two derivatives at a time \[u, u/s, u/s²\].
+    pub fn at<S: Over<C>>(&self, t: S) -> [S; 3] {
+        let input = |number: u32| match number.checked_sub(1) {
+            None => t,
+            Some(number) => S::constant(self.numbers[number as usize]),
+        };
+        self.tape.results(input, |slots| self.results.map(|result| slots[result as usize]))
+    }
+
+    /// Its tape, the number of the law on it, and the numbers that are its inputs after the time.
+    #[cfg(feature = "digits")]
+    pub(crate) fn parts(&self) -> (&Tape, Slot, &[C]) {
+        (&self.tape, self.results[0], &self.numbers)
     }
 }
 

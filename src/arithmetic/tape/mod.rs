@@ -66,7 +66,7 @@ pub enum Operation {
 
 impl Operation {
     /// The operands, as far as there are any.
-    fn operands(&self) -> [Option<Slot>; 3] {
+    pub fn operands(&self) -> [Option<Slot>; 3] {
         match *self {
             Self::Input(_) | Self::Constant(_) | Self::Beside => [None; 3],
             Self::Add(a, b) | Self::Subtract(a, b) | Self::Multiply(a, b) | Self::Divide(a, b) => {
@@ -104,7 +104,7 @@ impl Operation {
     }
 
     /// True for operations with a second result.
-    fn has_two_results(&self) -> bool {
+    pub fn has_two_results(&self) -> bool {
         matches!(self, Self::Sine(_) | Self::HyperbolicTangent(_))
     }
 }
@@ -160,6 +160,11 @@ impl Tape {
                 Operation::Exponential(_) | Operation::HyperbolicTangent(_) | Operation::Divide(..)
             )
         })
+    }
+
+    /// Its operations.
+    pub fn operations(&self) -> &[Operation] {
+        &self.operations
     }
 
     /// True for a formula without results.

@@ -4,14 +4,15 @@
 use super::parts;
 use super::{Body, Mechanism, dense_constants};
 use crate::arithmetic::{Complex, Real, Scalar};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
-use crate::dynamics::force::{Action, Spring, Torsion};
+use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
+use crate::dynamics::force::formula::Formulas;
+use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::series::{SeriesNumber, Terms};
 use crate::dynamics::tree::{self, Tree};
-use crate::scene::Scene;
+use crate::scene::{Decimal, Scene};
 use std::sync::Arc;
 
 /// Constants of a mechanism in numbers of the kind `C`, and where it starts.
@@ -33,6 +34,8 @@ pub struct ExactMechanism<C> {
     pub torsions: Vec<Torsion<C>>,
     /// Applied forces and torques.
     pub actions: Vec<Action<C>>,
+    /// Forces by formulas.
+    pub forces: Vec<UserForce<C>>,
     /// Constraint equations.
     pub constraints: Vec<ConstraintEquation<C>>,
     /// The gap of each wall, and its restitution.
@@ -52,7 +55,7 @@ pub struct ExactStart<C> {
     pub given: [Vec<bool>; 2],
 }
 
-impl<C: Real> ExactMechanism<C> {
+impl<C: Decimal> ExactMechanism<C> {
     /// The mechanism of a scene, which is `structure` in doubles.
     ///
     /// # Errors
@@ -78,6 +81,10 @@ impl<C: Real> ExactMechanism<C> {
             .map_err(|error| error.to_string())?;
         parts::joints(scene, &forest, &mut constraints);
         constraints.extend(parts::guides(scene, &forest));
+        let forces = match Formulas::of(scene, &forest).map_err(|error| error.to_string())? {
+            Some(formulas) => formulas.record(&formulas.parameters, &[]),
+            None => Ok(Vec::new()),
+        };
         let ground_energy = (bodies.iter().zip(&forest.roots()))
             .fold(C::ZERO, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
         Ok(Self {
@@ -87,6 +94,7 @@ impl<C: Real> ExactMechanism<C> {
             springs: parts::springs(scene, &forest),
             torsions: parts::torsions(scene),
             actions: parts::actions(scene, &forest),
+            forces: forces.map_err(|error| error.to_string())?,
             walls: (scene.walls.iter())
                 .map(|wall| {
                     let normal = Complex::new(wall.normal[0], wall.normal[1]);
@@ -109,7 +117,7 @@ impl<C: Real> ExactMechanism<C> {
             springs: &self.springs,
             torsions: &self.torsions,
             actions: &self.actions,
-            forces: &[],
+            forces: &self.forces,
             constraints: &self.constraints,
         }
     }
@@ -136,7 +144,9 @@ impl<C: Real> ExactMechanism<C> {
         tree::multiply::<C, 0>(n, &mass, omega, &mut momentum);
         let gravity = self.tree.gravity_energy(z) + self.ground_energy;
         let springs = self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(z));
-        let potential = self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi));
+        let elastic = self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi));
+        let at = Posture { phi, z, omega: &[] };
+        let potential = self.forces.iter().fold(elastic, |sum, force| sum + force.energy(C::ZERO, at));
         [dot(omega, &momentum).scale(0.5), potential]
     }
 
@@ -216,7 +226,7 @@ impl<C: Real> ExactMechanism<C> {
     }
 }
 
-impl<T: SeriesNumber<Constant = T>> ExactMechanism<T> {
+impl<T: SeriesNumber<Constant = T> + Decimal> ExactMechanism<T> {
     /// What is left of every constraint equation, and its rate, at a time; adds its Jacobian to `jacobian`
     /// (rows × n).
     pub fn residuals(&self, t: T::Time, phi: &[T], omega: &[T], jacobian: &mut [T]) -> Vec<[T; 2]> {

@@ -205,6 +205,10 @@ impl Source<Symbol> for Recorder {
             site.point.terms.iter().map(|term| term.0).chain(site.point.shifts.iter().map(|shift| shift.0));
         rates.fold(Complex::ZERO, |sum, k| sum + Complex::new(self.rate(k), self.rate(k)))
     }
+
+    fn constant(&self, value: f64) -> Symbol {
+        Symbol::of(value)
+    }
 }
 
 #[cfg(test)]

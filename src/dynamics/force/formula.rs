@@ -4,33 +4,36 @@
 //! choose, the *modes*; a run that meets a zero of a condition ends its step there and records the laws anew
 //! on the other branch, so that no method ever steps across a corner.
 
-use super::{Force, Loads, UserForce};
-use crate::arithmetic::Scalar;
+use super::UserForce;
+use super::law::Recorded;
 use crate::arithmetic::tape::Symbol;
+use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::Formula;
-use crate::scene::{Bound, Coupled, Coupling, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope};
+use crate::scene::{
+    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope,
+};
 use std::sync::Arc;
 
 /// From the first point to the second: the vector and its length.
-fn span<S: Scalar>(at: &Configuration<S>, [a, b]: &[Site; 2]) -> ([S; 2], S) {
+pub(super) fn span<S: Scalar, C>(at: &Configuration<S, C>, [a, b]: &[Site<C>; 2]) -> ([S; 2], S) {
     let [from, to] = [at.position(a), at.position(b)];
     let vector = [to[0] - from[0], to[1] - from[1]];
     (vector, (vector[0] * vector[0] + vector[1] * vector[1]).sqrt())
 }
 
-impl Meaning<Site> {
+impl<C: Copy> Meaning<Site<C>> {
     pub(in crate::dynamics) fn value<S: Scalar>(
         &self,
-        at: &Configuration<S>,
-        parameters: &[f64],
+        at: &Configuration<S, C>,
+        parameters: &[C],
         signals: &[S],
     ) -> S {
         match self {
             Self::Time => at.time(),
-            Self::Parameter(number) => S::of(parameters[*number]),
+            Self::Parameter(number) => at.constant(parameters[*number]),
             Self::Signal(number) => signals[*number],
             Self::Angle(body) => at.angle(*body),
             Self::Rate(body) => at.rate(*body),
@@ -54,16 +57,33 @@ impl Meaning<Site> {
 
 /// A formula that can be evaluated on a mechanism.
 #[derive(Clone, Debug, PartialEq)]
-struct Expression {
+pub(super) struct Expression<C = f64> {
     formula: Formula,
-    meanings: Vec<Meaning<Site>>,
+    meanings: Vec<Meaning<Site<C>>>,
+    /// The numbers of its nodes, where they may be no doubles.
+    numbers: Vec<C>,
     /// The number of its first condition among all.
     first: usize,
 }
 
-impl Expression {
-    fn values<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], signals: &[S]) -> Vec<S> {
+impl<C: Real> Expression<C> {
+    fn values<S: Scalar>(&self, at: &Configuration<S, C>, parameters: &[C], signals: &[S]) -> Vec<S> {
         self.meanings.iter().map(|meaning| meaning.value(at, parameters, signals)).collect()
+    }
+
+    /// Its value on the branches that `modes` say.
+    pub fn evaluated<S: Scalar>(
+        &self,
+        at: &Configuration<S, C>,
+        parameters: &[C],
+        signals: &[S],
+        modes: &[bool],
+    ) -> S {
+        let (values, modes) = (self.values(at, parameters, signals), self.modes(modes));
+        if self.numbers.is_empty() {
+            return self.formula.evaluate(&values, modes);
+        }
+        self.formula.evaluate_over(&values, modes, |node| at.constant(self.numbers[node]))
     }
 
     fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
@@ -73,27 +93,27 @@ impl Expression {
 
 /// Where a law acts.
 #[derive(Clone, Debug, PartialEq)]
-enum Acts {
-    Point { site: Site, follows: bool, force: [Expression; 2] },
-    Torque { body: usize, base: Option<usize>, torque: Expression },
-    Span { sites: [Site; 2], tension: Expression },
+pub(super) enum Acts<C = f64> {
+    Point { site: Site<C>, follows: bool, force: [Expression<C>; 2] },
+    Torque { body: usize, base: Option<usize>, torque: Expression<C> },
+    Span { sites: [Site<C>; 2], tension: Expression<C> },
     Nowhere,
 }
 
 /// One law.
 #[derive(Clone, Debug, PartialEq)]
-struct Law {
-    name: String,
-    potential: Option<Expression>,
-    place: Acts,
+pub(super) struct Law<C = f64> {
+    pub name: String,
+    pub potential: Option<Expression<C>>,
+    pub place: Acts<C>,
 }
 
 /// An event of a scene.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct FormulaEvent {
+pub(crate) struct FormulaEvent<C = f64> {
     /// Name.
     pub name: String,
-    when: Expression,
+    when: Expression<C>,
     /// Which zeros count.
     pub direction: Direction,
     /// True where the run ends there.
@@ -102,7 +122,7 @@ pub(crate) struct FormulaEvent {
     pub on: Vec<String>,
     /// Parts that act no longer.
     pub off: Vec<String>,
-    set: Vec<(usize, Expression)>,
+    set: Vec<(usize, Expression<C>)>,
 }
 
 /// A part that moves by a law of time.
@@ -116,51 +136,57 @@ pub(crate) struct Driven {
 
 /// All formulas of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Formulas {
+pub(crate) struct Formulas<C = f64> {
     /// Values of the parameters at the start.
-    pub parameters: Vec<f64>,
-    signals: Vec<Expression>,
-    laws: Vec<Law>,
+    pub parameters: Vec<C>,
+    signals: Vec<Expression<C>>,
+    laws: Vec<Law<C>>,
     /// Laws of motors and walls that are formulas.
-    profiles: Vec<(Driven, Expression)>,
+    profiles: Vec<(Driven, Expression<C>)>,
     /// Aims of motors that depend on the mechanism, with the angles they are of.
-    aims: Vec<(String, Vec<usize>, Expression)>,
+    aims: Vec<(String, Vec<usize>, Expression<C>)>,
     /// Events.
-    pub events: Vec<FormulaEvent>,
+    pub events: Vec<FormulaEvent<C>>,
     /// What each condition is part of, for messages.
     pub conditions: Vec<String>,
 }
 
 /// Collects expressions and numbers their conditions.
-struct Binder<'a> {
-    forest: &'a Forest,
+struct Binder<'a, C> {
+    forest: &'a Forest<C>,
     conditions: Vec<String>,
 }
 
-impl Binder<'_> {
-    fn bind(scope: &Scope, text: &str, owner: &str) -> Result<Bound, CompileError> {
+impl<C: Decimal> Binder<'_, C> {
+    fn bind(scope: &Scope<C>, text: &str, owner: &str) -> Result<Bound<C>, CompileError> {
         let unsound = |error| CompileError::Unsound(format!("formula of `{owner}`: {error}"));
         scope.bind(text).map(|(bound, _)| bound).map_err(unsound)
     }
 
     /// Numbers the conditions of a formula and finds its points.
-    fn placed(&mut self, Bound { formula, meanings }: Bound, owner: &str) -> Expression {
+    fn placed(&mut self, Bound { formula, meanings }: Bound<C>, owner: &str) -> Expression<C> {
         let first = self.conditions.len();
         self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
         let site = |place| self.forest.site(&place);
         let meanings = meanings.into_iter().map(|meaning| meaning.with_points(site)).collect();
-        Expression { formula, meanings, first }
+        let numbers = if C::IS_LONG { formula.numbers() } else { Vec::new() };
+        Expression { formula, meanings, numbers, first }
     }
 
-    fn expression(&mut self, scope: &Scope, text: &str, owner: &str) -> Result<Expression, CompileError> {
+    fn expression(
+        &mut self,
+        scope: &Scope<C>,
+        text: &str,
+        owner: &str,
+    ) -> Result<Expression<C>, CompileError> {
         let bound = Self::bind(scope, text, owner)?;
         Ok(self.placed(bound, owner))
     }
 }
 
-impl Formulas {
+impl<C: Decimal> Formulas<C> {
     /// Those of a scene; `None` where it has none.
-    pub fn of(scene: &Scene, forest: &Forest) -> Result<Option<Self>, CompileError> {
+    pub fn of(scene: &Scene<C>, forest: &Forest<C>) -> Result<Option<Self>, CompileError> {
         let motors = (scene.motors.iter().map(|motor| (&motor.name, Some(&motor.law), false)))
             .chain(scene.drives.iter().map(|drive| (&drive.name, Some(&drive.law), false)))
             .chain(scene.walls.iter().map(|wall| (&wall.name, wall.law.as_ref(), true)));
@@ -257,6 +283,31 @@ impl Formulas {
         Ok(Some(Self { parameters, signals, laws, profiles, aims, events, conditions }))
     }
 
+    /// The signals on the branches that `modes` say.
+    pub(super) fn signals<S: Scalar>(
+        &self,
+        at: &Configuration<S, C>,
+        parameters: &[C],
+        modes: &[bool],
+    ) -> Vec<S> {
+        let mut signals = Vec::with_capacity(self.signals.len());
+        for signal in &self.signals {
+            signals.push(signal.evaluated(at, parameters, &signals, modes));
+        }
+        signals
+    }
+
+    /// Records its laws on the branches that `modes` say.
+    ///
+    /// # Errors
+    /// A potential that depends on time or rates.
+    pub fn record(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<UserForce<C>>, CompileError> {
+        let record = |law| Recorded { law, formulas: self, parameters, modes }.record();
+        self.laws.iter().map(record).collect()
+    }
+}
+
+impl Formulas {
     /// True where a law applies forces beside potentials, on whatever branch.
     pub fn applies(&self) -> bool {
         self.laws.iter().any(|law| law.place != Acts::Nowhere)
@@ -267,25 +318,6 @@ impl Formulas {
         let changes =
             |event: &FormulaEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
         !self.conditions.is_empty() || self.events.iter().any(changes)
-    }
-
-    /// The signals on the branches that `modes` say.
-    fn signals<S: Scalar>(&self, at: &Configuration<S>, parameters: &[f64], modes: &[bool]) -> Vec<S> {
-        let mut signals = Vec::with_capacity(self.signals.len());
-        for signal in &self.signals {
-            let values = signal.values(at, parameters, &signals);
-            signals.push(signal.formula.evaluate(&values, signal.modes(modes)));
-        }
-        signals
-    }
-
-    /// Records its laws on the branches that `modes` say.
-    ///
-    /// # Errors
-    /// A potential that depends on time or rates.
-    pub fn record(&self, parameters: &[f64], modes: &[bool]) -> Result<Vec<UserForce>, CompileError> {
-        let record = |law| UserForce::record(&Recorded { law, formulas: self, parameters, modes });
-        self.laws.iter().map(record).collect()
     }
 
     /// True where laws of motors or walls are formulas.
@@ -313,8 +345,7 @@ impl Formulas {
         let aim = |(name, angles, expression): &'_ (String, Vec<usize>, Expression)| {
             let formula = |at: &Configuration<Symbol>| {
                 let signals = self.signals(at, parameters, modes);
-                let values = expression.values(at, parameters, &signals);
-                expression.formula.evaluate(&values, expression.modes(modes))
+                expression.evaluated(at, parameters, &signals, modes)
             };
             Aim::record(angles, formula)
                 .map(Arc::new)
@@ -391,76 +422,15 @@ impl Formulas {
     }
 }
 
-impl Law {
+impl<C> Law<C> {
     /// Its formulas in the order in which they were bound.
-    fn expressions(&self) -> impl Iterator<Item = &Expression> {
-        let acting: Vec<&Expression> = match &self.place {
+    fn expressions(&self) -> impl Iterator<Item = &Expression<C>> {
+        let acting: Vec<&Expression<C>> = match &self.place {
             Acts::Point { force: [x, y], .. } => vec![x, y],
             Acts::Torque { torque, .. } => vec![torque],
             Acts::Span { tension, .. } => vec![tension],
             Acts::Nowhere => Vec::new(),
         };
         self.potential.iter().chain(acting)
-    }
-}
-
-/// A law on the branches of some modes, as it is recorded.
-struct Recorded<'a> {
-    law: &'a Law,
-    formulas: &'a Formulas,
-    parameters: &'a [f64],
-    modes: &'a [bool],
-}
-
-impl Recorded<'_> {
-    fn evaluate<S: Scalar>(&self, expression: &Expression, at: &Configuration<S>, signals: &[S]) -> S {
-        let values = expression.values(at, self.parameters, signals);
-        expression.formula.evaluate(&values, expression.modes(self.modes))
-    }
-}
-
-impl Force for Recorded<'_> {
-    fn name(&self) -> &str {
-        &self.law.name
-    }
-
-    fn potential<S: Scalar>(&self, at: &Configuration<S>) -> S {
-        let Some(potential) = &self.law.potential else { return S::ZERO };
-        self.evaluate(potential, at, &self.formulas.signals(at, self.parameters, self.modes))
-    }
-
-    fn apply<S: Scalar>(&self, at: &Configuration<S>, loads: &mut Loads<S>) {
-        if self.law.place == Acts::Nowhere {
-            return;
-        }
-        let signals = self.formulas.signals(at, self.parameters, self.modes);
-        let of = |expression: &Expression| self.evaluate(expression, at, &signals);
-        match &self.law.place {
-            Acts::Point { site, follows, force } => {
-                let [x, y] = force.each_ref().map(of);
-                match site.body.filter(|_| *follows) {
-                    Some(body) => {
-                        let [c, s] = at.direction(body);
-                        loads.force(site, [c * x - s * y, s * x + c * y]);
-                    }
-                    None => loads.force(site, [x, y]),
-                }
-            }
-            Acts::Torque { body, base, torque } => {
-                let torque = of(torque);
-                loads.torque(*body, torque);
-                if let Some(base) = base {
-                    loads.torque(*base, -torque);
-                }
-            }
-            Acts::Span { sites, tension } => {
-                let (vector, length) = span(at, sites);
-                let pull = of(tension) / length;
-                let force = [vector[0] * pull, vector[1] * pull];
-                loads.force(&sites[0], force);
-                loads.force(&sites[1], [-force[0], -force[1]]);
-            }
-            Acts::Nowhere => {}
-        }
     }
 }

@@ -2,6 +2,8 @@
 
 pub mod action;
 pub(crate) mod formula;
+mod law;
+mod recorder;
 pub mod spring;
 pub mod torsion;
 pub mod user;

@@ -9,12 +9,10 @@
 //! power accounted as work = Σ F·P' + Σ torque w  of what is applied beside
 //! ```
 
-use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
-use crate::arithmetic::{Complex, Scalar};
-use crate::dynamics::CompileError;
-use crate::dynamics::configuration::{Configuration, Source};
+use crate::arithmetic::tape::{Slot, Tape};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
+use crate::dynamics::configuration::Configuration;
 use crate::dynamics::constraint::{Posture, Site};
-use std::cell::RefCell;
 
 /// A force or torque that acts on a mechanism, beside those a scene knows.
 ///
@@ -68,14 +66,14 @@ pub trait Force {
 
 /// Forces and torques that act at one moment.
 #[derive(Clone, Debug, Default)]
-pub struct Loads<S> {
-    forces: Vec<(Site, [S; 2])>,
-    torques: Vec<(usize, S)>,
+pub struct Loads<S, C = f64> {
+    pub(super) forces: Vec<(Site<C>, [S; 2])>,
+    pub(super) torques: Vec<(usize, S)>,
 }
 
-impl<S: Scalar> Loads<S> {
+impl<S: Scalar, C: Clone> Loads<S, C> {
     /// Adds a force \[N\] at a point; at a point of the ground it does nothing.
-    pub fn force(&mut self, site: &Site, force: [S; 2]) {
+    pub fn force(&mut self, site: &Site<C>, force: [S; 2]) {
         if site.body.is_some() {
             self.forces.push((site.clone(), force));
         }
@@ -91,6 +89,8 @@ impl<S: Scalar> Loads<S> {
 /// What an input of the tape is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::dynamics) enum Input {
+    /// A number that is no double.
+    Number(usize),
     Time,
     Angle(usize),
     Rate(usize),
@@ -116,177 +116,22 @@ pub(in crate::dynamics) struct Part {
 
 /// A recorded force.
 #[derive(Clone, Debug, PartialEq)]
-pub struct UserForce {
+pub struct UserForce<C = f64> {
     /// Name in messages.
     pub name: String,
     pub(in crate::dynamics) inputs: Vec<Input>,
-    pub(in crate::dynamics) sites: Vec<Site>,
+    pub(in crate::dynamics) sites: Vec<Site<C>>,
+    /// Numbers that are no doubles.
+    pub(in crate::dynamics) numbers: Vec<C>,
     /// What its potential does, and what it applies beside.
     pub(in crate::dynamics) parts: [Part; 2],
     /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
-    pub(in crate::dynamics) may_be_flat: bool,
+    pub(crate) may_be_flat: bool,
     /// Potential energy \[J\].
-    potential: Option<(Tape, Slot)>,
+    pub(super) potential: Option<(Tape, Slot)>,
 }
 
-/// Hands out inputs while a force is recorded.
-#[derive(Default)]
-struct Recorder {
-    inputs: RefCell<Vec<Input>>,
-    sites: RefCell<Vec<Site>>,
-}
-
-impl Recorder {
-    fn input(&self, input: Input) -> Symbol {
-        Symbol::input(number_of(&self.inputs, &input) as u32)
-    }
-
-    fn site(&self, site: &Site) -> usize {
-        number_of(&self.sites, site)
-    }
-}
-
-impl Source<Symbol> for Recorder {
-    fn time(&self) -> Symbol {
-        self.input(Input::Time)
-    }
-
-    fn angle(&self, body: usize) -> Symbol {
-        self.input(Input::Angle(body))
-    }
-
-    fn rate(&self, body: usize) -> Symbol {
-        self.input(Input::Rate(body))
-    }
-
-    fn direction(&self, body: usize) -> Complex<Symbol> {
-        Complex::new(self.input(Input::Cosine(body)), self.input(Input::Sine(body)))
-    }
-
-    fn position(&self, site: &Site) -> Complex<Symbol> {
-        if site.body.is_none() {
-            return Complex::of(site.point.root);
-        }
-        let site = self.site(site);
-        Complex::new(self.input(Input::X(site)), self.input(Input::Y(site)))
-    }
-
-    fn velocity(&self, site: &Site) -> Complex<Symbol> {
-        if site.body.is_none() {
-            return Complex::ZERO;
-        }
-        let site = self.site(site);
-        Complex::new(self.input(Input::XRate(site)), self.input(Input::YRate(site)))
-    }
-}
-
-/// What a force comes to, in symbols.
-#[derive(Default)]
-struct Recorded {
-    forces: Vec<(usize, [Symbol; 2])>,
-    torques: Vec<(usize, Symbol)>,
-}
-
-impl Recorded {
-    /// Adds a share of a generalized force that belongs to an input.
-    fn add(&mut self, recorder: &Recorder, input: Input, share: Symbol) {
-        let (place, vector) = match input {
-            Input::X(site) => (site, [share, Symbol::ZERO]),
-            Input::Y(site) => (site, [Symbol::ZERO, share]),
-            Input::Angle(body) => return self.torques.push((body, share)),
-            Input::Cosine(body) => {
-                return self.torques.push((body, -(share * recorder.input(Input::Sine(body)))));
-            }
-            Input::Sine(body) => {
-                return self.torques.push((body, share * recorder.input(Input::Cosine(body))));
-            }
-            _ => return,
-        };
-        match self.forces.iter_mut().find(|(site, _)| *site == place) {
-            Some((_, force)) => force.iter_mut().zip(vector).for_each(|(force, more)| *force += more),
-            None => self.forces.push((place, vector)),
-        }
-    }
-
-    fn symbols(&self) -> Vec<Symbol> {
-        self.forces
-            .iter()
-            .flat_map(|force| force.1)
-            .chain(self.torques.iter().map(|torque| torque.1))
-            .collect()
-    }
-
-    /// Of results and their tape: forces, torques, and the power if there is one more.
-    fn part(&self, (tape, slots): (Tape, Vec<Slot>)) -> Part {
-        let (forces, rest) = slots.split_at(2 * self.forces.len());
-        let (torques, power) = rest.split_at(self.torques.len());
-        Part {
-            tape,
-            forces: self
-                .forces
-                .iter()
-                .zip(forces.chunks_exact(2))
-                .map(|(force, slots)| (force.0, [slots[0], slots[1]]))
-                .collect(),
-            torques: self.torques.iter().zip(torques).map(|(torque, &slot)| (torque.0, slot)).collect(),
-            power: power.first().copied(),
-        }
-    }
-}
-
-impl UserForce {
-    /// Records a force.
-    ///
-    /// # Errors
-    /// A potential that depends on time or rates.
-    pub fn record(force: &impl Force) -> Result<Self, CompileError> {
-        let recorder = Recorder::default();
-        let (mut conservative, mut applied) = (Recorded::default(), Recorded::default());
-        let mut refused = None;
-        let [by_potential, beside, energy] = Symbol::record(|| {
-            let at = Configuration::new(&recorder);
-            let potential = force.potential(&at);
-            for (number, slope) in potential.gradient() {
-                let input = recorder.inputs.borrow()[number as usize];
-                match input {
-                    Input::Time | Input::Rate(_) | Input::XRate(_) | Input::YRate(_) => {
-                        refused = Some(CompileError::NoPotential(force.name().into()));
-                    }
-                    _ => conservative.add(&recorder, input, -slope),
-                }
-            }
-            let mut loads = Loads::default();
-            force.apply(&at, &mut loads);
-            let mut power = Symbol::ZERO;
-            for (site, [x, y]) in loads.forces {
-                let velocity = recorder.velocity(&site);
-                power += x * velocity.re + y * velocity.im;
-                let site = recorder.site(&site);
-                applied.add(&recorder, Input::X(site), x);
-                applied.add(&recorder, Input::Y(site), y);
-            }
-            for (body, torque) in loads.torques {
-                power += torque * recorder.rate(body);
-                applied.add(&recorder, Input::Angle(body), torque);
-            }
-            let some = |symbol: Symbol| (!symbol.is_zero()).then_some(symbol);
-            let beside = applied.symbols().into_iter().chain(some(power)).collect();
-            [conservative.symbols(), beside, some(potential).into_iter().collect()]
-        });
-        if let Some(refused) = refused {
-            return Err(refused);
-        }
-        let parts = [conservative.part(by_potential), applied.part(beside)];
-        Ok(Self {
-            name: force.name().into(),
-            may_be_flat: parts.iter().any(|part| part.tape.may_be_flat()),
-            parts,
-            potential: energy.1.first().map(|&slot| (energy.0, slot)),
-            inputs: recorder.inputs.into_inner(),
-            sites: recorder.sites.into_inner(),
-        })
-    }
-
+impl<C: Real> UserForce<C> {
     /// True where it does work that no energy stands for.
     pub fn does_work(&self) -> bool {
         self.parts[1].power.is_some()
@@ -330,8 +175,9 @@ impl UserForce {
 
     /// Evaluates a tape at `time` \[s\] and calls `then` with all results.
     #[inline]
-    fn at<T: Scalar, R>(&self, tape: &Tape, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
+    fn at<T: Over<C>, R>(&self, tape: &Tape, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
         let input = |number: u32| match self.inputs[number as usize] {
+            Input::Number(number) => T::constant(self.numbers[number]),
             Input::Time => time,
             Input::Angle(body) => at.phi[body],
             Input::Rate(body) => at.omega[body],
@@ -348,12 +194,12 @@ impl UserForce {
     /// Calls `force` with every site and the force \[N\] there, and `torque` with every body and the torque
     /// \[N·m\] on it.
     #[inline]
-    fn each<T: Scalar>(
+    fn each<T: Over<C>>(
         &self,
         part: &Part,
         time: T,
         at: Posture<T>,
-        mut force: impl FnMut(&Site, Complex<T>),
+        mut force: impl FnMut(&Site<C>, Complex<T>),
         mut torque: impl FnMut(usize, T),
     ) {
         if part.tape.is_empty() {
@@ -370,7 +216,7 @@ impl UserForce {
     }
 
     /// Adds the generalized forces \[N·m, N\] of a part; returns its power accounted as work \[W\].
-    fn pull_part<T: Scalar>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) -> T {
+    fn pull_part<T: Over<C>>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) -> T {
         if part.tape.is_empty() {
             return T::ZERO;
         }
@@ -387,23 +233,23 @@ impl UserForce {
     }
 
     /// Adds all its generalized forces \[N·m, N\]; returns the power accounted as work \[W\].
-    pub fn pull<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) -> T {
+    pub fn pull<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) -> T {
         self.parts.iter().fold(T::ZERO, |power, part| power + self.pull_part(part, time, at, load))
     }
 
     /// Adds those of its potential.
-    pub fn pull_by_potential<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+    pub fn pull_by_potential<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) {
         self.pull_part(&self.parts[0], time, at, load);
     }
 
     /// Adds those applied beside.
-    pub fn pull_applied<T: Scalar>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+    pub fn pull_applied<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) {
         self.pull_part(&self.parts[1], time, at, load);
     }
 
     /// Calls `force` with every element and the force \[N·m, N\] on it; torques act across their unit
     /// vectors.
-    pub fn spread<T: Scalar>(&self, time: T, at: Posture<T>, force: impl FnMut(usize, Complex<T>)) {
+    pub fn spread<T: Over<C>>(&self, time: T, at: Posture<T>, force: impl FnMut(usize, Complex<T>)) {
         let force = std::cell::RefCell::new(force);
         let torque = |body: usize, torque| (force.borrow_mut())(body, at.z[body].left().times(torque));
         for part in &self.parts {
@@ -412,7 +258,7 @@ impl UserForce {
     }
 
     /// Calls `force` with the body and the force \[N\] at every point it acts at.
-    pub fn forces<T: Scalar>(&self, time: T, at: Posture<T>, mut force: impl FnMut(usize, Complex<T>)) {
+    pub fn forces<T: Over<C>>(&self, time: T, at: Posture<T>, mut force: impl FnMut(usize, Complex<T>)) {
         for part in &self.parts {
             self.each(
                 part,
@@ -425,7 +271,10 @@ impl UserForce {
     }
 
     /// Magnitudes of forces \[N\] and torques \[N·m\] at a moment, summed.
-    pub fn magnitudes(&self, time: f64, at: Posture<f64>) -> [f64; 2] {
+    pub fn magnitudes(&self, time: f64, at: Posture<f64>) -> [f64; 2]
+    where
+        f64: Over<C>,
+    {
         let [mut force, mut torque] = [0.0; 2];
         for part in &self.parts {
             self.each(
@@ -440,13 +289,13 @@ impl UserForce {
     }
 
     /// Potential energy \[J\].
-    pub fn energy<T: Scalar>(&self, time: T, at: Posture<T>) -> T {
+    pub fn energy<T: Over<C>>(&self, time: T, at: Posture<T>) -> T {
         let Some((tape, slot)) = &self.potential else { return T::ZERO };
         self.at(tape, time, at, |slots| slots[*slot as usize])
     }
 
     /// Power accounted as work \[W\].
-    pub fn work_rate<T: Scalar>(&self, time: T, at: Posture<T>) -> T {
+    pub fn work_rate<T: Over<C>>(&self, time: T, at: Posture<T>) -> T {
         let Part { tape, power: Some(slot), .. } = &self.parts[1] else { return T::ZERO };
         self.at(tape, time, at, |slots| slots[*slot as usize])
     }

@@ -26,7 +26,7 @@ pub struct Terms<'a, C> {
     /// Applied forces and torques.
     pub actions: &'a [Action<C>],
     /// Forces by formulas and from outside the crate.
-    pub forces: &'a [UserForce],
+    pub forces: &'a [UserForce<C>],
     /// Constraint equations.
     pub constraints: &'a [ConstraintEquation<C>],
 }

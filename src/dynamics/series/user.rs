@@ -1,13 +1,24 @@
 //! The series of forces from outside the crate: their tape, order by order.
 
-use crate::arithmetic::tape::TapeSeries;
-use crate::arithmetic::{Complex, DoubleDouble, Real};
+use super::coefficient::SeriesNumber;
+use super::factors::Scale;
+use super::tape::LongTape;
+use crate::arithmetic::tape::{Slot, TapeSeries};
+use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::force::UserForce;
-use crate::dynamics::force::user::Input;
+use crate::dynamics::force::user::{Input, Part};
 
 /// Series of one force, powers 0 to P.
 #[derive(Clone, Debug)]
-pub struct UserSeries<T>([TapeSeries<T>; 2]);
+pub struct UserSeries<T: SeriesNumber>([PartSeries<T>; 2]);
+
+/// Those of what its potential does, or of what it applies beside.
+#[derive(Clone, Debug)]
+enum PartSeries<T: SeriesNumber> {
+    Plain(TapeSeries<T>),
+    /// Where numbers are long.
+    Long(LongTape<T>),
+}
 
 /// What the powers of a motion of `n` elements are, as far as they are known.
 #[derive(Clone, Copy)]
@@ -24,9 +35,9 @@ pub struct At<'a, T> {
     pub n: usize,
 }
 
-impl<T: Real> At<'_, T> {
+impl<T: SeriesNumber> At<'_, T> {
     /// Power `m` of an input.
-    fn power(&self, force: &UserForce, input: Input, m: usize) -> T {
+    fn power(&self, force: &UserForce<T::Constant>, input: Input, m: usize) -> T {
         let z = |m: usize| &self.z[m * self.n..(m + 1) * self.n];
         let omega = |m: usize| &self.omega[m * self.n..(m + 1) * self.n];
         let place = |site: usize| {
@@ -35,6 +46,8 @@ impl<T: Real> At<'_, T> {
         };
         let velocity = |site: usize| force.sites[site].point.turned(z(m + 1)).times(T::of((m + 1) as f64));
         match (input, m) {
+            (Input::Number(number), 0) => T::constant(force.numbers[number]),
+            (Input::Number(_), _) => T::ZERO,
             (Input::Time, 0) => self.time,
             (Input::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
             (Input::Angle(body), 0) => self.phi[body],
@@ -50,36 +63,77 @@ impl<T: Real> At<'_, T> {
     }
 }
 
-impl<T: Real> UserSeries<T> {
+impl<T: SeriesNumber> PartSeries<T> {
+    fn new(force: &UserForce<T::Constant>, part: &Part, order: usize) -> Self {
+        let is_number = |input: u32| matches!(force.inputs[input as usize], Input::Number(_));
+        match T::IS_LONG {
+            true => Self::Long(LongTape::new(&part.tape, order, is_number)),
+            false => Self::Plain(TapeSeries::new(&part.tape, order)),
+        }
+    }
+
+    #[inline(always)]
+    fn power(&self, slot: Slot, m: usize) -> T {
+        match self {
+            Self::Plain(series) => series.of(slot)[m],
+            Self::Long(series) => series.power(slot, m),
+        }
+    }
+}
+
+impl<T: SeriesNumber> UserSeries<T> {
     /// Room for powers up to `order`.
-    pub fn new(force: &UserForce, order: usize) -> Self {
-        Self(force.parts.each_ref().map(|part| TapeSeries::new(&part.tape, order)))
+    pub fn new(force: &UserForce<T::Constant>, order: usize) -> Self {
+        Self(force.parts.each_ref().map(|part| PartSeries::new(force, part, order)))
+    }
+
+    /// False where powers grow by more than products are made for.
+    pub fn is_sound(&self) -> bool {
+        self.0.iter().all(|part| match part {
+            PartSeries::Plain(_) => true,
+            PartSeries::Long(series) => series.is_sound(),
+        })
     }
 
     /// Takes power m of the forces off the elements' balance, and adds that of torques to `load`.
-    pub fn act(&mut self, force: &UserForce, m: usize, at: At<T>, rest: &mut [Complex<T>], load: &mut [T]) {
+    pub fn act(
+        &mut self,
+        force: &UserForce<T::Constant>,
+        m: usize,
+        at: At<T>,
+        (rest, load): (&mut [Complex<T>], &mut [T]),
+        scale: &Scale<T>,
+    ) {
         for (part, series) in force.parts.iter().zip(&mut self.0) {
-            series.advance(&part.tape, m, |number| at.power(force, force.inputs[number as usize], m));
+            let input = |number: u32| at.power(force, force.inputs[number as usize], m);
+            match series {
+                PartSeries::Plain(series) => series.advance(&part.tape, m, input),
+                PartSeries::Long(series) => series.advance(&part.tape, m, scale, input),
+            }
             for &(site, [x, y]) in &part.forces {
                 force.sites[site]
                     .point
-                    .spread(Complex::new(series.of(x)[m], series.of(y)[m]), |k, force| rest[k] -= force);
+                    .spread(Complex::new(series.power(x, m), series.power(y, m)), |k, force| {
+                        rest[k] -= force
+                    });
             }
             for &(body, torque) in &part.torques {
-                load[body] += series.of(torque)[m];
+                load[body] += series.power(torque, m);
             }
         }
     }
 
     /// Power m of the power accounted as work \[W/s^m\].
-    pub fn power(&self, force: &UserForce, m: usize) -> T {
-        force.parts[1].power.map_or(T::ZERO, |slot| self.0[1].of(slot)[m])
+    pub fn power(&self, force: &UserForce<T::Constant>, m: usize) -> T {
+        force.parts[1].power.map_or(T::ZERO, |slot| self.0[1].power(slot, m))
     }
 
     /// The first powers from a series in more digits.
     pub fn take(&mut self, other: &UserSeries<DoubleDouble>) {
         for (series, other) in self.0.iter_mut().zip(&other.0) {
-            series.take(other);
+            if let (PartSeries::Plain(series), PartSeries::Plain(other)) = (series, other) {
+                series.take(other);
+            }
         }
     }
 }

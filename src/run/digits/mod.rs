@@ -4,6 +4,7 @@
 //! numbers are read as written from row to row; [`Pair`] runs two side by side and tells to how many digits
 //! they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
+mod confirm;
 mod growth;
 mod keep;
 mod motion;

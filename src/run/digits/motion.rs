@@ -10,6 +10,7 @@
 //! eliminated are put back by Newton's iteration after every step (module `keep`), walls located by it (module
 //! `wall`).
 
+use super::confirm::{Probe, confirmed};
 use super::keep::Keeper;
 use super::precision::Precision;
 use super::wall;
@@ -22,6 +23,8 @@ use crate::stepping::{Cause, StepError};
 
 /// log2 of the factor by which a step may be longer than the one before.
 const SLACK: f64 = 0.25;
+/// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
+const WORK: f64 = 10.0;
 /// Powers the step is taken from: by symmetry some of them may vanish.
 const JUDGES: usize = 5;
 
@@ -66,6 +69,8 @@ pub struct Motion<const W: usize> {
     pub(super) series: Series<Digits<W>>,
     pub(super) state: LongState<W>,
     pub(super) keeper: Keeper<W>,
+    /// What confirms steps, where laws may be flat.
+    pub(super) probe: Option<Probe<W>>,
     /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends on.
     step: Option<(Digits<W>, Option<usize>)>,
     /// The radius its series has: see [`LongState`].
@@ -102,6 +107,7 @@ impl<const W: usize> Motion<W> {
             coordinates,
             series,
             keeper,
+            probe: Probe::of(&mechanism, coordinates),
             step: None,
             radius: None,
             longest: until,
@@ -179,6 +185,7 @@ impl<const W: usize> Motion<W> {
             series: self.series.clone(),
             state: self.state.clone(),
             keeper: self.keeper.clone(),
+            probe: self.probe.clone(),
             zeros: self.zeros.clone(),
             kept: self.kept.clone(),
             step: None,
@@ -257,7 +264,8 @@ impl<const W: usize> Motion<W> {
         if let Some(step) = self.step {
             return Ok(step);
         }
-        let step = self.expand();
+        let wanted = self.expand();
+        let step = confirmed(self, wanted);
         let seconds = self.state.t.value();
         if step.is_nan() {
             let hint = "look for a spring of length zero or a position without inertia";
@@ -339,6 +347,14 @@ impl<const W: usize> Motion<W> {
             }
             least = least.min((self.precision.tolerance() + first - size) / k as f64);
         }
+        if self.mechanism.structure.has_work_integral() {
+            // The work of a force is a product, and may converge later than its factors.
+            let energy = libm::log2(self.mechanism.structure.energy_scale);
+            let allowed = self.precision.tolerance() + WORK + energy;
+            let last = self.series.power.iter().enumerate().skip(order - JUDGES);
+            least =
+                last.fold(least, |least, (k, power)| least.min((allowed - power.log2()) / (k + 1) as f64));
+        }
         libm::exp2(least)
     }
 
@@ -366,7 +382,7 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Coordinates, rates and the work done since the state's time at a time after that.
-    fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
+    pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
         let f = self.state.u.len();
         let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
         let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;

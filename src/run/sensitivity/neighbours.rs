@@ -28,6 +28,10 @@ const TOO_MUCH: f64 = 1e-4;
 const NOTHING: f64 = 1e-11;
 /// Rounding of an evaluation, over its value.
 const ROUNDING: f64 = 4e-16;
+/// Numbers below are tried in changes of their unit, too, where changes over themselves say little.
+const NEAR_ZERO: f64 = 1e-3;
+/// Numbers below are zero but for rounding: what they do over themselves says nothing.
+const ROUNDED: f64 = 1e-12;
 /// Offsets and weights: on both sides, and on one.
 const BOTH: [[f64; 2]; 4] = [[-2.0, 1.0 / 12.0], [-1.0, -2.0 / 3.0], [1.0, 2.0 / 3.0], [2.0, -1.0 / 12.0]];
 const ONE: [[f64; 2]; 5] = [[0.0, -25.0 / 12.0], [1.0, 4.0], [2.0, -3.0], [3.0, 4.0 / 3.0], [4.0, -0.25]];
@@ -40,6 +44,19 @@ pub(in crate::run) struct Neighbour {
     compiled: Arc<Mechanism>,
     pub mechanism: Arc<Mechanism>,
     pub kernel: Kernel<f64>,
+}
+
+impl Neighbour {
+    /// Its accelerations at a state, by the code for this number of bodies where there is one.
+    pub fn accelerations(&mut self, t: Time, phi: &[f64], omega: &[f64]) -> &[f64] {
+        let Self { mechanism, kernel, .. } = self;
+        match mechanism.size() {
+            1 => kernel.accelerate::<1>(mechanism, t, phi, omega, Bias::default()),
+            2 => kernel.accelerate::<2>(mechanism, t, phi, omega, Bias::default()),
+            _ => kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default()),
+        }
+        &self.kernel.load
+    }
 }
 
 /// The mechanisms for one number.
@@ -82,16 +99,26 @@ impl Neighbours {
         base: (&Arc<Mechanism>, &Motion),
         until: f64,
     ) -> Result<Self, String> {
-        let search = |in_units: bool| Search { template, number, base, until, in_units };
-        let (mut attempt, mut error) = search(number.1 == 0.0).best()?;
+        let search = |in_units: bool| Search { template, number, base, until, in_units }.best();
+        let own = search(number.1 == 0.0);
         // A number near zero: what it does shows in changes of its unit, not in changes over itself.
-        if attempt.does_nothing()
-            && (f64::MIN_POSITIVE..1.0).contains(&number.1.abs())
-            && let Ok((other, other_error)) = search(true).best()
-            && !other.does_nothing()
-        {
-            (attempt, error) = (other, other_error);
-        }
+        let most = match &own {
+            Ok((attempt, _)) if attempt.does_nothing() => 1.0,
+            Ok((_, error)) if *error < ENOUGH => 0.0,
+            _ => NEAR_ZERO,
+        };
+        let is_rounding = number.1.abs() < ROUNDED;
+        let is_near_zero = number.1 != 0.0 && number.1.abs() < most;
+        let (attempt, error) = match is_near_zero.then(|| search(true)) {
+            Some(Ok(other)) if !other.0.does_nothing() => match own {
+                Ok(own) if !own.0.does_nothing() && own.1 <= other.1 => own,
+                _ => other,
+            },
+            Some(Err(why)) if own.as_ref().map_or(true, |own| is_rounding && own.0.does_nothing()) => {
+                return Err(why);
+            }
+            _ => own?,
+        };
         Ok(Self::of(attempt, error, base.0))
     }
 
@@ -279,7 +306,8 @@ impl Search<'_> {
             for (group, values) in self.values(candidate).into_iter().enumerate() {
                 if slopes.len() == group {
                     slopes.push(vec![0.0; values.len()]);
-                    sizes.push(0.0);
+                    // A start at rest is the difference of rates that are not small, and rounded as those.
+                    sizes.push([1.0, 1.0 / self.base.0.units.time].get(group).copied().unwrap_or(0.0));
                 }
                 for (slope, value) in slopes[group].iter_mut().zip(&values) {
                     *slope += weight * value;

@@ -246,10 +246,10 @@ impl Variation {
             }
             for (forcing, neighbours) in self.forcing.iter_mut().zip(&mut self.neighbours) {
                 for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
-                    let kernel = &mut neighbour.kernel;
-                    kernel.accelerate::<0>(&neighbour.mechanism, t, &phi, &omega, Bias::default());
-                    for (sum, load) in forcing[i * n..(i + 1) * n].iter_mut().zip(&kernel.load) {
-                        *sum += neighbour.weight * load;
+                    let weight = neighbour.weight;
+                    let accelerations = neighbour.accelerations(t, &phi, &omega);
+                    for (sum, &acceleration) in forcing[i * n..(i + 1) * n].iter_mut().zip(accelerations) {
+                        *sum += weight * acceleration;
                     }
                 }
             }

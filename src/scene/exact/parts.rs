@@ -4,16 +4,16 @@ use super::{Cursor, Decimal, Reader};
 use crate::scene::error::SceneError;
 use crate::scene::locate::Value;
 use crate::scene::{
-    Bar, Drive, Force, Given, Hinge, Law, Lock, Motor, Place, Rail, Scene, Sine, Slider, Spring, Start,
-    Torque, TorsionSpring, Wall, Weld,
+    Bar, Drive, Force, Given, Hinge, Law, Lock, Motor, Parameter, Place, Rail, Scene, Sine, Slider, Spring,
+    Start, Torque, TorsionSpring, Wall, Weld,
 };
 
 impl<'a, C: Decimal> Reader<'a, C> {
-    fn place(&self, at: &Cursor, plain: &Place) -> Result<Place<C>, SceneError> {
+    pub(super) fn place(&self, at: &Cursor, plain: &Place) -> Result<Place<C>, SceneError> {
         Ok(Place { bar: plain.bar, point: self.pair(at, "point", plain.point)? })
     }
 
-    fn between(&self, at: &Cursor, plain: &[Place; 2]) -> Result<[Place<C>; 2], SceneError> {
+    pub(super) fn between(&self, at: &Cursor, plain: &[Place; 2]) -> Result<[Place<C>; 2], SceneError> {
         let items = at.items("between");
         match &items[..] {
             [a, b] => Ok([self.place(a, &plain[0])?, self.place(b, &plain[1])?]),
@@ -23,9 +23,8 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     fn law(&self, at: &Cursor, plain: &Law) -> Result<Law<C>, SceneError> {
         let Some(law) = at.child("law") else { return Ok(Law::default()) };
-        if matches!(law.node.value, Value::Text(_)) {
-            let hint = "give it by start, rate, acceleration and sines";
-            return Err(self.refuse(&law, "is a formula of time, which has no exact series", hint));
+        if let Value::Text(text) = &law.node.value {
+            return Ok(Law { profile: Some(self.profile(&law, text)?), ..Law::default() });
         }
         let items = law.items("sines");
         let sines = items.iter().zip(&plain.sines).map(|(at, plain)| {
@@ -51,7 +50,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         plain: &[P],
         mut part: impl FnMut(&Cursor<'a>, &P) -> Result<E, SceneError>,
     ) -> Result<Vec<E>, SceneError> {
-        self.root.items(list).iter().zip(plain).map(|(at, plain)| part(at, plain)).collect()
+        self.plain_items(list).iter().zip(plain).map(|(at, plain)| part(at, plain)).collect()
     }
 
     fn bar(&self, at: &Cursor, plain: &Bar) -> Result<Bar<C>, SceneError> {
@@ -111,7 +110,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     pub(super) fn scene(&self, plain: &Scene) -> Result<Scene<C>, SceneError> {
-        let bars = 0..plain.bars.len();
+        let bars = 0..plain.own_bars();
         let motors: Vec<Cursor> =
             self.root.items("motors").into_iter().filter(|at| at.child("slider").is_none()).collect();
         let drives: Vec<Cursor> =
@@ -150,7 +149,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
                 restitution: self.number(at, "restitution", plain.restitution)?,
             })
         };
-        Ok(Scene {
+        let scene = Scene {
             name: plain.name.clone(),
             gravity: self.pair(&self.root, "gravity", plain.gravity)?,
             bars: self.each("bars", &plain.bars, |at, bar| self.bar(at, bar))?,
@@ -192,10 +191,18 @@ impl<'a, C: Decimal> Reader<'a, C> {
             walls: self.each("walls", &plain.walls, wall)?,
             start: bars.clone().map(|bar| self.start(plain, bar)).collect::<Result<_, _>>()?,
             given: bars.map(|bar| self.given(plain, bar)).collect::<Result<_, _>>()?,
+            parameters: (self.parameters.iter())
+                .map(|(name, value)| Parameter { name: name.clone(), value: *value })
+                .collect(),
+            points: self.points(plain)?,
+            signals: plain.signals.clone(),
+            integrals: plain.integrals.clone(),
+            laws: self.laws(plain)?,
             until: plain.until,
             every: plain.every,
             ..Scene::default()
-        })
+        };
+        Ok(scene.with_rotors())
     }
 
     fn spring(&self, at: &Cursor, spring: &Spring) -> Result<Spring<C>, SceneError> {

@@ -10,6 +10,7 @@
 
 mod branches;
 mod error;
+mod exact;
 mod parse;
 mod table;
 pub mod unit;
@@ -21,9 +22,9 @@ pub(crate) use error::meant;
 pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
-#[cfg(feature = "digits")]
-use crate::arithmetic::Real;
 use crate::arithmetic::Scalar;
+#[cfg(feature = "digits")]
+use crate::scene::number::Decimal;
 
 /// The longest formula \[bytes\].
 pub const LONGEST: usize = 4096;
@@ -182,16 +183,21 @@ impl Formula {
         self.run(values, &mut Given(bits))
     }
 
-    /// Its value over a scalar with an order, where `number` gives the numbers in its text as such scalars.
-    #[cfg(feature = "digits")]
-    pub(crate) fn exact_value<S: Real>(&self, values: &[S], number: impl Fn(f64) -> S) -> S {
-        self.run_over(values, &number, &mut branches::ByOrder)
+    /// The same where `number` gives the numbers of its nodes as such scalars.
+    pub(crate) fn evaluate_over<S: Scalar>(
+        &self,
+        values: &[S],
+        bits: &[bool],
+        number: impl Fn(usize) -> S,
+    ) -> S {
+        self.run_over(values, &|node, _| number(node), &mut Given(bits))
     }
 
-    /// True where a number in it is in degrees.
+    /// Its value over a scalar with an order, with the numbers of its text exactly as written.
     #[cfg(feature = "digits")]
-    pub(crate) fn has_angle_units(&self) -> bool {
-        self.text.split(|letter: char| !letter.is_ascii_alphabetic()).any(|word| word == "deg")
+    pub(crate) fn exact_value<S: Decimal>(&self, values: &[S]) -> S {
+        let numbers = self.numbers();
+        self.run_over(values, &|node, _| numbers[node], &mut branches::ByOrder)
     }
 
     /// The branches that hold at these values, by the signs of the conditions there.
@@ -212,20 +218,20 @@ impl Formula {
     }
 
     fn run<S: Scalar>(&self, values: &[S], branches: &mut impl Branches<S>) -> S {
-        self.run_over(values, &S::of, branches)
+        self.run_over(values, &|_, value| S::of(value), branches)
     }
 
     fn run_over<S: Scalar>(
         &self,
         values: &[S],
-        number: &impl Fn(f64) -> S,
+        number: &impl Fn(usize, f64) -> S,
         branches: &mut impl Branches<S>,
     ) -> S {
         if let [Node::Name(number)] = self.nodes[..] {
             return values.get(number).copied().unwrap_or(S::ZERO);
         }
         let mut results: Vec<S> = Vec::with_capacity(self.nodes.len());
-        for &node in &self.nodes {
+        for (place, &node) in self.nodes.iter().enumerate() {
             let at = |node: usize| results[node];
             let result = match node {
                 Node::Name(number) => values.get(number).copied().unwrap_or(S::ZERO),
@@ -245,9 +251,10 @@ impl Formula {
                 }
                 Node::Table(table, first, a) => {
                     let table = &self.tables[table];
-                    table.value(branches.piece(first, &table.knots(), at(a)), at(a), number)
+                    let piece = branches.piece(first, &table.knots(), at(a));
+                    table.value(piece, at(a), &|value| number(place, value))
                 }
-                Node::Number(value) => number(value),
+                Node::Number(value) => number(place, value),
                 node => self.smooth(node, at),
             };
             results.push(result);

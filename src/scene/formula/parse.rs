@@ -1,12 +1,12 @@
 //! From a text to a formula: by precedence, on bytes.
 
-use super::unit::{Dimension, find};
+use super::unit::{Dimension, Unit, find};
 use super::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant, LONGEST, Node, meant};
 
 /// How strongly a sign binds: more than `*`, less than `^`.
 const SIGN: u8 = 5;
 
-struct Parser<'a> {
+pub(super) struct Parser<'a> {
     text: &'a str,
     at: usize,
     depth: usize,
@@ -15,17 +15,7 @@ struct Parser<'a> {
 }
 
 pub(super) fn parse(text: &str, tables: &[Interpolant]) -> Result<Formula, FormulaError> {
-    let formula = Formula {
-        text: text.to_owned(),
-        nodes: Vec::new(),
-        constants: Vec::new(),
-        units: Vec::new(),
-        places: Vec::new(),
-        names: Vec::new(),
-        conditions: Vec::new(),
-        tables: Vec::new(),
-    };
-    let mut parser = Parser { text, at: 0, depth: 0, formula, tables };
+    let mut parser = Parser::new(text, tables);
     if text.len() > LONGEST {
         return Err(parser.error(0, 1, "the formula is too long", &format!("at most {LONGEST} bytes")));
     }
@@ -36,7 +26,21 @@ pub(super) fn parse(text: &str, tables: &[Interpolant]) -> Result<Formula, Formu
     }
 }
 
-impl Parser<'_> {
+impl<'a> Parser<'a> {
+    pub fn new(text: &'a str, tables: &'a [Interpolant]) -> Self {
+        let formula = Formula {
+            text: text.to_owned(),
+            nodes: Vec::new(),
+            constants: Vec::new(),
+            units: Vec::new(),
+            places: Vec::new(),
+            names: Vec::new(),
+            conditions: Vec::new(),
+            tables: Vec::new(),
+        };
+        Self { text, at: 0, depth: 0, formula, tables }
+    }
+
     fn error(&self, start: usize, end: usize, problem: &str, hint: &str) -> FormulaError {
         FormulaError::new(self.text, start, end, problem.to_owned(), hint.to_owned())
     }
@@ -159,7 +163,8 @@ impl Parser<'_> {
         }
     }
 
-    fn number(&mut self) -> Result<usize, FormulaError> {
+    /// The number that stands here, without its unit.
+    pub fn digits(&mut self) -> &'a str {
         let (bytes, start) = (self.text.as_bytes(), self.at);
         let digits =
             |from: usize| from + bytes[from..].iter().take_while(|byte| byte.is_ascii_digit()).count();
@@ -174,22 +179,38 @@ impl Parser<'_> {
             }
         }
         self.at = end;
-        let number = match self.text[start..end].parse::<f64>() {
+        &self.text[start..end]
+    }
+
+    fn number(&mut self) -> Result<usize, FormulaError> {
+        let start = self.at;
+        let digits = self.digits();
+        let end = self.at;
+        let number = match digits.parse::<f64>() {
             Ok(number) if number.is_finite() => number,
             Ok(_) => return Err(self.error(start, end, "this number is too large", "at most 1.7e308")),
             Err(_) => return Err(self.error(start, end, "this is no number", "for example 0.5 or 1e-3")),
         };
-        let Some((above, below, dimension)) = self.unit()? else {
+        let units = self.units()?;
+        let Some((&(first, power), others)) = units.split_first() else {
             return Ok(self.push(Node::Number(number), start, end));
         };
+        let (mut above, mut below) = (first.above.powi(power), first.below.powi(power));
+        let mut dimension = Dimension::NONE.times(first.dimension, f64::from(power));
+        for &(unit, power) in others {
+            let (more, less) = (unit.above.powi(power.abs()), unit.below.powi(power.abs()));
+            let (more, less) = if power > 0 { (more, less) } else { (less, more) };
+            (above, below) = (above * more, below * less);
+            dimension = dimension.times(unit.dimension, f64::from(power));
+        }
         let node = self.push(Node::Number(number * above / below), start, self.at);
         self.formula.units.push((node, dimension));
         Ok(node)
     }
 
-    /// The unit behind a number, as `mm`, `N*s/m` or `m/s^2`: what it is multiplied and divided by.
-    fn unit(&mut self) -> Result<Option<(f64, f64, Dimension)>, FormulaError> {
-        let Some(b'a'..=b'z' | b'A'..=b'Z') = self.peek() else { return Ok(None) };
+    /// The units behind a number, as in `mm`, `N*s/m` or `m/s^2`, with their powers.
+    pub fn units(&mut self) -> Result<Vec<(&'static Unit, i32)>, FormulaError> {
+        let Some(b'a'..=b'z' | b'A'..=b'Z') = self.peek() else { return Ok(Vec::new()) };
         let (word, end) = self.word();
         let Some(first) = find(word) else {
             let hint = meant(word, &super::unit::UNITS.iter().map(|unit| unit.name).collect::<Vec<_>>());
@@ -198,9 +219,7 @@ impl Parser<'_> {
             return Err(self.error(self.at, end, &problem, &hint));
         };
         self.at = end;
-        let power = self.power_of_unit();
-        let (mut above, mut below) = (first.above.powi(power), first.below.powi(power));
-        let mut dimension = Dimension::NONE.times(first.dimension, f64::from(power));
+        let mut units = vec![(first, self.power_of_unit())];
         loop {
             let before = self.at;
             let sign = match self.peek() {
@@ -216,13 +235,9 @@ impl Parser<'_> {
                 break;
             };
             self.at = end;
-            let power = self.power_of_unit();
-            let (more, less) = (unit.above.powi(power), unit.below.powi(power));
-            let (more, less) = if sign > 0 { (more, less) } else { (less, more) };
-            (above, below) = (above * more, below * less);
-            dimension = dimension.times(unit.dimension, f64::from(sign * power));
+            units.push((unit, sign * self.power_of_unit()));
         }
-        Ok(Some((above, below, dimension)))
+        Ok(units)
     }
 
     /// The letters that stand here, and where they end.

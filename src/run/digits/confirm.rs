@@ -1,0 +1,73 @@
+//! Whether a step of the series agrees with the equations inside it.
+//!
+//! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step begins and
+//! change within it, as `tanh(100*x)` does: the powers that would say so are not among those carried.  At a few
+//! times inside the step the motion is therefore expanded anew to its first powers, and their acceleration
+//! compared with that of the series; the step is shortened until they agree.  What rises and is flat again between
+//! these times is not seen.
+
+use super::motion::Motion;
+use crate::arithmetic::Scalar;
+use crate::arithmetic::digits::Digits;
+use crate::dynamics::Coordinates;
+use crate::dynamics::compile::exact::ExactMechanism;
+use crate::dynamics::series::Series;
+
+/// Times inside a step, in shares of it that are no multiples of one another.
+const SHARES: [f64; 4] = [0.234375, 0.515625, 0.796875, 1.0];
+/// Powers of the rates that are expanded there: the fewest there can be.
+const POWERS: usize = 2;
+/// log2 of the part of a step's tolerance that the accelerations may be off by, over the step and its order.
+const ALLOWED: f64 = 6.0;
+/// Shortenings at most; each by a third.
+const MOST: usize = 60;
+
+/// A series of few powers.
+#[derive(Clone)]
+pub struct Probe<const W: usize>(Series<Digits<W>>);
+
+impl<const W: usize> Probe<W> {
+    /// Of a mechanism with laws that may be flat.
+    pub fn of(mechanism: &ExactMechanism<Digits<W>>, coordinates: Coordinates) -> Option<Self> {
+        let is_needed = mechanism.forces.iter().any(|force| force.may_be_flat);
+        is_needed.then(|| Self(Series::of_terms(&mechanism.terms(), coordinates, POWERS)))
+    }
+}
+
+/// Of a step of so many seconds as much as the equations confirm.
+pub fn confirmed<const W: usize>(motion: &mut Motion<W>, mut step: f64) -> f64 {
+    let Some(mut probe) = motion.probe.take() else { return step };
+    for _ in 0..MOST {
+        if !step.is_finite() || SHARES.iter().all(|share| agrees(motion, &mut probe, step, share * step)) {
+            break;
+        }
+        step *= 0.65625;
+    }
+    motion.probe = Some(probe);
+    step
+}
+
+/// True where the acceleration of the series at a time after the state's is that of the equations there.
+fn agrees<const W: usize>(motion: &Motion<W>, probe: &mut Probe<W>, step: f64, after: f64) -> bool {
+    let h = Digits::of(after);
+    let there = motion.state_at(motion.state.t + h);
+    let f = there.u.len();
+    let zeros = vec![Digits::ZERO; f];
+    probe.0.expand_terms(&motion.mechanism.terms(), there.t, &there.u, &zeros, &there.rate);
+    let order = motion.precision.order;
+    let largest = |rates: &[Digits<W>]| {
+        rates.iter().map(Digits::log2).fold(0.0, |most: f64, size| if size > most { size } else { most })
+    };
+    let first = largest(&motion.series.rate[..f]);
+    let allowed = motion.precision.tolerance() + first + libm::log2(order as f64 / step) + ALLOWED;
+    (0..f).all(|c| {
+        let powers = motion.series.rate[c..].iter().step_by(f).enumerate().skip(1);
+        // A sum has the limbs of its shorter term: high powers are kept to few.
+        let full = |x: Digits<W>| x.shortened(motion.precision.limbs);
+        let slope =
+            powers.rev().fold(Digits::ZERO, |sum, (m, &power)| full(sum * h) + full(power).scale(m as f64));
+        let off = (probe.0.rate[f + c] - slope).log2();
+        // Where the equations have no finite answer the step is not judged.
+        off.is_nan() || off <= allowed
+    })
+}

@@ -1,0 +1,137 @@
+//! Formulas of time and state, which are kept as texts, and what they speak of.
+
+use super::{Cursor, Decimal, Reader};
+use crate::scene::error::SceneError;
+use crate::scene::formula::{Formula, Interpolant};
+use crate::scene::locate::Value;
+use crate::scene::{Load, LoadLaw, NamedPoint, Profile, Scene};
+
+/// The list a law stands in.
+fn list<C>(load: &Load<C>) -> &'static str {
+    match load {
+        Load::Force { .. } => "forces",
+        Load::Torque { .. } => "torques",
+        Load::Spring { .. } => "springs",
+        Load::TorsionSpring { .. } => "torsion_springs",
+        Load::Potential { .. } => "potentials",
+    }
+}
+
+impl<'a, C: Decimal> Reader<'a, C> {
+    /// The items of a list whose numbers are constant.
+    pub(super) fn plain_items(&self, of: &str) -> Vec<Cursor<'a>> {
+        let is_law = |at: &Cursor| {
+            let mut laws = self.plain.laws.iter().filter(|law| list(&law.load) == of);
+            laws.any(|law| crate::scene::set::name(at.node) == Some(&law.name))
+        };
+        self.root.items(of).into_iter().filter(|at| !is_law(at)).collect()
+    }
+
+    /// Named points.
+    pub(super) fn points(&self, plain: &Scene) -> Result<Vec<NamedPoint<C>>, SceneError> {
+        let items = self.root.items("points");
+        let point = |(at, plain): (&Cursor, &NamedPoint)| {
+            Ok(NamedPoint { name: plain.name.clone(), place: self.place(at, &plain.place)? })
+        };
+        items.iter().zip(&plain.points).map(point).collect()
+    }
+
+    /// Forces, torques, springs and potentials by formulas, without the torques of integrals.
+    pub(super) fn laws(&self, plain: &Scene) -> Result<Vec<LoadLaw<C>>, SceneError> {
+        plain.acting_laws().map(|law| self.load(law)).collect()
+    }
+
+    fn load(&self, LoadLaw { name, load }: &LoadLaw) -> Result<LoadLaw<C>, SceneError> {
+        let items = self.root.items(list(load));
+        let at = items.iter().find(|at| crate::scene::set::name(at.node) == Some(name)).unwrap_or(&self.root);
+        let text = |key: &str, plain: &str| self.formula(at, key, plain);
+        let if_any =
+            |key: &str, plain: &Option<String>| plain.as_ref().map(|plain| text(key, plain)).transpose();
+        let load = match load {
+            Load::Force { bar, point, force: [x, y], follows } => Load::Force {
+                bar: *bar,
+                point: self.pair(at, "point", *point)?,
+                force: {
+                    let components = at.items("force");
+                    let component = |k: usize, plain: &str| match components.get(k) {
+                        Some(at) => self.formula_at(at, plain),
+                        None => Ok(plain.to_owned()),
+                    };
+                    [component(0, x)?, component(1, y)?]
+                },
+                follows: *follows,
+            },
+            Load::Torque { bar, relative_to, torque } => {
+                Load::Torque { bar: *bar, relative_to: *relative_to, torque: text("torque", torque)? }
+            }
+            Load::Spring { between, potential, tension } => Load::Spring {
+                between: self.between(at, between)?,
+                potential: if_any("potential", potential)?,
+                tension: if_any("tension", tension)?,
+            },
+            Load::TorsionSpring { bar, relative_to, potential, torque } => Load::TorsionSpring {
+                bar: *bar,
+                relative_to: *relative_to,
+                potential: if_any("potential", potential)?,
+                torque: if_any("torque", torque)?,
+            },
+            Load::Potential { energy } => Load::Potential { energy: text("energy", energy)? },
+        };
+        Ok(LoadLaw { name: name.clone(), load })
+    }
+
+    fn formula(&self, at: &Cursor, key: &str, plain: &str) -> Result<String, SceneError> {
+        at.child(key).map_or_else(|| Ok(plain.to_owned()), |at| self.formula_at(&at, plain))
+    }
+
+    /// The text of a formula, which must be smooth; a number by all its digits.
+    fn formula_at(&self, at: &Cursor, plain: &str) -> Result<String, SceneError> {
+        if let Value::Number(value) = at.node.value {
+            return Ok(format!("{:?}", self.literal(at.node, value)));
+        }
+        self.smooth(at, plain)?;
+        Ok(plain.to_owned())
+    }
+
+    /// A formula without corners and tables.
+    pub(super) fn smooth(&self, at: &Cursor, text: &str) -> Result<Formula, SceneError> {
+        let tables = &self.plain.tables;
+        let tables: Vec<_> =
+            tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
+        match Formula::parse_with(text, &tables) {
+            Ok(formula) if formula.conditions() == 0 => Ok(formula),
+            Ok(_) => {
+                Err(self
+                    .refuse_part(at, "its formula has corners or tables, across which there is no series"))
+            }
+            Err(error) => {
+                Err(self.refuse(at, &format!("is no formula: {}", error.problem), "give a formula"))
+            }
+        }
+    }
+
+    /// Refuses signals and integrals with corners or tables.
+    pub(super) fn refuse_corners(&self) -> Result<(), SceneError> {
+        for key in ["signals", "integrals"] {
+            let Some(holder) = self.root.child(key) else { continue };
+            let Value::Object(members) = &holder.node.value else { continue };
+            for member in members {
+                if let (Value::Text(text), Some(at)) = (&member.node.value, holder.child(&member.key)) {
+                    self.smooth(&at, text)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A law of time.
+    pub(super) fn profile(&self, at: &Cursor, text: &str) -> Result<Profile<C>, SceneError> {
+        let formula = self.smooth(at, text)?;
+        let value = |name: &str| {
+            let known = self.parameters.iter().find(|known| known.0 == name);
+            known.map(|known| known.1)
+        };
+        let values: Vec<Option<C>> = formula.names().map(value).collect();
+        Ok(Profile::recorded(&formula, &values, &[]))
+    }
+}
