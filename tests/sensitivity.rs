@@ -314,7 +314,7 @@ fn numbers_that_are_zero_but_for_rounding_have_the_derivatives_of_zero() {
     for (zero, tiny) in zero.measures.iter().zip(&tiny.measures) {
         assert_near(tiny.slopes[0], zero.slopes[0], 1e-10, "beside zero");
     }
-    // A rate of the law that the start contradicts as soon as it is more than rounding.
+    // How fast a rail is travelled changes no angle: a frame that moves steadily is as good as any.
     let driven = template(
         r#"{"name": "driven", "gravity": [9.81, 0],
             "bars": [{"name": "b", "mass": 0.56, "centre": [0.52, 0], "inertia": 0.031, "length": 1.08}],
@@ -325,17 +325,9 @@ fn numbers_that_are_zero_but_for_rounding_have_the_derivatives_of_zero() {
                         "law": {"start": 0.06, "rate": -1.7e-17, "sines": [{"amplitude": 0.08, "frequency": 3.6, "phase": 1.5707963267948966}]}}],
             "start": {"b": {"phi": -1.96, "omega": 0, "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#,
     );
-    let request = SensitivityRequest {
-        of: vec!["b.phi".parse().expect("a measure")],
-        to: vec!["motors.drive.law.rate".into()],
-        at: Some(1.0),
-        ..SensitivityRequest::default()
-    };
-    match sensitivity(&driven, &request, &mut || false) {
-        Ok(found) => panic!("{:?}", found.measures),
-        Err(error) => {
-            assert!(error.to_string().contains("no derivative by motors.drive.law.rate"), "{error}")
-        }
+    let found = derived(&driven, &["b.phi", "b.omega"], &["motors.drive.law.rate"], 1.0);
+    for measured in &found.measures {
+        assert!(measured.slopes[0].abs() < 1e-11, "{:e}", measured.slopes[0]);
     }
 }
 

@@ -32,6 +32,8 @@ const ROUNDING: f64 = 4e-16;
 const NEAR_ZERO: f64 = 1e-3;
 /// Numbers below are zero but for rounding: what they do over themselves says nothing.
 const ROUNDED: f64 = 1e-12;
+/// Groups of values of the start: coordinates and rates.
+const STARTS: usize = 2;
 /// Offsets and weights: on both sides, and on one.
 const BOTH: [[f64; 2]; 4] = [[-2.0, 1.0 / 12.0], [-1.0, -2.0 / 3.0], [1.0, 2.0 / 3.0], [2.0, -1.0 / 12.0]];
 const ONE: [[f64; 2]; 5] = [[0.0, -25.0 / 12.0], [1.0, 4.0], [2.0, -3.0], [3.0, 4.0 / 3.0], [4.0, -0.25]];
@@ -306,8 +308,7 @@ impl Search<'_> {
             for (group, values) in self.values(candidate).into_iter().enumerate() {
                 if slopes.len() == group {
                     slopes.push(vec![0.0; values.len()]);
-                    // A start at rest is the difference of rates that are not small, and rounded as those.
-                    sizes.push([1.0, 1.0 / self.base.0.units.time].get(group).copied().unwrap_or(0.0));
+                    sizes.push(self.least_size(group));
                 }
                 for (slope, value) in slopes[group].iter_mut().zip(&values) {
                     *slope += weight * value;
@@ -318,6 +319,18 @@ impl Search<'_> {
         (slopes, sizes)
     }
 
+    /// The size that values of a group have at least: a start at rest and a constraint that is met are
+    /// differences of numbers that are not small, and rounded as those.
+    fn least_size(&self, group: usize) -> f64 {
+        let units = self.base.0.units;
+        let (place, rate) = (units.length.min(1.0), 1.0 / units.time);
+        match group.checked_sub(STARTS) {
+            None => [1.0, rate][group],
+            Some(rest) => [0.0, place, place * rate, place][rest % 4],
+        }
+    }
+
+    /// The start in [`STARTS`] groups; then for each state accelerations, constraints, their rates and gaps.
     fn values(&self, candidate: &Candidate) -> Vec<Vec<f64>> {
         let n = self.base.0.coordinates();
         let Candidate { mechanism, start } = candidate;
