@@ -240,7 +240,7 @@ fn a_run_goes_on_to_the_last_bit() {
             begun
                 .row(3, &mut || {
                     steps += 1;
-                    steps == 9
+                    steps == 2
                 })
                 .expect("no stop")
                 .is_none()
