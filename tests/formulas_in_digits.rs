@@ -1,6 +1,6 @@
 //! Formulas of time and state in many digits, against closed forms in integer arithmetic of another crate.
 
-use crate::many_digits::{cosine, fixed, last, near, number, one, source, text, times};
+use crate::many_digits::{cosine, fixed, last, mean, near, number, one, pi, source, text, times};
 use num_bigint::BigInt;
 
 /// A rotor of moment of inertia 0.7 kg m² and what acts on it.
@@ -59,21 +59,11 @@ fn a_linear_oscillator_by_formulas_follows_its_cosine_to_eighty_digits() {
 #[test]
 fn a_cubic_spring_returns_after_its_lemniscatic_period() {
     let coil = r#""torsion_springs": [{"name": "coil", "body": "rotor", "potential": "0.175*angle^4"}]"#;
-    let (mut a, mut b) = (root(&(one() * 2)), one());
-    for _ in 0..12 {
-        (a, b) = ((&a + &b) / 2, (&a * &b).sqrt());
-    }
-    let arctan = |k: u32| {
-        let (mut power, mut sum) = (one() / k, BigInt::ZERO);
-        for i in 0..160_u32 {
-            let term = &power / (2 * i + 1);
-            sum = if i % 2 == 0 { sum + term } else { sum - term };
-            power /= k * k;
-        }
-        sum
-    };
-    let pi = arctan(5) * 16 - arctan(239) * 4;
-    let period = times(&times(&(pi * 2), &root(&(one() * 2))), &inverse(&times(&fixed("0.9"), &a)));
+    let diagonal = root(&(one() * 2));
+    let period = times(
+        &times(&(pi() * 2), &diagonal),
+        &inverse(&times(&fixed("0.9"), &mean(diagonal.clone(), one()))),
+    );
     let period = text(&period);
     let row = last(&source(&rotor(coil, "0.9", "0"), &[], &period, &period), 70);
     near(&number(row.bodies[0][0]), &fixed("0.9"), 66);

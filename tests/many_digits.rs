@@ -84,6 +84,28 @@ pub fn cosine(x: &BigInt) -> BigInt {
     sum
 }
 
+/// π by J. Machin.
+pub fn pi() -> BigInt {
+    let arctan = |k: u32| {
+        let (mut power, mut sum) = (one() / k, BigInt::ZERO);
+        for i in 0..160_u32 {
+            let term = &power / (2 * i + 1);
+            sum = if i % 2 == 0 { sum + term } else { sum - term };
+            power /= k * k;
+        }
+        sum
+    };
+    arctan(5) * 16 - arctan(239) * 4
+}
+
+/// The arithmetic-geometric mean.
+pub fn mean(mut a: BigInt, mut b: BigInt) -> BigInt {
+    for _ in 0..12 {
+        (a, b) = ((&a + &b) / 2, (&a * &b).sqrt());
+    }
+    a
+}
+
 #[track_caller]
 pub fn near(found: &BigInt, expected: &BigInt, digits: u32) {
     let off = found - expected;
@@ -126,23 +148,8 @@ fn a_pendulum_returns_after_its_elliptic_period() {
      "bars": [{"name": "bar", "mass": 0.37, "centre": [0.7, 0], "inertia": 0, "length": 1}],
      "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
      "start": {"bar": {"phi": 2.2, "omega": 0}}, "until": 3, "every": 3}"#;
-    let (mut a, mut b) = (one(), cosine(&fixed("1.1")));
-    for _ in 0..12 {
-        (a, b) = ((&a + &b) / 2, (&a * &b).sqrt());
-    }
-    // π by J. Machin.
-    let arctan = |k: u32| {
-        let (mut power, mut sum) = (one() / k, BigInt::ZERO);
-        for i in 0..160_u32 {
-            let term = &power / (2 * i + 1);
-            sum = if i % 2 == 0 { sum + term } else { sum - term };
-            power /= k * k;
-        }
-        sum
-    };
-    let pi = arctan(5) * 16 - arctan(239) * 4;
     let root = (fixed("0.7") * one() * one() / fixed("9.81")).sqrt();
-    let period = times(&(pi * 2), &root) * one() / a;
+    let period = times(&(pi() * 2), &root) * one() / mean(one(), cosine(&fixed("1.1")));
     let period = text(&period);
     let row = last(&source(pendulum, &[], &period, &period), 70);
     near(&number(row.bodies[0][0]), &fixed("2.2"), 66);

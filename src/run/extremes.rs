@@ -118,7 +118,7 @@ pub(super) struct ExtremesMemory {
     found: Vec<Found>,
     /// Steps that are not tried to be passed over, as one before them was not.
     waits: u8,
-    /// True where the lower degree was enough for the last step that was passed over.
+    /// True where the lower degree was enough for the last step that was tried.
     is_short: bool,
 }
 

@@ -6,9 +6,10 @@
 //! ```
 //!
 //! So no term of a sum has a sign or a place of its own: a column is a loop over limbs one after another in
-//! memory, added up in two sums of 128 bits, and the sums of V are differences of sums from the first power on.  A sum of
-//! total power M contributes (step/U)^M to a step, and is formed from so many limbs of its factors as that
-//! leaves; columns below those are left out.  A power larger than there is room for makes the room larger.
+//! memory, added up in two sums of 128 bits, and the sums of V are differences of sums from the first power
+//! on.  A sum of total power M contributes (step/U)^M to a step, and is formed from so many limbs of its
+//! factors as that leaves; columns below those are left out.  A power larger than there is room for makes the
+//! room larger.
 
 use super::{Digits, Kind, Scalar, sum_of_products};
 use std::ops::RangeInclusive;

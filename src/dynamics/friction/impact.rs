@@ -90,7 +90,7 @@ impl Mechanism {
     /// Rates \[rad/s, m/s\] without those along the normals of the contacts that are held, which impulses of
     /// their walls take off with the friction of those that slide; `None` where there are no such impulses.
     ///
-    /// They may pull: see `rest` in the room `run`.
+    /// They may pull: see `run/contact/rest.rs`.
     pub(crate) fn without_normal_rates(&self, t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<f64>> {
         let metric = Metric::at(self, t, phi, omega)?;
         let (before, z) = (metric.velocity(omega), self.elements(phi));

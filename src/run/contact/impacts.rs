@@ -16,6 +16,16 @@ use crate::stabilization::projection::project;
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
 
+impl Outcome {
+    /// Counts an impact, and keeps what it was among the first ones.
+    pub(super) fn record_impact(&mut self, impact: impl FnOnce() -> ImpactRecord) {
+        self.impact_count += 1;
+        if self.impacts.len() < KEPT {
+            self.impacts.push(impact());
+        }
+    }
+}
+
 impl ContactDriver {
     /// Strikes every point that touches a wall and moves into it, then holds those that stay.
     pub(in crate::run) fn meet(&mut self, outcome: &mut Outcome) -> Result<(), StepError> {
@@ -100,17 +110,10 @@ impl ContactDriver {
             return self.impact_at_several(&touching, outcome);
         }
         // Letting others go may have moved it by rounding.
-        let last = self.motion();
-        let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
-        motion.omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
-        motion.work = motion.work + impact.motor_work;
-        self.driver.jump(&motion);
-        let change = self.sampler.balance(&motion) - before;
-        self.sampler.shift(change);
+        let (last, after, energy_lost) = self.jump_to(&impact.omega, impact.motor_work);
         let Impact { impulse, tangential, .. } = impact;
-        let claim = Claim { contact, impulse, tangential, energy_lost: -change.hi };
+        let claim = Claim { contact, impulse, tangential, energy_lost };
         let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
-        let after = self.motion();
         if let Err(what) = impact_monitor::check(&striking, tolerance, &last, &after, &claim) {
             let (cause, what) =
                 (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
@@ -119,34 +122,45 @@ impl ContactDriver {
                 ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor")
             });
         }
-        if let Some(jumps) = &self.jumps {
-            jumps.push(Jump {
-                contact: Some(contact),
-                switch: None,
-                before: last,
-                after,
-                mechanism: Arc::clone(&self.mechanism),
-            });
-        }
-        outcome.impact_loss -= change.hi;
+        let t = last.time.hi;
+        self.tell_impact(Some(contact), last, after);
+        outcome.impact_loss += energy_lost;
         // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off
         // it, and is no impact.
         let contact_speed = self.free.contacts[contact].length / self.free.units.time;
         if -impact.approach <= NO_SPEED * contact_speed {
             return Ok(-impact.approach);
         }
-        outcome.impact_count += 1;
-        if outcome.impacts.len() < KEPT {
-            outcome.impacts.push(ImpactRecord {
-                t: motion.time.hi,
-                wall: self.name(contact).into(),
-                impulse: impact.impulse,
-                friction_impulse: impact.tangential,
-                approach: impact.approach,
-                energy_lost: -change.hi,
-            });
-        }
+        outcome.record_impact(|| ImpactRecord {
+            t,
+            wall: self.name(contact).into(),
+            impulse,
+            friction_impulse: tangential,
+            approach: impact.approach,
+            energy_lost,
+        });
         Ok(-impact.approach)
+    }
+
+    /// Gives the motion these rates \[rad/s, m/s\], with this impulsive work of motors \[J\]: the motion on both
+    /// sides, and the energy lost \[J\].
+    pub(super) fn jump_to(&mut self, omega: &[f64], motor_work: f64) -> (Motion, Motion, f64) {
+        let last = self.motion();
+        let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
+        motion.omega = omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
+        motion.work = motion.work + motor_work;
+        self.driver.jump(&motion);
+        let change = self.sampler.balance(&motion) - before;
+        self.sampler.shift(change);
+        (last, self.motion(), -change.hi)
+    }
+
+    /// Tells of an impact where somebody asks.
+    pub(super) fn tell_impact(&self, contact: Option<usize>, before: Motion, after: Motion) {
+        if let Some(jumps) = &self.jumps {
+            let mechanism = Arc::clone(&self.mechanism);
+            jumps.push(Jump { contact, switch: None, before, after, mechanism });
+        }
     }
 
     /// Holds the points that touch and stay, and lets the others go; `struck` touches, wherever a projection

@@ -3,13 +3,11 @@
 use super::super::impact_monitor;
 use super::super::running::Outcome;
 use super::impacts::Posture;
-use super::{ContactDriver, ImpactRecord, Jump, KEPT, NO_SPEED, in_modes};
-use crate::arithmetic::DoubleDouble;
+use super::{ContactDriver, ImpactRecord, NO_SPEED, in_modes};
 use crate::dynamics::Mechanism;
 use crate::dynamics::friction::Mode;
 use crate::dynamics::impact::Impact;
 use crate::stepping::{Cause, StepError};
-use std::sync::Arc;
 
 impl ContactDriver {
     /// The walls whose points touch at the impact of one of them.
@@ -62,47 +60,29 @@ impl ContactDriver {
                 format!("no impulses fit the laws of impact and friction at walls {}", self.names(contacts));
             return Err(self.paradox(outcome, what));
         };
-        let last = self.motion();
-        let (mut motion, before) = (last.clone(), self.sampler.balance(&last));
-        motion.omega = impacts.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
-        motion.work = motion.work + impacts.motor_work;
-        self.driver.jump(&motion);
-        let change = self.sampler.balance(&motion) - before;
-        self.sampler.shift(change);
+        let (last, after, energy_lost) = self.jump_to(&impacts.omega, impacts.motor_work);
         let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
-        let after = self.motion();
         let checked =
-            impact_monitor::check_several(&striking, tolerance, [&last, &after], &impacts.blows, -change.hi);
+            impact_monitor::check_several(&striking, tolerance, [&last, &after], &impacts.blows, energy_lost);
         if let Err(what) = checked {
             let what = format!("impact at walls {}: {what}", self.names(contacts));
             let stop = self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method dp8");
             return Err(StepError { cause: Cause::ImpactCheckFailed, ..stop });
         }
-        if let Some(jumps) = &self.jumps {
-            let mechanism = Arc::clone(&self.mechanism);
-            jumps.push(Jump {
-                contact: contacts.first().copied(),
-                switch: None,
-                before: last,
-                after,
-                mechanism,
-            });
-        }
-        outcome.impact_loss -= change.hi;
+        let t = last.time.hi;
+        self.tell_impact(contacts.first().copied(), last, after);
+        outcome.impact_loss += energy_lost;
         let mut hardest = 0.0_f64;
         for blow in &impacts.blows {
             hardest = hardest.max(-blow.normal_rates[0]);
-            outcome.impact_count += 1;
-            if outcome.impacts.len() < KEPT {
-                outcome.impacts.push(ImpactRecord {
-                    t: motion.time.hi,
-                    wall: self.name(blow.contact).into(),
-                    impulse: blow.impulse,
-                    friction_impulse: blow.tangential,
-                    approach: blow.normal_rates[0],
-                    energy_lost: blow.energy_lost(),
-                });
-            }
+            outcome.record_impact(|| ImpactRecord {
+                t,
+                wall: self.name(blow.contact).into(),
+                impulse: blow.impulse,
+                friction_impulse: blow.tangential,
+                approach: blow.normal_rates[0],
+                energy_lost: blow.energy_lost(),
+            });
         }
         Ok(hardest)
     }

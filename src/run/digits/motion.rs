@@ -382,7 +382,7 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Coordinates, rates and the work done since the state's time at a time after that.
-    pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
+    fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
         let f = self.state.u.len();
         let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
         let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;

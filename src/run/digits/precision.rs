@@ -10,9 +10,9 @@ pub(super) const BITS: f64 = std::f64::consts::LOG2_10;
 const SPARE: usize = 28;
 /// Highest power of the rates a digit: it makes the work least where an order costs its square.
 const ORDER: f64 = 1.15;
-/// Powers beyond that, as part of what one costs does not grow with their number: with 20 instead of 4 runs take
-/// 0.66 to 0.9 of the time up to 40 digits, and as long from 100 on.
-const MORE: usize = 20;
+/// Powers beyond that, as part of what one costs does not grow with their number: with 20 instead of 4 runs
+/// take 0.66 to 0.9 of the time up to 40 digits, and as long from 100 on.
+const LEAST_ORDER: usize = 20;
 
 /// Digits, and the order of the series that serves them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -30,7 +30,7 @@ pub struct Precision {
 impl Precision {
     /// Of so many digits; `has_loops`: with as many digits more as passages near singular positions lose.
     pub fn new(digits: usize, has_loops: bool) -> Self {
-        let order = (ORDER * digits as f64) as usize + MORE;
+        let order = (ORDER * digits as f64) as usize + LEAST_ORDER;
         let spare = if has_loops { (0.5 * BITS * digits as f64) as usize + 96 } else { SPARE };
         let bits = libm::ceil(BITS * digits as f64) as usize + spare;
         let limbs = limbs_for(digits, spare).min(MOST - 1);
