@@ -10,7 +10,7 @@ mod rest;
 mod several;
 use super::build::build;
 use super::driver::{Driver, DriverState, Halt, Pause, Watch};
-use super::event::{EventDetector, Memory, SwitchFunction};
+use super::event::{EventDetector, EventMemory, SwitchFunction};
 use super::extremes::{ExtremesDetector, ExtremesMemory};
 use super::flip::FlipDetector;
 use super::impact_monitor;
@@ -149,7 +149,7 @@ pub(super) struct ContactDriverState {
     /// Parameters of the scene's laws, and the branches they are on.
     laws: Option<(Vec<f64>, Vec<bool>)>,
     /// What the detector of events remembers, where there is one.
-    events: Option<Memory>,
+    events: Option<EventMemory>,
     /// What is known of the extremes of outputs, where there are any.
     extremes: Option<ExtremesMemory>,
 }
@@ -180,7 +180,7 @@ pub(super) struct ContactDriver {
     /// Looks for events from outside, where there are any.
     pub(super) events: Option<EventDetector>,
     /// What such a detector remembered, until there is one again.
-    remembered: Option<Memory>,
+    remembered: Option<EventMemory>,
     /// Looks for the extremes of outputs, where there are any.
     pub(super) extremes: Option<ExtremesDetector>,
     /// How often an event has changed the motion, the parts that act or the branches of laws.

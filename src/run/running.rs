@@ -2,17 +2,18 @@
 //! go on elsewhere.
 
 mod outcome;
+mod prepared;
 mod snapshot;
 mod stops;
 
 pub use self::outcome::{Outcome, RunError};
+pub use self::prepared::Run;
 pub use self::snapshot::{ResumeError, Snapshot};
 use self::stops::{advised, came_apart, drift_stop, not_finite, uncounted};
-use super::build::build;
 use super::clock::{Clock, still};
 use super::contact::ContactDriver;
 use super::drift::{Drift, Limits};
-use super::driver::{Driver, Pause};
+use super::driver::Pause;
 use super::event::{Event, EventDetector};
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
@@ -20,90 +21,13 @@ use super::inside::{Observer, ObserverAdapter, StepsOf};
 use super::monitor::Monitor;
 use super::plan::{Plan, Request};
 use super::sample::Sample;
-use super::trust::{ErrorEstimator, Level};
+use super::trust::ErrorEstimator;
 use super::turns::Turns;
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use crate::stepping::{Statistics, StepError};
 use std::cell::{Cell, RefCell};
 use std::sync::Arc;
-
-/// A run about to begin.
-pub struct Run {
-    mechanism: Arc<Mechanism>,
-    plan: Plan,
-    limits: Limits,
-    driver: Box<dyn Driver>,
-    turns: Turns,
-    /// For runs of an ensemble, which look for bars that turn over and keep no samples: whether they end with
-    /// the first.
-    ensemble: Option<bool>,
-    error_estimator: Option<ErrorEstimator>,
-    events: Vec<Box<dyn Event>>,
-    clock: Clock,
-    begun: Motion,
-}
-
-impl Run {
-    /// Prepares a run from a motion.
-    ///
-    /// # Errors
-    /// A method that cannot begin there.
-    pub fn new(
-        mechanism: Arc<Mechanism>,
-        mut plan: Plan,
-        limits: Limits,
-        start: &Motion,
-    ) -> Result<Self, StepError> {
-        let mut driver = build(&mechanism, &mut plan, start)?;
-        driver.allow(plan.max_evaluations);
-        let turns = Turns::new(&mechanism, &plan, start);
-        Ok(Self {
-            mechanism,
-            plan,
-            limits,
-            driver,
-            turns,
-            ensemble: None,
-            error_estimator: None,
-            events: Vec::new(),
-            clock: still,
-            begun: start.clone(),
-        })
-    }
-
-    /// The same, accompanied by an estimate of its error; `start` is the motion it begins with.
-    ///
-    /// Nothing of the run itself changes by it, to the last bit.
-    #[must_use]
-    pub fn trusted(self, level: Level, start: &Motion) -> Self {
-        let error_estimator =
-            (level != Level::Off).then(|| ErrorEstimator::new(&self.mechanism, &self.plan, start, level));
-        Self { error_estimator, ..self }
-    }
-
-    /// The same, timed by a clock: see [`Outcome::wall`].
-    #[must_use]
-    pub fn timed(self, clock: Clock) -> Self {
-        Self { clock, ..self }
-    }
-
-    /// The same with events; where one changes the run, the estimate of its error ends.
-    #[must_use]
-    pub fn with_events(self, events: Vec<Box<dyn Event>>) -> Self {
-        Self { events, ..self }
-    }
-
-    /// The same as one of many: looks for the first bar that turns over, and without samples for charts.
-    pub(super) fn of_ensemble(self, ends_at_flip: bool) -> Self {
-        Self { ensemble: Some(ends_at_flip), ..self }
-    }
-
-    /// The plan as it will be carried out.
-    pub fn plan(&self) -> &Plan {
-        &self.plan
-    }
-}
 
 /// A scene from its start to its horizon in one call: compiles, plans, integrates.
 ///

@@ -5,10 +5,14 @@
 //! `spring.stiffness` is `springs.spring.stiffness`.  A path is judged against the tables of `format.rs` and
 //! the scene's own text once; values are judged when they are filled in.
 
+mod walk;
+
+pub(super) use walk::Walk;
+
 use super::error::SceneError;
-use super::format::{Field, LAW, SCENE, START, Shape, Table, UNIFORM_BAR, kind};
-use super::locate::{Node, Value, push_index, push_key};
-use super::read::{listed, nearest, parse_scene, put_together, read_text, source_name};
+use super::format::{LAW, SCENE, START};
+use super::locate::{Node, Value};
+use super::read::{parse_scene, put_together, read_text, source_name};
 use super::set::{Override, SEVERAL, Step, hint, name, steps};
 use super::{Output, Scene};
 use std::path::Path;
@@ -240,144 +244,6 @@ pub(super) fn is_number(path: &str, tree: &Node) -> bool {
 fn member<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
     let Value::Object(members) = &node.value else { return None };
     members.iter().find(|member| member.key == key).map(|member| &member.node)
-}
-
-/// Follows a path through the format's tables and the scene's tree side by side.
-pub(super) struct Walk<'a> {
-    pub tree: &'a Node,
-}
-
-impl Walk<'_> {
-    /// The unit of the number at the end of a path; else what is wrong and a hint.
-    pub fn unit(&self, path: &str) -> Result<&'static str, (String, String)> {
-        let steps = steps(path).ok_or_else(|| {
-            ("it is not a path".to_owned(), "keys, names and [indices] joined by dots".to_owned())
-        })?;
-        let mut steps = steps.into_iter().peekable();
-        let (mut table, mut node, mut walked): (&'static Table, Option<&Node>, String) =
-            (&SCENE, Some(self.tree), String::new());
-        loop {
-            let Some(Step::Key(key)) = steps.next() else { return Err(no_number(&walked, table)) };
-            let Some(field) = table.field(key) else {
-                let keys: Vec<&str> = table.fields.iter().map(|field| field.name).collect();
-                return Err((format!("{} has no `{key}`", table.title), hint(key, &keys)));
-            };
-            push_key(&mut walked, key);
-            node = node.and_then(|node| member(node, key));
-            // What holds a number must be in the scene, as for an override; the number itself may be left to
-            // its default.
-            if node.is_none() && steps.peek().is_some() {
-                return Err((
-                    format!("{walked} is not in the scene"),
-                    "a part of the start that is found or that a motor gives cannot be varied; else add it to the file".into(),
-                ));
-            }
-            match (&field.shape, steps.peek()) {
-                (Shape::Number(quantity) | Shape::LawNumber(quantity) | Shape::Inertia(quantity), None) => {
-                    return Ok(quantity.unit);
-                }
-                (Shape::Parameters, Some(Step::Key(name))) => {
-                    element_by_key(node, name, &mut walked)?;
-                    steps.next();
-                    return if steps.next().is_none() { Ok("") } else { Err(no_number(&walked, table)) };
-                }
-                (Shape::Pair(quantity) | Shape::LawPair(quantity), Some(Step::Index(0 | 1))) => {
-                    steps.next();
-                    return if steps.next().is_none() {
-                        Ok(quantity.unit)
-                    } else {
-                        Err(no_number(&walked, table))
-                    };
-                }
-                (Shape::Object(inner) | Shape::Law(inner, _), Some(_)) => table = inner,
-                (Shape::ByBar(inner), Some(Step::Key(bar))) => {
-                    node = element_by_key(node, bar, &mut walked)?;
-                    steps.next();
-                    table = inner;
-                }
-                (Shape::List { of, .. }, Some(step)) => {
-                    node = element(node, step, &mut walked)?;
-                    steps.next();
-                    table =
-                        kind(of, |key| node.is_some_and(|node| member(node, key).is_some())).unwrap_or(table);
-                }
-                (Shape::Between, Some(step)) => {
-                    node = element(node, step, &mut walked)?;
-                    steps.next();
-                    table = &super::format::PLACE;
-                }
-                _ => return Err(example(&walked, field)),
-            }
-        }
-    }
-}
-
-fn no_number(walked: &str, table: &Table) -> (String, String) {
-    (format!("{walked} is {}, not a number", table.title), format!("go on with one of {}", table.keys()))
-}
-
-/// What is wrong with a path that ends too early or too late at a field.
-fn example(walked: &str, field: &Field) -> (String, String) {
-    let hint = match &field.shape {
-        Shape::Pair(_) | Shape::LawPair(_) => format!("{walked}[0] or {walked}[1]"),
-        Shape::Object(table) | Shape::Law(table, _) | Shape::ByBar(table) => {
-            format!("go on, in the end with one of {}", table.keys())
-        }
-        Shape::List { of, .. } => {
-            format!("go on with the name of one, then one of {}", of.first().unwrap_or(&&UNIFORM_BAR).keys())
-        }
-        shape => format!("it {}", shape.allowed()),
-    };
-    (format!("{walked} is not a single number"), hint)
-}
-
-/// An element of a list by name or index.
-fn element<'a>(
-    node: Option<&'a Node>,
-    step: &Step,
-    walked: &mut String,
-) -> Result<Option<&'a Node>, (String, String)> {
-    let Some(Value::List(nodes)) = node.map(|node| &node.value) else { return Ok(None) };
-    let names: Vec<&str> = nodes.iter().filter_map(name).collect();
-    let found = match step {
-        Step::Index(index) => nodes.get(*index),
-        Step::Key(key) => nodes.iter().find(|node| name(node) == Some(key)),
-    };
-    if found.is_none() {
-        let (what, hint) = match step {
-            Step::Index(index) => {
-                (format!("[{index}]"), format!("indices count from 0; there are {}", nodes.len()))
-            }
-            Step::Key(key) => (format!(" `{key}`"), hint(key, &names)),
-        };
-        return Err((format!("{walked} has no{what}"), hint));
-    }
-    match step {
-        Step::Index(index) => push_index(walked, *index),
-        Step::Key(key) => push_key(walked, key),
-    }
-    Ok(found)
-}
-
-/// The start of a bar.
-fn element_by_key<'a>(
-    node: Option<&'a Node>,
-    bar: &str,
-    walked: &mut String,
-) -> Result<Option<&'a Node>, (String, String)> {
-    let Some(Value::Object(members)) = node.map(|node| &node.value) else { return Ok(None) };
-    let Some(found) = members.iter().find(|member| member.key == bar) else {
-        let known: Vec<&str> = members.iter().map(|member| member.key.as_str()).collect();
-        let hint = match nearest(bar, known.iter().copied()) {
-            Some(near) => format!("did you mean `{near}`?"),
-            None => {
-                format!("there are: {}; a bar that a motor drives starts as its law says", listed(&known))
-            }
-        };
-        return Err((format!("{walked} has no `{bar}`"), hint));
-    };
-    push_key(walked, bar);
-    Ok(Some(&found.node))
 }
 
 #[cfg(test)]

@@ -1,8 +1,9 @@
 //! Degrees of freedom, and rows that say nothing new: everywhere, or at the start alone.
 
+use super::guess::shuffled;
 use super::newton::{KEPT, Problem};
 use super::svd::{Matrix, independent};
-use super::{Assembly, DENSE, DEPENDENT, shuffled};
+use super::{Assembly, DENSE, DEPENDENT};
 use crate::arithmetic::{DoubleDouble, Scalar};
 
 /// As [`DEPENDENT`], near a singular position, where rows that are met to [`KEPT`] leave angles open by its

@@ -24,6 +24,7 @@
 //! # }
 //! ```
 
+mod execute;
 mod grid;
 mod judge;
 mod point;
@@ -32,11 +33,14 @@ mod shard;
 pub mod table;
 #[cfg(feature = "threads")]
 mod threads;
+mod totals;
 
+pub use execute::{PointObserver, sweep, sweep_on};
 pub use grid::{Grid, Vary, VaryError};
 pub use judge::PointTrust;
 pub use point::{Point, Status};
 pub use shard::Shard;
+pub use totals::Totals;
 
 use super::drift::Limits;
 use super::methods::MethodId;
@@ -47,8 +51,7 @@ use crate::scene::{Scene, SceneError, Template, Variable};
 use crate::stepping::taylor::batch::Batch;
 use std::ops::Range;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Times at which drift is looked at where no output interval was asked for.
 const LOOKS: f64 = 8.0;
@@ -98,60 +101,6 @@ pub enum SweepError {
     /// An observer failed to write, or wanted no more.
     #[error("{0}")]
     Observer(#[from] std::io::Error),
-}
-
-/// Sees the points of a sweep, in the order of the grid.
-pub trait PointObserver {
-    /// Takes a point.
-    ///
-    /// # Errors
-    /// Whatever shall end the sweep.
-    fn see(&mut self, point: &Point) -> std::io::Result<()>;
-
-    /// Told now and then how many points are finished, seen or not yet, and what those seen amount to.
-    ///
-    /// # Errors
-    /// Whatever shall end the sweep; points under way are given up.
-    fn finished(&mut self, _points: u64, _seen: &Totals) -> std::io::Result<()> {
-        Ok(())
-    }
-}
-
-impl<F: FnMut(&Point) -> std::io::Result<()>> PointObserver for F {
-    fn see(&mut self, point: &Point) -> std::io::Result<()> {
-        self(point)
-    }
-}
-
-/// What a sweep amounted to, or the points of it seen so far.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Totals {
-    /// Points that reached the horizon, or the flip they were to end with.
-    pub done: u64,
-    /// Points that stopped before.
-    pub stopped: u64,
-    /// Points that could not begin.
-    pub refused: u64,
-    /// Points left out.
-    pub skipped: u64,
-    /// Points in which a bar turned over.
-    pub flipped: u64,
-    /// Points done whose error was estimated, and those of them that are in doubt: see
-    /// [`PointTrust::is_doubtful`].
-    pub judged: u64,
-    /// See `judged`.
-    pub doubtful: u64,
-    /// Steps of all of them.
-    pub steps: u64,
-    /// Largest energy drift among those done, over the energy scale, and the point's number.
-    pub energy: (f64, u64),
-    /// Largest violation of a constraint among those done, at position \[rad or m\] and velocity level,
-    /// whichever point.
-    pub constraint: [f64; 2],
-    /// Threads used.
-    pub threads: usize,
-    /// Time spent, interruptions left out.
-    pub wall: Duration,
 }
 
 impl Sweep {
@@ -407,156 +356,4 @@ fn distinct(variables: &[Variable]) -> Result<(), Refusal> {
 fn timed(request: &Request, scene: &Scene) -> Request {
     let every = request.every.unwrap_or(request.until.unwrap_or(scene.until) / LOOKS);
     Request { every: Some(every), ..request.clone() }
-}
-
-/// What the threads of a sweep share.
-struct Shared<'a> {
-    sweep: &'a Sweep,
-    chunk: u64,
-    /// The points that were not seen before.
-    rest: Range<u64>,
-    finished: AtomicU64,
-    /// Set where nobody wants the rest.
-    is_over: AtomicBool,
-}
-
-impl Shared<'_> {
-    fn chunks(&self) -> u64 {
-        (self.rest.end - self.rest.start).div_ceil(self.chunk)
-    }
-
-    /// The points of a chunk; fewer where nobody wants them any more.
-    fn integrate(&self, chunk: u64) -> Vec<Point> {
-        let first = self.rest.start + chunk * self.chunk;
-        let last = (first + self.chunk).min(self.rest.end);
-        let finished = || {
-            self.finished.fetch_add(1, Ordering::Relaxed);
-        };
-        let is_over = || self.is_over.load(Ordering::Relaxed) || self.sweep.is_stopped();
-        self.sweep.integrate(first..last, &finished, &is_over)
-    }
-}
-
-/// Runs all points of a sweep on so many threads (0: as many as there are processors) and shows them to
-/// `observer` in the order of the grid.
-///
-/// Without the feature `threads` there is one.
-///
-/// # Errors
-/// What the observer failed with; a point that fails is part of what it is shown.
-pub fn sweep(sweep: &Sweep, threads: usize, observer: &mut dyn PointObserver) -> Result<Totals, SweepError> {
-    sweep_on(sweep, threads, Totals::default(), observer)
-}
-
-/// The same for the points that follow those seen before, which amounted to `seen`.
-///
-/// # Errors
-/// As [`sweep`].
-pub fn sweep_on(
-    sweep: &Sweep,
-    threads: usize,
-    seen: Totals,
-    observer: &mut dyn PointObserver,
-) -> Result<Totals, SweepError> {
-    let begin = Instant::now();
-    let available = || std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = if cfg!(not(feature = "threads")) {
-        1
-    } else if threads == 0 {
-        available()
-    } else {
-        threads
-    };
-    let (range, before) = (sweep.range(), seen.points().min(sweep.count()));
-    let shared = Shared {
-        sweep,
-        chunk: sweep.chunk(threads),
-        rest: range.start + before..range.end,
-        finished: AtomicU64::new(before),
-        is_over: AtomicBool::new(false),
-    };
-    let mut sweep_observer =
-        SweepObserver { observer, begin, before: seen.wall, totals: Totals { threads, ..seen } };
-    #[cfg(feature = "threads")]
-    threads::integrate(&shared, threads, &mut sweep_observer)?;
-    #[cfg(not(feature = "threads"))]
-    for chunk in 0..shared.chunks() {
-        let points = shared.integrate(chunk);
-        sweep.check_stop()?;
-        points.iter().try_for_each(|point| sweep_observer.see(point))?;
-        sweep_observer.finished(shared.finished.load(Ordering::Relaxed))?;
-    }
-    sweep_observer.totals.wall = sweep_observer.before + begin.elapsed();
-    Ok(sweep_observer.totals)
-}
-
-/// An observer, and what it has seen.
-struct SweepObserver<'a> {
-    observer: &'a mut dyn PointObserver,
-    begin: Instant,
-    /// Time spent before this part of the sweep.
-    before: Duration,
-    totals: Totals,
-}
-
-impl SweepObserver<'_> {
-    fn see(&mut self, point: &Point) -> std::io::Result<()> {
-        self.totals.take(point);
-        self.observer.see(point)
-    }
-
-    fn finished(&mut self, points: u64) -> std::io::Result<()> {
-        self.totals.wall = self.before + self.begin.elapsed();
-        self.observer.finished(points, &self.totals)
-    }
-}
-
-impl Totals {
-    /// Points seen.
-    pub fn points(&self) -> u64 {
-        [self.done, self.stopped, self.refused, self.skipped].into_iter().fold(0, u64::saturating_add)
-    }
-
-    /// With those of the points that follow; times add up, and of threads the most counts.
-    pub fn join(&mut self, next: &Self) {
-        self.done += next.done;
-        self.stopped += next.stopped;
-        self.refused += next.refused;
-        self.skipped += next.skipped;
-        self.flipped += next.flipped;
-        self.judged += next.judged;
-        self.doubtful += next.doubtful;
-        self.steps += next.steps;
-        if next.energy.0 > self.energy.0 {
-            self.energy = next.energy;
-        }
-        for (most, level) in self.constraint.iter_mut().zip(next.constraint) {
-            *most = most.max(level);
-        }
-        self.threads = self.threads.max(next.threads);
-        self.wall += next.wall;
-    }
-
-    fn take(&mut self, point: &Point) {
-        match point.status {
-            Status::Done => self.done += 1,
-            Status::Stopped(_) => self.stopped += 1,
-            Status::Refused(_) => self.refused += 1,
-            Status::Skipped => self.skipped += 1,
-        }
-        self.flipped += u64::from(point.flip.is_some());
-        if let (Status::Done, Some(trust)) = (&point.status, &point.trust) {
-            self.judged += u64::from(trust.error.is_some());
-            self.doubtful += u64::from(trust.is_doubtful());
-        }
-        self.steps += point.steps;
-        if point.status == Status::Done {
-            if point.energy > self.energy.0 {
-                self.energy = (point.energy, point.index);
-            }
-            for (most, level) in self.constraint.iter_mut().zip(point.constraint.unwrap_or_default()) {
-                *most = most.max(level);
-            }
-        }
-    }
 }

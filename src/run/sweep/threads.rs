@@ -1,6 +1,7 @@
 //! Chunks on several threads, seen in order.
 
-use super::{Point, Shared, SweepError, SweepObserver};
+use super::execute::{Shared, SweepObserver};
+use super::{Point, SweepError};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};

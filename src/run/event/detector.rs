@@ -1,0 +1,341 @@
+//! The events of a run: which functions there are, what they belong to, and what is done at their zeros.
+
+use super::search::Passage;
+use super::{Action, Change, Direction, Event, EventRecord};
+use crate::dynamics::compile::Laws;
+use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::friction::FrictionWatch;
+use crate::run::inside::{Inside, StepWatcher};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What the last coefficients of an interpolant may be over the largest value: so much, or the given share of
+/// the relative tolerance, by which the dense output of a step is not smooth itself.
+const RESOLVED: f64 = 1e-11;
+const SHARE: f64 = 0.1;
+/// Share of a step within which the event that began it does not happen again.
+pub(super) const SAME: f64 = 1e-9;
+/// Events kept; more are counted.
+const KEPT: usize = 100_000;
+
+/// What a detector remembers between steps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(in crate::run) struct EventMemory {
+    /// The side of zero each function was on last: -1, 1, or 0 where that is not known.
+    pub(super) sides: Vec<i8>,
+    /// The event that happened last, and when.
+    pub(super) last: Option<(usize, Time)>,
+    /// What is to be done at the end of the step.
+    pub pending: Option<(usize, Action)>,
+    /// Conditions that changed sign last, and when.
+    flipped: Vec<(usize, Time)>,
+    /// Events of the scene that close a joint which is closed: they rest, as their functions do at zero.
+    pub(super) resting: Vec<usize>,
+    /// Those that rested until the last step.
+    pub(super) woken: Vec<usize>,
+    /// True where what is to be done cannot be: the motion is driven back onto that condition from both sides.
+    pub slides: bool,
+}
+
+/// Detects the events of a run: those of the scene, those from outside, then the zeros of the conditions
+/// that choose the branches of the scene's laws.
+pub(in crate::run) struct EventDetector {
+    events: Vec<Box<dyn Event>>,
+    /// The scene's formulas on their present branches.
+    laws: Option<Laws>,
+    mechanism: Arc<Mechanism>,
+    /// Where places stick and slide.
+    pub friction: Option<FrictionWatch>,
+    pub memory: EventMemory,
+    /// Events of the scene that close joints and locks, and these.
+    closers: Vec<(usize, Vec<String>)>,
+    /// What the last coefficients of an interpolant may be over its largest value.
+    pub(super) resolved: f64,
+    /// Events since somebody last took them.
+    found: Vec<EventRecord>,
+    count: u64,
+}
+
+/// What a function belongs to: an event or condition by its number, with the scene's laws.
+pub(super) enum Owner<'a> {
+    Scene(&'a Laws, usize),
+    Outside(usize),
+    Condition(&'a Laws, usize),
+    Friction(&'a FrictionWatch, usize),
+}
+
+/// The function at whose zero an event changed the run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::run) enum SwitchFunction {
+    /// That of an event of the scene, by its number.
+    Event(usize),
+    /// A condition of the scene's laws.
+    Condition(usize),
+    /// One that only the run itself knows.
+    Other,
+}
+
+impl EventDetector {
+    /// One for a mechanism with all its parts, with events from outside.
+    pub fn new(mechanism: Arc<Mechanism>, events: Vec<Box<dyn Event>>) -> Self {
+        let laws = mechanism.laws.clone();
+        let friction = FrictionWatch::new(&mechanism);
+        let (memory, found) = (EventMemory::default(), Vec::new());
+        let mut detector = Self {
+            events,
+            laws,
+            mechanism,
+            friction,
+            memory,
+            closers: Vec::new(),
+            resolved: RESOLVED,
+            found,
+            count: 0,
+        };
+        detector.closers = detector.closing();
+        detector.memory.sides = vec![0; detector.functions()];
+        detector
+    }
+
+    /// One for what the scene itself asks for; `None` where that is nothing.
+    pub fn of_scene(mechanism: &Arc<Mechanism>) -> Option<Self> {
+        let detector = Self::new(Arc::clone(mechanism), Vec::new());
+        (detector.functions() > 0).then_some(detector)
+    }
+
+    /// The events of the scene that close joints and locks, and these.
+    fn closing(&self) -> Vec<(usize, Vec<String>)> {
+        let mechanism = &self.mechanism;
+        let is_joint = |part: &String| {
+            let row = mechanism.constraints.iter().position(|row| row.name == *part);
+            mechanism.joints.iter().any(|joint| joint.name == *part)
+                || row.is_some_and(|row| !mechanism.is_motor(row))
+        };
+        let events = self.laws.iter().flat_map(|laws| laws.formulas.events.iter().enumerate());
+        events
+            .map(|(number, event)| (number, event.on.iter().filter(|part| is_joint(part)).cloned().collect()))
+            .filter(|(_, joints): &(usize, Vec<String>)| !joints.is_empty())
+            .collect()
+    }
+
+    /// Lets events rest whose joints are closed, where these parts do not act.
+    pub fn rest(&mut self, off: &[String]) {
+        let Self { closers, memory, .. } = self;
+        for (event, joints) in closers.iter() {
+            let (rests, rested) =
+                (joints.iter().any(|joint| !off.contains(joint)), memory.resting.contains(event));
+            if rests && !rested {
+                memory.resting.push(*event);
+                memory.sides[*event] = 0;
+            } else if rested && !rests {
+                memory.resting.retain(|resting| resting != event);
+                memory.woken.push(*event);
+            }
+        }
+    }
+
+    /// How many events are the scene's.
+    fn of_the_scene(&self) -> usize {
+        self.laws.as_ref().map_or(0, |laws| laws.formulas.events.len())
+    }
+
+    /// How many belong to the scene's events, those from outside and the conditions of laws.
+    fn before_friction(&self) -> usize {
+        let conditions = self.laws.as_ref().map_or(0, |laws| laws.modes.len());
+        self.of_the_scene() + self.events.len() + conditions
+    }
+
+    /// How many functions there are.
+    fn functions(&self) -> usize {
+        self.before_friction() + self.friction.as_ref().map_or(0, FrictionWatch::functions)
+    }
+
+    /// The number of an event's function among those of friction, where it is one.
+    pub fn friction_function(&self, event: usize) -> Option<usize> {
+        event.checked_sub(self.before_friction())
+    }
+
+    /// Looks at the steps of a method of this relative tolerance from now on.
+    pub fn suit(&mut self, tolerance: Option<f64>) {
+        self.resolved = RESOLVED.max(SHARE * tolerance.unwrap_or_default());
+    }
+
+    /// Goes on with the places with friction in the modes of a mechanism.
+    pub fn watch_friction(&mut self, mechanism: &Arc<Mechanism>) {
+        self.friction = FrictionWatch::new(mechanism);
+    }
+
+    /// What a function belongs to.
+    pub(super) fn owner(&self, function: usize) -> Owner<'_> {
+        let (scene, conditions) = (self.of_the_scene(), self.of_the_scene() + self.events.len());
+        if let (Some(watch), Some(number)) = (&self.friction, self.friction_function(function)) {
+            return Owner::Friction(watch, number);
+        }
+        match &self.laws {
+            Some(laws) if function < scene => Owner::Scene(laws, function),
+            Some(laws) if function >= conditions => Owner::Condition(laws, function - conditions),
+            _ => Owner::Outside(function - scene),
+        }
+    }
+
+    /// The function of an event.
+    pub fn switch_function(&self, event: usize) -> SwitchFunction {
+        match self.owner(event) {
+            Owner::Scene(_, number) => SwitchFunction::Event(number),
+            Owner::Condition(_, number) => SwitchFunction::Condition(number),
+            _ => SwitchFunction::Other,
+        }
+    }
+
+    /// True for an event that is not the scene's own.
+    pub fn is_from_outside(&self, event: usize) -> bool {
+        matches!(self.owner(event), Owner::Outside(_))
+    }
+
+    /// Goes on with the laws of a mechanism on their present branches.
+    pub fn exchange(&mut self, mechanism: Arc<Mechanism>) {
+        self.laws.clone_from(&mechanism.laws);
+        self.mechanism = mechanism;
+    }
+
+    /// Goes on with what another one remembered; false where that was one of other events.
+    pub fn restore(&mut self, memory: EventMemory) -> bool {
+        let functions = self.functions();
+        let fits = memory.sides.len() == functions
+            && memory.last.is_none_or(|(event, _)| event < functions)
+            && memory.pending.as_ref().is_none_or(|(event, _)| *event < functions);
+        if fits {
+            self.memory = memory;
+        }
+        fits
+    }
+
+    /// The name of an event.
+    pub fn name(&self, event: usize) -> &str {
+        match self.owner(event) {
+            Owner::Scene(laws, number) => &laws.formulas.events[number].name,
+            Owner::Condition(laws, number) => &laws.formulas.conditions[number],
+            Owner::Friction(watch, number) => watch.place(number).map_or("friction", |place| &place.name),
+            Owner::Outside(number) => self.events[number].name(),
+        }
+    }
+
+    /// Which passages of an event count; of a condition those that leave its present side.
+    fn counts(&self, event: usize, rises: bool) -> bool {
+        let direction = match self.owner(event) {
+            Owner::Scene(laws, number) => laws.formulas.events[number].direction,
+            Owner::Condition(laws, number) => return laws.modes[number] != rises,
+            Owner::Friction(..) => return !rises,
+            Owner::Outside(number) => self.events[number].direction(),
+        };
+        match direction {
+            Direction::Either => true,
+            Direction::Rising => rises,
+            Direction::Falling => !rises,
+        }
+    }
+
+    /// What happens at an event.
+    fn action(&mut self, event: usize, motion: &Motion) -> Action {
+        match self.owner(event) {
+            Owner::Condition(_, number) => {
+                Action::Change(Change { flips: Some(number), ..Change::default() })
+            }
+            Owner::Scene(laws, number) => {
+                let said = &laws.formulas.events[number];
+                if said.stop {
+                    return Action::Stop;
+                }
+                let after =
+                    self.mechanism.seen(motion, |at| laws.formulas.set_by(number, at, &laws.parameters));
+                let off = said.off.iter().map(|part| (part.clone(), false));
+                let switches: Vec<_> = off.chain(said.on.iter().map(|part| (part.clone(), true))).collect();
+                let parameters = (after != laws.parameters).then_some(after);
+                if switches.is_empty() && parameters.is_none() {
+                    return Action::Record;
+                }
+                Action::Change(Change { switches, parameters, ..Change::default() })
+            }
+            Owner::Friction(..) => Action::Record,
+            Owner::Outside(number) => {
+                let Self { events, mechanism, .. } = self;
+                mechanism.seen(motion, |at| events[number].action(at, motion))
+            }
+        }
+    }
+
+    /// Moves what was found to a list, which keeps so many; returns how many there were.
+    pub fn take_found(&mut self, list: &mut Vec<EventRecord>) -> u64 {
+        let room = KEPT.saturating_sub(list.len());
+        list.extend(self.found.drain(..).take(room));
+        std::mem::take(&mut self.count)
+    }
+
+    /// Values of all event functions at a motion.
+    pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
+        let mut values: Vec<f64> = self.mechanism.seen(motion, |at| {
+            let from_outside = self.events.iter().map(|event| event.value(at));
+            let Some(Laws { formulas, parameters, modes }) = &self.laws else {
+                return from_outside.collect();
+            };
+            (0..formulas.events.len())
+                .map(|event| formulas.event_value(event, at, parameters))
+                .chain(from_outside)
+                .chain(formulas.condition_values(at, parameters, modes))
+                .collect()
+        });
+        values.extend(self.friction.iter().flat_map(|watch| watch.values(motion)));
+        values
+    }
+}
+
+impl StepWatcher for EventDetector {
+    fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
+        let (begin, end) = inside.span();
+        let span = (end - begin).hi;
+        if span <= 0.0 || self.functions() == 0 {
+            return None;
+        }
+        let mut passages = Vec::new();
+        self.passages(inside, begin, span, 0, &mut passages);
+        self.memory.woken.clear();
+        passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
+        for Passage { t, event, rises } in passages {
+            let is_friction = matches!(self.owner(event), Owner::Friction(..));
+            let is_condition = is_friction || matches!(self.owner(event), Owner::Condition(..));
+            let is_same = self
+                .memory
+                .last
+                .is_some_and(|(last, before)| last == event && (t - before).hi <= SAME * span);
+            if !self.counts(event, rises) || is_same && !is_condition {
+                continue;
+            }
+            let t = if t > begin { self.polished(inside, event, t) } else { t };
+            let landed = inside.landed(t).cloned();
+            let motion = landed.unwrap_or_else(|| inside.at(t).clone());
+            self.memory.last = Some((event, t));
+            if is_condition {
+                self.memory.flipped.retain(|(_, before)| (t - *before).hi <= SAME * span);
+                if !is_friction {
+                    self.memory.slides = self.memory.flipped.iter().any(|(flipped, _)| *flipped == event);
+                    self.memory.flipped.push((event, t));
+                }
+                self.memory.pending = Some((event, self.action(event, &motion)));
+                return Some(t);
+            }
+            self.count += 1;
+            self.found.push(EventRecord {
+                name: self.name(event).into(),
+                t: t.hi,
+                phi: (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect(),
+                omega: motion.omega.iter().map(|omega| omega.hi).collect(),
+            });
+            let action = self.action(event, &motion);
+            if action != Action::Record {
+                self.memory.pending = Some((event, action));
+                return Some(t);
+            }
+        }
+        None
+    }
+}

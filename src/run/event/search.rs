@@ -1,0 +1,163 @@
+//! Zeros of event functions in a step: they are interpolated at Chebyshev points, by as high a degree as they
+//! ask for, and searched by the same root finding as walls and flips ([`search`](crate::stepping)); a zero is
+//! then polished on the dense output itself.
+
+use super::detector::{EventDetector, Owner, SAME};
+use crate::dynamics::Time;
+use crate::run::inside::Inside;
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
+
+/// Degrees of the interpolants.
+const DEGREES: [usize; 3] = [8, 16, 32];
+/// Halvings of a step whose event functions no interpolant resolves.
+const HALVINGS: u32 = 4;
+/// Steps of the secant method at most.
+const ROUNDS: usize = 6;
+/// Share of a step over which the slope of an event function is taken, and which corrections of its zero
+/// keep to.
+const SLOPE: f64 = 1e-3;
+/// Share of a step in which an event function leaves zero that was kept there by a joint.
+const LEAVES: f64 = 1e-5;
+/// Share of the largest value within a step up to which a condition is at its zero where the step begins.
+const NO_VALUE: f64 = 1e-12;
+/// Steps of this share of the time are rounding.
+const INSTANT: f64 = 8.0 * f64::EPSILON;
+
+/// A passage of an event function.
+pub(super) struct Passage {
+    pub t: Time,
+    pub event: usize,
+    pub rises: bool,
+}
+
+impl EventDetector {
+    /// Passages in a part of a step, in no order.
+    pub(super) fn passages(
+        &mut self,
+        inside: &mut dyn Inside,
+        begin: Time,
+        span: f64,
+        depth: u32,
+        all: &mut Vec<Passage>,
+    ) {
+        let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
+        let is_enough = |curve: &Chebyshev| curve.tail() <= self.resolved * curve.most();
+        let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));
+        let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
+        if !is_resolved && depth < HALVINGS {
+            self.passages(inside, begin, 0.5 * span, depth + 1, all);
+            return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
+        }
+        for (event, curve) in curves.iter().enumerate() {
+            if self.memory.resting.contains(&event) {
+                continue;
+            }
+            let is_woken = self.memory.woken.contains(&event);
+            let sign = |value: f64| if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
+            // From the last node to the first.
+            let nodes = &values[event];
+            let [first, next] = [nodes[nodes.len() - 1], nodes[nodes.len() - 2]];
+            let mode = match self.owner(event) {
+                Owner::Condition(laws, number) => Some(laws.modes[number]),
+                Owner::Friction(..) => Some(true),
+                _ => None,
+            };
+            // Within the rounding of time a condition is on both sides.
+            if mode.is_some() && span <= INSTANT * begin.hi.abs() {
+                continue;
+            }
+            if let Some(mode) = mode {
+                // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
+                // An impact may have carried it across.
+                let other = if mode { -1 } else { 1 };
+                let is_there = first.abs() <= NO_VALUE * curve.most() || sign(first) == other;
+                if is_there && sign(next) == other {
+                    all.push(Passage { t: begin, event, rises: !mode });
+                }
+            }
+            let side = &mut self.memory.sides[event];
+            if mode.is_none() && first == 0.0 && *side != 0 && sign(next) == -*side {
+                all.push(Passage { t: begin, event, rises: *side < 0 });
+            }
+            *side = if first == 0.0 || self.memory.last == Some((event, begin)) {
+                sign(next)
+            } else {
+                sign(first)
+            };
+            // What has just left zero is not sent back by rounding.
+            let mut share = if is_woken { LEAVES } else { 0.0 };
+            if is_woken {
+                *side = sign(curve.at(share)[0]);
+            }
+            while let Some(zero) = root(curve, 0.0, share, 1.0) {
+                share = zero + SAME;
+                let after = sign(curve.at(share.min(1.0))[0]);
+                // At the very end of a step what follows is not known: it is on the other side.
+                *side = if after == 0 || share >= 1.0 { -*side } else { after };
+                all.push(Passage { t: begin + zero * span, event, rises: *side > 0 });
+                if share >= 1.0 {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Where a passage near `near` is on the dense output, between the ends of the step.
+    pub(super) fn polished(&self, inside: &mut dyn Inside, event: usize, near: Time) -> Time {
+        let (begin, end) = inside.span();
+        let mut at = |t: Time| self.values(inside.at(t))[event];
+        let shift = SAME * (end - begin).hi;
+        let (mut before, mut t) =
+            (if (near - begin).hi > shift { near + -shift } else { near + shift }, near);
+        let (mut value_before, mut value) = (at(before), at(t));
+        for _ in 0..ROUNDS {
+            let change = value * (t - before).hi / (value - value_before);
+            if value == 0.0 || !change.is_finite() || change.abs() > 1e-3 * (end - begin).hi {
+                break;
+            }
+            (before, value_before) = (t, value);
+            t = t + -change;
+            t = if t < begin {
+                begin
+            } else if t > end {
+                end
+            } else {
+                t
+            };
+            value = at(t);
+            if change.abs() <= f64::EPSILON * t.hi.abs() {
+                break;
+            }
+        }
+        self.landed(inside, event, t)
+    }
+
+    /// The same of a method whose dense output is less accurate than its steps: by steps that end there, with
+    /// the slope of the dense output.
+    fn landed(&self, inside: &mut dyn Inside, event: usize, mut t: Time) -> Time {
+        let (begin, end) = inside.span();
+        let span = (end - begin).hi;
+        let beside = if (t - begin).hi > SLOPE * span { t + -SLOPE * span } else { t + SLOPE * span };
+        let mut slope = None;
+        for _ in 0..ROUNDS {
+            let Some(value) = inside.landed(t).map(|motion| self.values(motion)[event]) else { break };
+            let slope = *slope.get_or_insert_with(|| {
+                let [here, there] = [t, beside].map(|t| self.values(inside.at(t))[event]);
+                (there - here) / (beside - t).hi
+            });
+            let change = value / slope;
+            if !change.is_finite() || change.abs() > SLOPE * span {
+                break;
+            }
+            let next = t + -change;
+            if next <= begin || next >= end {
+                break;
+            }
+            t = next;
+            if change.abs() <= SAME * SAME.sqrt() * span {
+                break;
+            }
+        }
+        t
+    }
+}
