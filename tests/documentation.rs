@@ -142,6 +142,35 @@ fn every_link_leads_somewhere() {
     assert!(count > 50, "{count} links");
 }
 
+/// Registries show the README apart from what it links to.
+#[cfg(unix)]
+#[test]
+fn links_of_a_release_are_absolute() {
+    let place = std::env::temp_dir().join(format!("driftless-links-{}", std::process::id()));
+    std::fs::create_dir_all(place.join("python")).expect("a folder");
+    for name in ["README.md", "Cargo.toml", "python/Cargo.toml"] {
+        std::fs::copy(root().join(name), place.join(name)).expect(name);
+    }
+    let script = root().join(".ci/links");
+    let run = |url: &str| std::process::Command::new(&script).arg(url).arg(&place).status().expect("bash");
+    assert_eq!(run("ftp://example.org").code(), Some(3));
+    // A second time changes nothing.
+    assert!(
+        run("https://example.org/driftless/").success() && run("https://example.org/driftless").success()
+    );
+    let read = |name: &str| std::fs::read_to_string(place.join(name)).expect(name);
+    let (before, after) = (Page::one("README.md").text, read("README.md"));
+    let links = |text: &str| text.matches("](").count();
+    assert_eq!(after.matches("](https://").count(), links(&before));
+    assert_eq!(links(&after), links(&before));
+    for manifest in ["Cargo.toml", "python/Cargo.toml"] {
+        let lines = read(manifest);
+        let named = lines.lines().filter(|line| *line == "repository = \"https://example.org/driftless\"");
+        assert_eq!(named.count(), 1, "{manifest}");
+    }
+    std::fs::remove_dir_all(&place).expect("a folder");
+}
+
 #[test]
 fn every_page_and_picture_is_used() {
     let summary: BTreeSet<_> =
