@@ -6,26 +6,29 @@
 //! a row kept by projection, until its force would have to pull.
 
 mod impacts;
+mod jumps;
 mod rest;
 mod several;
-use super::build::build;
-use super::driver::{Driver, DriverState, Halt, Pause, Watch};
-use super::event::{EventDetector, EventMemory, SwitchFunction};
-use super::extremes::{ExtremesDetector, ExtremesMemory};
+mod state;
+
+pub(super) use impacts::in_modes;
+pub(super) use jumps::{Jump, JumpLog, Switch};
+pub(super) use state::ContactDriverState;
+
+use super::driver::{Driver, Halt, Pause, Watch};
+use super::event::{EventDetector, EventMemory};
+use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
 use super::impact_monitor;
 use super::inside::{ObserverAdapter, StepWatcher, Watchers};
-use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::friction::Mode;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, Statistics, StepError};
-pub(super) use impacts::in_modes;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 /// One impact of a run.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -74,84 +77,6 @@ struct Held {
     since: f64,
     /// Where it stands among the holds kept by name.
     kept: Option<usize>,
-}
-
-/// What happened between two steps: an impact, points held or released, or a change by an event.
-#[derive(Clone, Debug)]
-pub(super) struct Jump {
-    /// The contact of an impact.
-    pub contact: Option<usize>,
-    /// The change by an event.
-    pub switch: Option<Switch>,
-    /// The motion on both sides.
-    pub before: Motion,
-    pub after: Motion,
-    /// The mechanism with the contacts held from then on.
-    pub mechanism: Arc<Mechanism>,
-}
-
-/// A change by an event.
-#[derive(Clone, Debug)]
-pub(super) struct Switch {
-    /// The function whose zero it is at.
-    pub at: SwitchFunction,
-    /// True where neither the motion nor parameters are others: only parts and branches are.
-    pub keeps_values: bool,
-    /// Parts that do not act from then on.
-    pub off: Vec<String>,
-}
-
-/// Jumps since somebody last took them, where somebody asks.
-#[derive(Clone, Debug, Default)]
-pub(super) struct JumpLog {
-    list: Arc<Mutex<Vec<Jump>>>,
-    /// Whether changes by events are wanted.
-    has_switches: bool,
-}
-
-impl JumpLog {
-    /// One that takes changes by events too.
-    pub fn with_switches() -> Self {
-        Self { has_switches: true, ..Self::default() }
-    }
-
-    pub fn push(&self, jump: Jump) {
-        if jump.switch.is_none() || self.has_switches {
-            self.list.lock().unwrap_or_else(PoisonError::into_inner).push(jump);
-        }
-    }
-
-    /// Takes them out.
-    pub fn take(&self) -> Vec<Jump> {
-        std::mem::take(&mut *self.list.lock().unwrap_or_else(PoisonError::into_inner))
-    }
-}
-
-/// Where a course is: all that what follows depends on.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub(super) struct ContactDriverState {
-    place: DriverState,
-    /// Energy less work at the start, shifted by impacts \[J\].
-    reference: Option<DoubleDouble>,
-    /// Contacts held, in the order of their rows.
-    contacts: Vec<usize>,
-    /// Modes of the places with friction.
-    modes: Vec<Mode>,
-    held: Vec<Held>,
-    holds_in_row: usize,
-    events_in_row: usize,
-    is_between: bool,
-    stabilizer: f64,
-    /// Parts that do not act at the moment.
-    off: Vec<String>,
-    /// How much further motors and locks go on than the scene says, by row \[rad, m\].
-    shifts: Vec<(usize, f64)>,
-    /// Parameters of the scene's laws, and the branches they are on.
-    laws: Option<(Vec<f64>, Vec<bool>)>,
-    /// What the detector of events remembers, where there is one.
-    events: Option<EventMemory>,
-    /// What is known of the extremes of outputs, where there are any.
-    extremes: Option<ExtremesMemory>,
 }
 
 /// A driver on its way through impacts and holds.
@@ -266,133 +191,12 @@ impl ContactDriver {
         self.driver.statistics()
     }
 
-    /// Where it is, to go on from.
-    pub(super) fn contact_state(&self) -> ContactDriverState {
-        ContactDriverState {
-            place: self.driver.place(),
-            reference: self.sampler.reference(),
-            contacts: self.mechanism.held.clone(),
-            modes: self.mechanism.modes.clone(),
-            held: self.held.clone(),
-            holds_in_row: self.holds_in_row,
-            events_in_row: self.events_in_row,
-            is_between: self.is_between,
-            stabilizer: self.stabilizer,
-            off: self.off.clone(),
-            shifts: self.shifts.clone(),
-            laws: self.whole.laws.as_ref().map(|laws| (laws.parameters.clone(), laws.modes.clone())),
-            events: self
-                .events
-                .as_ref()
-                .map(|events| events.memory.clone())
-                .or_else(|| self.remembered.clone()),
-            extremes: self.extremes.as_ref().map(|extremes| extremes.memory.clone()),
-        }
-    }
-
     /// Looks for these events from now on; false where what is remembered of events is of others.
     pub(super) fn watch_for(&mut self, mut detector: EventDetector) -> bool {
         detector.watch_friction(&self.mechanism);
         let fits = self.remembered.take().is_none_or(|memory| detector.restore(memory));
         self.events = Some(detector);
         fits
-    }
-
-    /// How many holds must be kept by name for a station to be consistent.
-    pub(super) fn names_holds(contact_state: &ContactDriverState) -> usize {
-        contact_state.held.iter().filter_map(|held| held.kept).map(|kept| kept + 1).max().unwrap_or(0)
-    }
-
-    /// A course that goes on from a station, which was reached on the way to `horizon`; `None` where it
-    /// cannot be one of this mechanism and plan.
-    pub(super) fn resume(
-        mechanism: Arc<Mechanism>,
-        plan: &Plan,
-        start: &Motion,
-        contact_state: ContactDriverState,
-        horizon: Time,
-    ) -> Result<Option<Self>, StepError> {
-        let ContactDriverState {
-            place,
-            reference,
-            contacts,
-            modes,
-            held,
-            holds_in_row,
-            events_in_row,
-            is_between,
-            stabilizer,
-            off,
-            shifts,
-            laws,
-            events,
-            extremes,
-        } = contact_state;
-        let mut whole = mechanism.whole.clone().map_or(mechanism, |(whole, _)| whole);
-        if !shifts.is_empty() {
-            whole = Arc::new(whole.shifted(&shifts));
-        }
-        if let Some((parameters, modes)) = laws {
-            let sizes = whole.laws.as_ref().map(|laws| (laws.parameters.len(), laws.modes.len()));
-            if sizes != Some((parameters.len(), modes.len())) {
-                return Ok(None);
-            }
-            let Ok(branch) = whole.on_branch(parameters, modes) else { return Ok(None) };
-            whole = Arc::new(branch);
-        }
-        let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
-        let known = |contact: usize| contact < mechanism.contacts.len();
-        let once = contacts.iter().enumerate().all(|(i, contact)| !contacts[..i].contains(contact));
-        let fits = modes.len() == mechanism.frictions.len();
-        if !once || !fits || !contacts.iter().copied().chain(held.iter().map(|held| held.contact)).all(known)
-        {
-            return Ok(None);
-        }
-        let mut plan = plan.clone();
-        let holding = in_modes(&mechanism, &contacts, &modes);
-        if holding.constraints.len() > mechanism.constraints.len() {
-            plan.stabilization = Stabilization::Projection;
-        }
-        let mut contact_driver = Self::new(Arc::clone(&mechanism), build(&holding, &mut plan, start)?);
-        if !contact_driver.driver.resume(place, horizon)? {
-            return Ok(None);
-        }
-        contact_driver.driver.allow(plan.max_evaluations);
-        if !Arc::ptr_eq(&holding, &mechanism) {
-            contact_driver.sampler.hold(Arc::clone(&holding));
-            contact_driver.mechanism = holding;
-        }
-        contact_driver.sampler.refer(reference);
-        let acting = Arc::clone(&contact_driver.mechanism);
-        if let Some(events) = &mut contact_driver.events {
-            events.watch_friction(&acting);
-        }
-        if let (Some(detector), Some(memory)) = (&mut contact_driver.events, &events) {
-            detector.exchange(Arc::clone(&whole));
-            detector.restore(memory.clone());
-        }
-        let mut looking =
-            extremes.is_some().then(|| ExtremesDetector::new(&contact_driver.mechanism)).flatten();
-        let fits = match (&mut looking, extremes) {
-            (Some(looking), Some(memory)) => looking.restore(memory),
-            (_, memory) => memory.is_none(),
-        };
-        if !fits {
-            return Ok(None);
-        }
-        Ok(Some(Self {
-            whole,
-            off,
-            shifts,
-            extremes: looking,
-            remembered: events,
-            held,
-            holds_in_row,
-            events_in_row,
-            is_between,
-            stabilizer,
-            ..contact_driver
-        }))
     }
 
     /// Advances to an output time, through impacts and holds; false where it paused on the way.

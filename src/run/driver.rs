@@ -1,8 +1,7 @@
 //! The loop over steps: a problem, its method and its state, from one output time to the next.
 //!
-//! Every method is taken the same way: a step is made, springs and walls are checked, flips are looked for,
-//! monitors are shown the motion, and what lies between steps is read off them. [`contact`](super::contact)
-//! takes a driver through impacts, [`running`](super::running) is the loop over output times.
+//! A step is made, springs and walls are checked, flips are looked for, and monitors are shown the motion.
+//! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) to output times.
 
 use super::flip::{self, FlipDetector};
 use super::inside::{Inside, StepWatcher};

@@ -42,7 +42,7 @@ impl ContactDriver {
         for _ in 0..ROUNDS {
             let mut quiet = true;
             for number in 0..self.free.contacts.len() {
-                let posture = self.posture();
+                let posture = self.present_state();
                 let contact = &self.free.contacts[number];
                 let approach = -contact.gap_rate(posture.t, &posture.z, &posture.omega);
                 let is_met = contact.touches(posture.t, &posture.z)
@@ -66,7 +66,7 @@ impl ContactDriver {
             return self.impact_at_several(&touching, outcome);
         }
         let t = self.motion().time;
-        let Posture { phi, omega, .. } = self.posture();
+        let PresentState { phi, omega, .. } = self.present_state();
         let (impact, striking) = loop {
             // Friction in hinges and sliders takes no part in impacts.
             let modes = vec![Mode::Open; self.free.frictions.len()];
@@ -183,7 +183,7 @@ impl ContactDriver {
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let motion = self.motion();
-        let Posture { z, phi, omega, .. } = self.posture();
+        let PresentState { z, phi, omega, .. } = self.present_state();
         let touches = |contact: &usize| {
             Some(*contact) == struck
                 || self.mechanism.held.contains(contact)
@@ -342,10 +342,10 @@ impl ContactDriver {
     }
 
     /// The present motion in doubles.
-    pub(super) fn posture(&mut self) -> Posture {
+    pub(super) fn present_state(&mut self) -> PresentState {
         let motion = self.motion();
         let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        Posture {
+        PresentState {
             t: motion.time,
             z: self.free.elements(&phi),
             omega: motion.omega.iter().map(|omega| omega.hi).collect(),
@@ -363,7 +363,7 @@ pub(in crate::run) fn in_modes(free: &Arc<Mechanism>, contacts: &[usize], modes:
 }
 
 /// Time, elements, coordinates \[rad, m\] and rates \[rad/s, m/s\] as doubles.
-pub(super) struct Posture {
+pub(super) struct PresentState {
     pub t: Time,
     pub z: Vec<Complex<f64>>,
     pub phi: Vec<f64>,

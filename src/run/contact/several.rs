@@ -2,7 +2,7 @@
 
 use super::super::impact_monitor;
 use super::super::running::Outcome;
-use super::impacts::Posture;
+use super::impacts::PresentState;
 use super::{ContactDriver, ImpactRecord, NO_SPEED, in_modes};
 use crate::dynamics::Mechanism;
 use crate::dynamics::friction::Mode;
@@ -12,7 +12,7 @@ use crate::stepping::{Cause, StepError};
 impl ContactDriver {
     /// The walls whose points touch at the impact of one of them.
     pub(super) fn touching_with(&mut self, contact: usize) -> Vec<usize> {
-        let Posture { t, z, .. } = self.posture();
+        let PresentState { t, z, .. } = self.present_state();
         let touches = |&other: &usize| {
             other == contact
                 || self.mechanism.held.contains(&other)
@@ -27,7 +27,7 @@ impl ContactDriver {
             return None;
         }
         let touching = self.touching_with(contact);
-        let Posture { t, z, omega, .. } = self.posture();
+        let PresentState { t, z, omega, .. } = self.present_state();
         let approach = |number: usize| -self.free.contacts[number].gap_rate(t, &z, &omega);
         let hardest = approach(contact);
         let is_met = |&&number: &&usize| {
@@ -52,7 +52,7 @@ impl ContactDriver {
         contacts: &[usize],
         outcome: &mut Outcome,
     ) -> Result<f64, StepError> {
-        let Posture { t, phi, omega, .. } = self.posture();
+        let PresentState { t, phi, omega, .. } = self.present_state();
         let modes = vec![Mode::Open; self.free.frictions.len()];
         let striking = in_modes(&self.free, &[], &modes);
         let Some(impacts) = striking.impact_at_several(contacts, t, &phi, &omega) else {
