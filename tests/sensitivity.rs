@@ -56,6 +56,7 @@ fn an_oscillation_is_derived_by_all_its_numbers() {
     let to = ["bar.phi", "bar.omega", "s.stiffness", "s.free_angle", "bars.bar.inertia", "bars.bar.mass"];
     let t = 4.3;
     let found = derived(&scene, &["bar.phi", "bar.omega", "bar.alpha"], &to, t);
+    assert!(found.by_series);
     let (k, inertia, x, v) = (3.0_f64, 0.5_f64, 0.5, -0.4);
     let w = (k / inertia).sqrt();
     let (s, c) = ((w * t).sin(), (w * t).cos());
@@ -78,6 +79,7 @@ fn the_quarter_period_of_a_pendulum_is_derived_by_amplitude_and_gravity() {
             "start": {"bar": {"phi": 1.9, "omega": 0}}, "until": 2, "every": 0.1}"#,
     );
     let found = derived(&scene, &["event:bottom", "min:bar.omega"], &["bar.phi", "gravity[0]"], 1.0);
+    assert!(found.by_series);
     let (k, rate) = ((0.95_f64).sin(), (9.81_f64 / 0.5).sqrt());
     let [complete, second] = elliptic(k);
     assert_near(found.measures[0].value, complete / rate, 1e-12, "quarter period");
@@ -106,6 +108,7 @@ fn a_ball_is_derived_through_its_impact() {
     let to = ["start.ball.origin[1]", "gravity[1]", "floor.restitution", "walls.floor.line.through[1]"];
     let t = 0.8;
     let found = derived(&scene, &["ball.y", "ball.vy", "impact:floor"], &to, t);
+    assert!(found.by_series);
     let (g, h, e) = (9.81_f64, 1.2_f64, 0.7);
     let (fall, speed) = ((2.0 * h / g).sqrt(), (2.0 * g * h).sqrt());
     let (after, rate) = (t - fall, e * speed - g * (t - fall));
@@ -119,6 +122,64 @@ fn a_ball_is_derived_through_its_impact() {
     assert_near(found.measures[2].value, fall, 1e-12, "impact");
     assert_near(found.measures[2].slopes[0], 1.0 / speed, 1e-9, "impact by height");
     assert_near(found.measures[2].slopes[1], 0.5 * fall / g, 1e-9, "impact by gravity");
+}
+
+/// A torque with a corner has no series across it: the columns are integrated by collocation.
+#[test]
+fn an_oscillation_that_is_let_go_is_derived_through_the_corner() {
+    let scene = template(
+        r#"{"name": "let_go", "gravity": [0, 0],
+            "bars": [{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": 0.5, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "parameters": {"k": 3},
+            "torques": [{"name": "t", "body": "bar", "torque": "-k*max(bar.phi, 0)"}],
+            "start": {"bar": {"phi": 0.7, "omega": -0.4}}, "until": 5, "every": 0.1}"#,
+    );
+    let t = 2.0;
+    let found = derived(&scene, &["bar.phi", "bar.omega"], &["bar.phi", "bar.omega", "k"], t);
+    assert!(!found.by_series);
+    // x = A cos(w t + d) until x = 0 at t1, then -A w (t - t1).
+    let (k, inertia, x, v) = (3.0_f64, 0.5_f64, 0.7_f64, -0.4_f64);
+    let w = (k / inertia).sqrt();
+    let (size, phase) = (x.hypot(v / w), (-v / w).atan2(x));
+    let met = (std::f64::consts::FRAC_PI_2 - phase) / w;
+    let square = size * size;
+    for (j, [by_size, by_phase, by_w]) in [
+        [x / size, v / w / square, 0.0],
+        [v / (w * w) / size, -x / w / square, 0.0],
+        [-v * v / w.powi(3) / size, x * v / (w * w) / square, 1.0],
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let share = if j == 2 { 0.5 * w / k } else { 1.0 };
+        let rate = -(by_size * w + size * by_w) * share;
+        let later = (-by_phase / w - met / w * by_w) * share;
+        assert_near(found.measures[0].slopes[j], rate * (t - met) + size * w * later, 1e-9, "angle");
+        assert_near(found.measures[1].slopes[j], rate, 1e-9, "rate");
+    }
+}
+
+/// A number that stands at several places, and one that is asked for twice.
+#[test]
+fn a_parameter_moves_every_formula_it_is_in() {
+    let scene = template(
+        r#"{"name": "twice", "gravity": [0, 0],
+            "bars": [{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": "a^2", "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "parameters": {"a": 0.8},
+            "torques": [{"name": "t", "body": "bar", "torque": "-a*bar.phi"}],
+            "start": {"bar": {"phi": 0.7, "omega": 0}}, "until": 5, "every": 0.1}"#,
+    );
+    let t = 3.1;
+    let found = derived(&scene, &["bar.phi"], &["a", "bar.phi", "a"], t);
+    assert!(found.by_series);
+    // x = x0 cos(w t), w² = a/a².
+    let w = 0.8_f64.powf(-0.5);
+    let expected = 0.7 * t * (w * t).sin() * 0.5 * w / 0.8;
+    for (slope, expected) in found.measures[0].slopes.iter().zip([expected, (w * t).cos(), expected]) {
+        assert_near(*slope, expected, 1e-10, "parameter");
+    }
 }
 
 /// Angles and rates at a time of the reference motion with another value of a number.

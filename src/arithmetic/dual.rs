@@ -4,28 +4,67 @@
 //! (a, a') + (b, b') = (a + b, a' + b'),     (a, a') (b, b') = (a b, a b' + a' b),     f(a, a') = (f(a), f'(a) a')
 //! ```
 //!
-//! The equations of motion evaluated on them are their own Jacobian.
+//! The equations of motion evaluated on them are their own Jacobian.  There are two kinds, with the same
+//! arithmetic: beside a [`Dual`] masses, lengths and all other numbers of a scene are doubles; beside a
+//! [`Varied`] number these have derivatives themselves.
 //!
 //! Source: A. Griewank, A. Walther, *Evaluating Derivatives*, 2nd ed. (2008), section 3.1 (vector mode).
 
-use super::{DoubleDouble, Real, Scalar};
+use super::{DoubleDouble, Over, Real, Scalar};
 use std::cmp::Ordering;
+use std::fmt::Debug;
+use std::marker::PhantomData;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// What the constants beside a dual number are.
+pub trait Kind: Clone + Copy + Debug + 'static {
+    /// True where they have derivatives as well.
+    const IS_VARIED: bool;
+}
+
+/// Doubles.
+#[derive(Clone, Copy, Debug)]
+pub struct Fixed;
+
+/// Dual numbers of the same kind.
+#[derive(Clone, Copy, Debug)]
+pub struct Own;
+
+impl Kind for Fixed {
+    const IS_VARIED: bool = false;
+}
+
+impl Kind for Own {
+    const IS_VARIED: bool = true;
+}
 
 /// A value with its derivatives in `D` directions.
 #[derive(Clone, Copy, Debug)]
-pub struct Dual<const D: usize> {
+pub struct DualNumber<const D: usize, K> {
     /// The value.
     pub value: f64,
     /// Its derivatives.
     pub slope: [f64; D],
+    kind: PhantomData<K>,
 }
 
-impl<const D: usize> Dual<D> {
+/// A dual number beside constants that are doubles.
+pub type Dual<const D: usize> = DualNumber<D, Fixed>;
+
+/// A dual number beside constants that are such numbers too.
+pub type Varied<const D: usize> = DualNumber<D, Own>;
+
+impl<const D: usize, K: Kind> DualNumber<D, K> {
+    /// From its value and its derivatives.
+    #[inline(always)]
+    pub fn new(value: f64, slope: [f64; D]) -> Self {
+        Self { value, slope, kind: PhantomData }
+    }
+
     /// A constant.
     #[inline(always)]
     pub fn constant(value: f64) -> Self {
-        Self { value, slope: [0.0; D] }
+        Self::new(value, [0.0; D])
     }
 
     /// The unknown that is moved in direction `lane`; a constant where there is no such direction.
@@ -41,7 +80,11 @@ impl<const D: usize> Dual<D> {
     /// f(a) where f' is known.
     #[inline(always)]
     fn map(self, value: f64, derivative: f64) -> Self {
-        Self { value, slope: self.slope.map(|slope| slope * derivative) }
+        let mut slope = self.slope;
+        for slope in &mut slope {
+            *slope *= derivative;
+        }
+        Self::new(value, slope)
     }
 
     /// (a b, a b' + a' b).
@@ -53,19 +96,24 @@ impl<const D: usize> Dual<D> {
     /// Slopes joined one by one.
     #[inline(always)]
     fn join(self, other: Self, value: f64, slope: impl Fn(f64, f64) -> f64) -> Self {
-        Self { value, slope: std::array::from_fn(|lane| slope(self.slope[lane], other.slope[lane])) }
+        // Loops over lanes become vectors, which closures of `from_fn` do not.
+        let mut joined = self.slope;
+        for lane in 0..D {
+            joined[lane] = slope(self.slope[lane], other.slope[lane]);
+        }
+        Self::new(value, joined)
     }
 }
 
-impl<const D: usize> Default for Dual<D> {
+impl<const D: usize, K: Kind> Default for DualNumber<D, K> {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
-impl<const D: usize> Scalar for Dual<D> {
-    const ZERO: Self = Self { value: 0.0, slope: [0.0; D] };
-    const ONE: Self = Self { value: 1.0, slope: [0.0; D] };
+impl<const D: usize, K: Kind> Scalar for DualNumber<D, K> {
+    const ZERO: Self = Self { value: 0.0, slope: [0.0; D], kind: PhantomData };
+    const ONE: Self = Self { value: 1.0, slope: [0.0; D], kind: PhantomData };
 
     #[inline(always)]
     fn of(value: f64) -> Self {
@@ -111,12 +159,18 @@ impl<const D: usize> Scalar for Dual<D> {
     }
 }
 
-impl<const D: usize> Real for Dual<D> {
+impl<const D: usize, K: Kind> Real for DualNumber<D, K> {
     const IS_PLAIN: bool = false;
+    const HAS_CONSTANTS: bool = K::IS_VARIED;
 
     #[inline(always)]
     fn value(self) -> f64 {
         self.value
+    }
+
+    #[inline(always)]
+    fn times_fraction(self, fraction: Self) -> Self {
+        self.scale(fraction.value)
     }
 
     #[inline(always)]
@@ -130,20 +184,33 @@ impl<const D: usize> Real for Dual<D> {
     }
 }
 
-/// Numbers are compared by their values.
-impl<const D: usize> PartialEq for Dual<D> {
+impl<const D: usize> Over<Varied<D>> for Varied<D> {
+    #[inline(always)]
+    fn constant(value: Self) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn by(self, factor: Self) -> Self {
+        self * factor
+    }
+}
+
+/// Numbers are compared by their values; of those that are constants too, zero is what stays zero.
+impl<const D: usize, K: Kind> PartialEq for DualNumber<D, K> {
     fn eq(&self, other: &Self) -> bool {
-        self.value == other.value
+        self.value == other.value && (!K::IS_VARIED || self.slope == other.slope)
     }
 }
 
-impl<const D: usize> PartialOrd for Dual<D> {
+impl<const D: usize, K: Kind> PartialOrd for DualNumber<D, K> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        self.value.partial_cmp(&other.value)
+        let order = self.value.partial_cmp(&other.value);
+        order.filter(|order| order.is_ne() || self == other)
     }
 }
 
-impl<const D: usize> Add for Dual<D> {
+impl<const D: usize, K: Kind> Add for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -151,7 +218,7 @@ impl<const D: usize> Add for Dual<D> {
     }
 }
 
-impl<const D: usize> Sub for Dual<D> {
+impl<const D: usize, K: Kind> Sub for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -159,7 +226,7 @@ impl<const D: usize> Sub for Dual<D> {
     }
 }
 
-impl<const D: usize> Mul for Dual<D> {
+impl<const D: usize, K: Kind> Mul for DualNumber<D, K> {
     type Output = Self;
     // The product rule is a sum.
     #[allow(clippy::suspicious_arithmetic_impl)]
@@ -169,7 +236,7 @@ impl<const D: usize> Mul for Dual<D> {
     }
 }
 
-impl<const D: usize> Div for Dual<D> {
+impl<const D: usize, K: Kind> Div for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -178,7 +245,7 @@ impl<const D: usize> Div for Dual<D> {
     }
 }
 
-impl<const D: usize> Neg for Dual<D> {
+impl<const D: usize, K: Kind> Neg for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -186,14 +253,14 @@ impl<const D: usize> Neg for Dual<D> {
     }
 }
 
-impl<const D: usize> AddAssign for Dual<D> {
+impl<const D: usize, K: Kind> AddAssign for DualNumber<D, K> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl<const D: usize> SubAssign for Dual<D> {
+impl<const D: usize, K: Kind> SubAssign for DualNumber<D, K> {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
@@ -224,6 +291,14 @@ mod tests {
         for (slope, difference) in dual.slope.into_iter().zip(differences) {
             assert!((slope - difference).abs() < 1e-14, "{slope} {difference}");
         }
+    }
+
+    #[test]
+    fn a_constant_that_changes_is_not_zero() {
+        let changing = Varied::<1>::unknown(0.0, 0);
+        assert!(changing != Varied::ZERO && changing == changing && Varied::<1>::of(0.0) == Varied::ZERO);
+        assert_eq!(changing.partial_cmp(&Varied::ZERO), None);
+        assert!(Dual::<1>::unknown(0.0, 0) == Dual::ZERO);
     }
 
     #[test]

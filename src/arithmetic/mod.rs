@@ -2,8 +2,9 @@
 //!
 //! Every formula of [`dynamics`](crate::dynamics) is written once over [`Scalar`] and evaluated on `f64`
 //! (inner loops), on [`DoubleDouble`] (monitors, references), on [`Dual`] numbers (Jacobians), on
-//! [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods), and on
-//! numbers of any number of digits (module `digits`), whose constants have as many: [`Over`].
+//! [`Eight`](eight::Eight) lanes and their [`Pairs`](pairs::Pairs) (stages of implicit methods), on
+//! numbers of any number of digits (module `digits`), and on [`Varied`] ones, beside which the constants
+//! of a scene are such numbers as well: [`Over`].
 //!
 //! Two rules keep the bits the same on every machine: trigonometry comes from pure Rust (the `libm` crate, or
 //! our own series in lanes and in double-double), and a fused multiply-add is written as one wherever it is
@@ -37,7 +38,7 @@ pub mod tape;
 
 pub use complex::Complex;
 pub use double_double::DoubleDouble;
-pub use dual::Dual;
+pub use dual::{Dual, Varied};
 
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
@@ -141,8 +142,9 @@ impl<T: Scalar> Over<f64> for T {
 pub trait Real: Scalar + PartialOrd {
     /// True for `f64` itself, for which there are kernels of lanes.
     const IS_PLAIN: bool;
-    /// True for numbers of many digits, whose sums of products are rounded once.
-    const IS_LONG: bool = false;
+    /// True for numbers that constants of a scene are too, of many digits or with derivatives; their series
+    /// are multiplied as factors.
+    const HAS_CONSTANTS: bool = false;
     /// Share of its scale below which the pivot of a constraint counts as zero.
     const DROPPED: f64 = 1e-8;
 
@@ -154,6 +156,12 @@ pub trait Real: Scalar + PartialOrd {
 
     /// The number as a double-double, exactly.
     fn double_double(self) -> DoubleDouble;
+
+    /// The product with a number that is the same whatever a scene says.
+    #[inline(always)]
+    fn times_fraction(self, fraction: Self) -> Self {
+        self * fraction
+    }
 
     /// Σ a b.
     #[inline]

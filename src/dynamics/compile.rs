@@ -1,7 +1,6 @@
 //! Scene to mechanism: the hinge trees, their constant matrices, the rows, and what the scene does not need
 //! left out.
 
-#[cfg(feature = "digits")]
 pub mod exact;
 mod parts;
 

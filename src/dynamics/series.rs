@@ -32,11 +32,13 @@ mod drive;
 mod factors;
 #[cfg(feature = "digits")]
 mod long;
+mod own;
 pub mod polynomial;
 mod rows;
 mod spring;
 mod tape;
 mod user;
+mod varied;
 mod work_integral;
 
 use self::action::ActionSeries;
@@ -102,7 +104,7 @@ pub struct Series<T: SeriesNumber> {
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
     /// then.
     bodywise: Option<Box<Bodywise<T>>>,
-    /// The bodies' series as factors, where numbers are long.
+    /// The bodies' series as factors, where series are multiplied so.
     factors: Factors<T>,
     /// Limbs that powers of the rates are kept to; none where numbers have none.
     limbs: Vec<usize>,
@@ -120,7 +122,7 @@ impl<T: SeriesNumber> Series<T> {
             CoordinatePartition::free(mechanism)
         };
         let f = partition.count();
-        let is_bodywise = !T::IS_LONG && !partition.driven();
+        let is_bodywise = !T::HAS_CONSTANTS && !partition.driven();
         let bodywise = is_bodywise.then(|| Bodywise::new(mechanism, order)).flatten().map(Box::new);
         let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
         Self {
@@ -163,7 +165,7 @@ impl<T: SeriesNumber> Series<T> {
         self.limbs = limbs;
     }
 
-    /// Scales products of long numbers.
+    /// What the products of factors have in common.
     pub fn rescale(&mut self, scale: Scale<T>) {
         self.factors.scale = scale;
     }
@@ -272,6 +274,12 @@ impl<T: SeriesNumber> Series<T> {
     /// The factors of M_0, and the powers from `first` on.
     #[inline(never)]
     fn orders<const N: usize>(&mut self, terms: &Terms<T::Constant>, first: usize) {
+        self.orders_here::<N>(terms, first);
+    }
+
+    /// The same, compiled as the place is it is called from.
+    #[inline(always)]
+    fn orders_here<const N: usize>(&mut self, terms: &Terms<T::Constant>, first: usize) {
         let n = size::<N>(self.elements);
         let angles = size::<N>(self.angles);
         self.factor::<N>(terms);
@@ -287,7 +295,7 @@ impl<T: SeriesNumber> Series<T> {
         if let Some(bodywise) = &mut self.bodywise {
             bodywise.begin(&self.omega[..(first + 1) * n], &self.rest[..first * n]);
         }
-        if T::IS_LONG {
+        if T::HAS_CONSTANTS {
             self.factors.begin(n, &self.z, &self.omega, &self.drive);
         }
         for m in first..self.order {
@@ -337,7 +345,7 @@ impl<T: SeriesNumber> Series<T> {
         let (turned, bend) = (&mut self.turned[..n], &mut self.bend[..n]);
         let factor = T::of((m + 1) as f64);
         bend[angles..].fill(Complex::ZERO);
-        if T::IS_LONG {
+        if T::HAS_CONSTANTS {
             let Factors { scale, z, omega, .. } = &self.factors;
             for i in 0..angles {
                 let sum = z[i].times(&omega[i], scale, m + 1, 1..=m + 1);
@@ -381,7 +389,7 @@ impl<T: SeriesNumber> Series<T> {
             load[x] -= rest[x].re;
             load[x + 1] -= rest[x].im;
         }
-        if T::IS_LONG {
+        if T::HAS_CONSTANTS {
             // Of l = 0 only, R is not complete yet.
             let Factors { scale, z: factors, rest: known, .. } = &self.factors;
             for k in 0..angles {
@@ -495,7 +503,7 @@ impl<T: SeriesNumber> Series<T> {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
         mass_terms::<T, N>(terms.tree, &self.bend, rest);
-        if T::IS_LONG {
+        if T::HAS_CONSTANTS {
             self.factors.push(newest, omega, rest);
         }
     }

@@ -139,7 +139,7 @@ fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Com
     let mut kernel = Kernel::<Dual<1>>::new(mechanism);
     let mut product = |x: &[f64]| -> Vec<f64> {
         let along = |values: &[f64], slopes: &[f64]| -> Vec<Dual<1>> {
-            values.iter().zip(slopes).map(|(&value, &slope)| Dual { value, slope: [slope] }).collect()
+            values.iter().zip(slopes).map(|(&value, &slope)| Dual::new(value, [slope])).collect()
         };
         kernel.accelerate::<0>(
             mechanism,

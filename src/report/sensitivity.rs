@@ -55,6 +55,7 @@ pub fn object(found: &Sensitivity, deviations: &[f64]) -> Value {
             .map(|(input, sigma)| (input.path.clone(), json!(sigma))).collect::<Map<_, _>>(),
         "lost": found.lost,
         "steps": found.steps[0],
+        "by_series": found.by_series,
     })
 }
 

@@ -3,18 +3,20 @@
 //! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
 //! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  Formulas of
 //! time and state are kept as texts and read as exactly when the mechanism is compiled.  What a formula takes
-//! from a table has no such digits, and what has corners no series; both are refused by name.
+//! from a table has no such digits, and what has corners no series; both are refused by name.  Numbers may also
+//! be given beside the text, with derivatives that no text holds.
 
 mod laws;
 mod parts;
 
-use super::Scene;
 use super::error::SceneError;
 use super::formula::Formula;
-use super::locate::{Node, Source, Value, push_index, push_key};
+use super::locate::{Node, Source, Span, Value, push_index, push_key};
 use super::number::Decimal;
 use super::read::put_together;
 use super::template::Template;
+use super::{Scene, SceneEvent};
+use std::cell::RefCell;
 
 /// The times of a scene.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +35,31 @@ impl Template {
     /// As [`Template::scene`]; a number whose digits do not tell all of it, or a part that is not known
     /// exactly.
     pub fn exact<C: Decimal>(&self, typed: &[String]) -> Result<(Scene<C>, Times<C>), SceneError> {
+        self.exact_with(typed, &[], Watched::All)
+    }
+
+    /// The same where the numbers at some paths are these.
+    ///
+    /// # Errors
+    /// As [`Template::exact`]; a number is not taken up by any part.
+    pub fn exact_with<C: Decimal>(
+        &self,
+        typed: &[String],
+        known: &[(&str, C)],
+        watched: Watched,
+    ) -> Result<(Scene<C>, Times<C>), SceneError> {
         let plain = self.scene()?;
         let (text, source, overrides) = self.parts();
         let (source, tree) = put_together(text, source, overrides)?;
+        let places = known.iter().filter_map(|(path, value)| Some((tree.at(path)?.span, *value)));
         let mut reader = Reader {
             source: &source,
             plain: &plain,
             root: Cursor { node: &tree, path: String::new() },
             typed,
+            known: places.collect(),
+            is_read: RefCell::new(vec![false; known.len()]),
+            watched,
             parameters: Vec::new(),
         };
         reader.refuse_parts(&plain)?;
@@ -49,8 +68,21 @@ impl Template {
             until: reader.number(&reader.root, "until", plain.until)?,
             every: reader.number(&reader.root, "every", plain.every)?,
         };
-        Ok((reader.scene(&plain)?, times))
+        let scene = reader.scene(&plain)?;
+        match reader.is_read.borrow().iter().position(|is_read| !is_read) {
+            None => Ok((scene, times)),
+            Some(number) => Err(reader.refuse(&reader.root, "is not read at a path", known[number].0)),
+        }
     }
+}
+
+/// Who watches for the events of a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watched {
+    /// Nobody: scenes with events are refused.
+    All,
+    /// Another run beside: those are refused that change what acts.
+    Changes,
 }
 
 /// A number as people type them on a command line, exactly; see [`number`](super::number).
@@ -114,6 +146,10 @@ struct Reader<'a, C> {
     plain: &'a Scene,
     root: Cursor<'a>,
     typed: &'a [String],
+    /// Numbers that stand for those at some places of the text, and which of them were read.
+    known: Vec<(Span, C)>,
+    is_read: RefCell<Vec<bool>>,
+    watched: Watched,
     parameters: Vec<(String, C)>,
 }
 
@@ -133,8 +169,14 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// Parts that are not carried in many digits.
     fn refuse_parts(&self, scene: &Scene) -> Result<(), SceneError> {
+        let changes =
+            |event: &SceneEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
+        let has_events = match self.watched {
+            Watched::All => !scene.events.is_empty(),
+            Watched::Changes => scene.events.iter().any(changes),
+        };
         let parts = [
-            ("events", !scene.events.is_empty(), "events change what acts"),
+            ("events", has_events, "events change what acts"),
             ("inactive", !scene.inactive.is_empty(), "events change what acts"),
         ];
         for (key, is_there, why) in parts {
@@ -213,11 +255,24 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// What a number was written as.
     fn literal(&self, node: &Node, value: f64) -> C {
+        if let Some(number) = self.known_at(node) {
+            return number;
+        }
         let (text, digits, is_all) = self.source.text(node.span);
         let typed = text.checked_sub(1).and_then(|index| self.typed.get(index));
         let typed = typed.and_then(|typed| typed.split_once('=')).filter(|_| is_all);
         let exact = typed.map_or_else(|| C::parse(digits), |(_, value)| exact_number(value));
         exact.unwrap_or_else(|| shortest(value))
+    }
+
+    /// What is known to stand for the number at a place; of several numbers, all derivatives count.
+    fn known_at(&self, node: &Node) -> Option<C> {
+        let here = self.known.iter().enumerate().filter(|(_, (span, _))| *span == node.span);
+        let numbers = here.map(|(number, (_, value))| {
+            self.is_read.borrow_mut()[number] = true;
+            *value
+        });
+        numbers.reduce(|sum, number| sum + number.moved_to(0.0))
     }
 
     fn number(&self, at: &Cursor, key: &str, absent: f64) -> Result<C, SceneError> {

@@ -36,7 +36,7 @@ pub(super) struct Text {
 }
 
 /// Bytes `start..end` of a text.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     text: u32,
     start: u32,

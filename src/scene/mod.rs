@@ -7,7 +7,6 @@
 mod build;
 mod digits;
 mod error;
-#[cfg(feature = "digits")]
 pub(crate) mod exact;
 mod fit;
 mod format;

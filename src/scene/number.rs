@@ -1,6 +1,6 @@
 //! Numbers as people type them on a command line.
 
-use crate::arithmetic::Real;
+use crate::arithmetic::{Real, Varied};
 use std::f64::consts::PI;
 
 /// A number that decimal text can be read as.
@@ -10,6 +10,11 @@ pub trait Decimal: Real {
 
     /// π.
     fn pi() -> Self;
+
+    /// The number with another value, and the derivatives it has.
+    fn moved_to(self, value: f64) -> Self {
+        Self::of(value)
+    }
 }
 
 impl Decimal for f64 {
@@ -19,6 +24,20 @@ impl Decimal for f64 {
 
     fn pi() -> Self {
         PI
+    }
+}
+
+impl<const D: usize> Decimal for Varied<D> {
+    fn parse(text: &str) -> Option<Self> {
+        f64::parse(text).map(Self::constant)
+    }
+
+    fn pi() -> Self {
+        Self::constant(PI)
+    }
+
+    fn moved_to(self, value: f64) -> Self {
+        Self::new(value, self.slope)
     }
 }
 

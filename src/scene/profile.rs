@@ -84,19 +84,19 @@ impl<C: Decimal> Profile<C> {
     /// The law on these branches, without its peaks; `values` are those of its names, `None` for t.
     pub(crate) fn recorded(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
         let inputs = RefCell::new(Vec::new());
-        let constant = |value: C| match C::IS_LONG {
+        let constant = |value: C| match C::HAS_CONSTANTS {
             // The tape folds constants in doubles.
             true => Symbol::input(1 + number_of(&inputs, &value) as u32),
             false => Symbol::of(value.value()),
         };
-        let numbers = if C::IS_LONG { formula.numbers() } else { Vec::new() };
+        let numbers = if C::HAS_CONSTANTS { formula.numbers() } else { Vec::new() };
         let [(tape, results)] = Symbol::record(|| {
             let slope = |of: Symbol| {
                 of.gradient().iter().find(|part| part.0 == 0).map_or(Symbol::ZERO, |part| part.1)
             };
             let t = Symbol::input(0);
             let values: Vec<Symbol> = values.iter().map(|value| value.map_or(t, constant)).collect();
-            let law = match C::IS_LONG {
+            let law = match C::HAS_CONSTANTS {
                 true => formula.evaluate_over(&values, modes, |node| constant(numbers[node])),
                 false => formula.evaluate(&values, modes),
             };
@@ -122,7 +122,6 @@ impl<C: Decimal> Profile<C> {
     }
 
     /// Its tape, the number of the law on it, and the numbers that are its inputs after the time.
-    #[cfg(feature = "digits")]
     pub(crate) fn parts(&self) -> (&Tape, Slot, &[C]) {
         (&self.tape, self.results[0], &self.numbers)
     }

@@ -70,6 +70,20 @@ pub(super) enum Step<'a> {
     Index(usize),
 }
 
+impl Node {
+    /// What stands at a whole path in it.
+    pub(super) fn at(&self, path: &str) -> Option<&Node> {
+        steps(path)?.iter().try_fold(self, |node, step| match (step, &node.value) {
+            (Step::Key(key), Value::Object(members)) => {
+                members.iter().find(|member| member.key == *key).map(|member| &member.node)
+            }
+            (Step::Key(key), Value::List(nodes)) => nodes.iter().find(|node| name(node) == Some(key)),
+            (Step::Index(index), Value::List(nodes)) => nodes.get(*index),
+            _ => None,
+        })
+    }
+}
+
 /// `bars[1].length` to its steps; `None` where it is no path.
 pub(super) fn steps(path: &str) -> Option<Vec<Step<'_>>> {
     let mut steps = Vec::new();

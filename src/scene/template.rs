@@ -162,16 +162,7 @@ impl Template {
     /// As [`parse_scene`] where the text is no JSON or an override does not fit it.
     pub fn value(&self, variable: &Variable) -> Result<Option<f64>, SceneError> {
         let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
-        let mut node = Some(&tree);
-        for step in steps(&variable.path).unwrap_or_default() {
-            node = node.and_then(|node| match (&step, &node.value) {
-                (Step::Key(key), Value::Object(_)) => member(node, key),
-                (Step::Key(key), Value::List(nodes)) => nodes.iter().find(|node| name(node) == Some(key)),
-                (Step::Index(index), Value::List(nodes)) => nodes.get(*index),
-                _ => None,
-            });
-        }
-        Ok(node.and_then(|node| match &node.value {
+        Ok(tree.at(&variable.path).and_then(|node| match &node.value {
             Value::Number(value) => Some(*value),
             _ => None,
         }))

@@ -162,7 +162,7 @@ impl<const W: usize> Over<Digits<W>> for Digits<W> {
 
 impl<const W: usize> Real for Digits<W> {
     const IS_PLAIN: bool = false;
-    const IS_LONG: bool = true;
+    const HAS_CONSTANTS: bool = true;
     /// Rounding leaves far less of a pivot that is zero.
     const DROPPED: f64 = 1e-40;
 

@@ -73,7 +73,7 @@ impl<C: Decimal> ExactMechanism<C> {
             for row in parts::kept_angles(scene) {
                 let law = structure.constraints[row].law.as_ref();
                 if let (Some(law), Some(kept)) = (law, &mut constraints[row].law) {
-                    kept.start = C::of(law.start);
+                    kept.start = kept.start.moved_to(law.start);
                 }
             }
         }

@@ -169,7 +169,7 @@ impl<C: Decimal> Binder<'_, C> {
         self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
         let site = |place| self.forest.site(&place);
         let meanings = meanings.into_iter().map(|meaning| meaning.with_points(site)).collect();
-        let numbers = if C::IS_LONG { formula.numbers() } else { Vec::new() };
+        let numbers = if C::HAS_CONSTANTS { formula.numbers() } else { Vec::new() };
         Expression { formula, meanings, numbers, first }
     }
 

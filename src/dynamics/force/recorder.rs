@@ -62,7 +62,7 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
 
     /// What is no double is an input: the tape folds constants in doubles.
     fn constant(&self, value: C) -> Symbol {
-        if C::IS_LONG {
+        if C::HAS_CONSTANTS {
             self.input(Input::Number(number_of(&self.numbers, &value)))
         } else {
             Symbol::of(value.value())

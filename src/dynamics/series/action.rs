@@ -22,7 +22,7 @@ pub struct ActionSeries<T: SeriesNumber> {
     velocity: Vec<Complex<T>>,
     /// Rate of the body a torque acts on, less that of its base.
     rate: Vec<T>,
-    /// The same as factors, where numbers are long.
+    /// The same as factors, where series are multiplied so.
     factors: Option<Box<ActionFactors<T>>>,
 }
 
@@ -64,7 +64,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
             force: vectors(),
             velocity: vectors(),
             rate: zeros(if is_force { 0 } else { order + 1 }),
-            factors: T::IS_LONG.then(|| Box::new(ActionFactors::new(order))),
+            factors: T::HAS_CONSTANTS.then(|| Box::new(ActionFactors::new(order))),
         }
     }
 

@@ -1,4 +1,4 @@
-//! Series as factors of Cauchy products, for numbers whose products are more than a loop.
+//! Series as factors of Cauchy products, for numbers whose products are more than a plain loop.
 //!
 //! Powers are handed over as they are found; products are asked for by their total power.  Doubles and
 //! double-doubles have nothing of this: the series of those are multiplied where they stand.
@@ -25,6 +25,27 @@ pub trait CauchyFactor<T>: Clone + Debug {
     /// `Σ_j a_j b_{total-j}` over the powers `of` the first.
     fn product(&self, other: &Self, scale: &Self::Scale, total: usize, of: RangeInclusive<usize>) -> T;
 
+    /// The products of two series with one.
+    #[inline]
+    fn products(
+        pair: [&Self; 2],
+        other: &Self,
+        scale: &Self::Scale,
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> [T; 2] {
+        [pair[0].product(other, scale, total, of.clone()), pair[1].product(other, scale, total, of)]
+    }
+
+    /// The product of the first ones of two pairs, and `sign` times that of the second ones.
+    fn sum_of_products(
+        pairs: [[&Self; 2]; 2],
+        sign: f64,
+        scale: &Self::Scale,
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> T;
+
     /// False where the powers grow by more than products are made for.
     fn is_sound(&self) -> bool;
 }
@@ -40,6 +61,16 @@ impl<T: Real> CauchyFactor<T> for () {
     fn push(&mut self, _scale: &(), _power: T) {}
 
     fn product(&self, _other: &(), _scale: &(), _total: usize, _of: RangeInclusive<usize>) -> T {
+        T::ZERO
+    }
+
+    fn sum_of_products(
+        _pairs: [[&(); 2]; 2],
+        _sign: f64,
+        _scale: &(),
+        _total: usize,
+        _of: RangeInclusive<usize>,
+    ) -> T {
         T::ZERO
     }
 
@@ -65,18 +96,21 @@ impl<T: SeriesNumber> VectorFactor<T> {
     }
 
     /// Forgets all powers.
+    #[inline]
     pub fn restart(&mut self, scale: &Scale<T>) {
         self.re.restart(scale);
         self.im.restart(scale);
     }
 
     /// Takes the next power.
+    #[inline(always)]
     pub fn push(&mut self, scale: &Scale<T>, power: Complex<T>) {
         self.re.push(scale, power.re);
         self.im.push(scale, power.im);
     }
 
     /// The product with a series of numbers.
+    #[inline]
     pub fn times(
         &self,
         other: &T::Factor,
@@ -84,20 +118,22 @@ impl<T: SeriesNumber> VectorFactor<T> {
         total: usize,
         of: RangeInclusive<usize>,
     ) -> Complex<T> {
-        Complex::new(
-            self.re.product(other, scale, total, of.clone()),
-            self.im.product(other, scale, total, of),
-        )
+        let [re, im] = T::Factor::products([&self.re, &self.im], other, scale, total, of);
+        Complex::new(re, im)
     }
 
     /// The dot product with a series of vectors.
+    #[inline]
     pub fn dot(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
-        self.re.product(&other.re, scale, total, of.clone()) + self.im.product(&other.im, scale, total, of)
+        let pairs = [[&self.re, &other.re], [&self.im, &other.im]];
+        T::Factor::sum_of_products(pairs, 1.0, scale, total, of)
     }
 
     /// The cross product with a series of vectors.
+    #[inline]
     pub fn cross(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
-        self.re.product(&other.im, scale, total, of.clone()) - self.im.product(&other.re, scale, total, of)
+        let pairs = [[&self.re, &other.im], [&self.im, &other.re]];
+        T::Factor::sum_of_products(pairs, -1.0, scale, total, of)
     }
 
     /// False where the powers grow by more than products are made for.
@@ -121,7 +157,7 @@ pub struct Factors<T: SeriesNumber> {
 impl<T: SeriesNumber> Factors<T> {
     /// Room for so many bodies, up to power `order` of the rates.
     pub fn new(bodies: usize, is_tied: bool, order: usize) -> Self {
-        let bodies = if T::IS_LONG { bodies } else { 0 };
+        let bodies = if T::HAS_CONSTANTS { bodies } else { 0 };
         let numbers = |count: usize| vec![T::Factor::new(order + 1); count];
         let vectors = || vec![VectorFactor::new(order + 1); bodies];
         let driven = if is_tied { bodies } else { 0 };
@@ -157,11 +193,14 @@ impl<T: SeriesNumber> Factors<T> {
     }
 
     /// The next powers of unit vectors, rates and R.
+    #[inline(always)]
     pub fn push(&mut self, z: &[Complex<T>], omega: &[T], rest: &[Complex<T>]) {
         let scale = &self.scale;
-        self.z.iter_mut().zip(z).for_each(|(factor, &z)| factor.push(scale, z));
-        self.omega.iter_mut().zip(omega).for_each(|(factor, &omega)| factor.push(scale, omega));
-        self.rest.iter_mut().zip(rest).for_each(|(factor, &rest)| factor.push(scale, rest));
+        for i in 0..self.z.len() {
+            self.z[i].push(scale, z[i]);
+            self.omega[i].push(scale, omega[i]);
+            self.rest[i].push(scale, rest[i]);
+        }
     }
 
     /// False where the powers of a series grow by more than products are made for.

@@ -177,7 +177,7 @@ impl<T: SeriesNumber> RowSeries<T> {
         }
         schur::product(r, &self.jacobian, &self.minv_jt, &mut self.schur);
         self.weakest = schur::factor::<T, 0>(r, &mut self.schur, &mut self.pivot, &self.scale);
-        if self.weakest.share < NEAR && !T::IS_LONG {
+        if self.weakest.share < NEAR && T::DROPPED == schur::DROPPED {
             let rows = [&self.jacobian[..], &self.minv_jt[..]];
             self.weakest = schur::look_closer(
                 &self.metric,
@@ -282,7 +282,11 @@ impl<T: SeriesNumber> RowSeries<T> {
 /// Power m of the product of a row's multiplier, every `rows`-th number, and a series of m + 1 powers.
 fn with_rates<T: Real>(multiplier: &[T], rows: usize, rates: &[T]) -> T {
     let pairs = multiplier.iter().step_by(rows).zip(rates.iter().rev());
-    if T::IS_LONG { T::sum_of_products(pairs) } else { pairs.fold(T::ZERO, |sum, (&a, &b)| sum + a * b) }
+    if T::HAS_CONSTANTS {
+        T::sum_of_products(pairs)
+    } else {
+        pairs.fold(T::ZERO, |sum, (&a, &b)| sum + a * b)
+    }
 }
 
 /// Power m of a row's second derivative without the accelerations of power m: `bend` is what e'' has without

@@ -24,7 +24,7 @@ pub struct SpringSeries<T: SeriesNumber> {
     inverse_square: Vec<T>,
     closing: Vec<T>,
     strain_rate: Vec<T>,
-    /// The same as factors, where numbers are long.
+    /// The same as factors, where series are multiplied so.
     factors: Option<Box<SpringFactors<T>>>,
 }
 
@@ -85,7 +85,7 @@ impl<T: SeriesNumber> SpringSeries<T> {
             inverse_square: room(is_damped),
             closing: room(is_damped),
             strain_rate: room(is_damped),
-            factors: (T::IS_LONG && spring.needs_length()).then(|| Box::new(SpringFactors::new(order))),
+            factors: (T::HAS_CONSTANTS && spring.needs_length()).then(|| Box::new(SpringFactors::new(order))),
         }
     }
 
@@ -120,8 +120,8 @@ impl<T: SeriesNumber> SpringSeries<T> {
         if !spring.needs_length() {
             return force;
         }
-        if T::IS_LONG {
-            return force + self.long_force(spring, m, z, n, scale);
+        if T::HAS_CONSTANTS {
+            return force + self.factored_force(spring, m, z, n, scale);
         }
         let span = &self.span[..=m];
         self.square[m] = product(span, span, |a, b| a.dot(b));
@@ -161,8 +161,8 @@ impl<T: SeriesNumber> SpringSeries<T> {
         force
     }
 
-    /// What free length and damper add to the force at power m, on long numbers.
-    fn long_force(
+    /// What free length and damper add to the force at power m, as products of factors.
+    fn factored_force(
         &mut self,
         spring: &Spring<T::Constant>,
         m: usize,

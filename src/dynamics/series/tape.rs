@@ -1,5 +1,6 @@
-//! The series of a tape on numbers of many digits: the recurrences of [`TapeSeries`], whose sums of products are
-//! those of [factors](super::factors), and numbers of the tape that no time is in, which have one power.
+//! The series of a tape on numbers that are constants too: the recurrences of [`TapeSeries`], whose sums of
+//! products are those of [factors](super::factors), and numbers of the tape that no time is in, which have one
+//! power.
 //!
 //! [`TapeSeries`]: crate::arithmetic::tape::TapeSeries
 
@@ -23,13 +24,13 @@ struct Result<T: SeriesNumber> {
 
 /// Powers 0 … P of all results of a tape.
 #[derive(Clone, Debug)]
-pub struct LongTape<T: SeriesNumber> {
+pub struct FactorTape<T: SeriesNumber> {
     results: Vec<Result<T>>,
     /// Who is a factor of a product, plainly and [weighted](Result::weighted).
     is_factor: Vec<[bool; 2]>,
 }
 
-impl<T: SeriesNumber> LongTape<T> {
+impl<T: SeriesNumber> FactorTape<T> {
     /// Room for powers up to `order`; `is_number` tells the inputs that do not change with time.
     pub fn new(tape: &Tape, order: usize, is_number: impl Fn(u32) -> bool) -> Self {
         let operations = tape.operations();

@@ -2,7 +2,7 @@
 
 use super::coefficient::SeriesNumber;
 use super::factors::Scale;
-use super::tape::LongTape;
+use super::tape::FactorTape;
 use crate::arithmetic::tape::{Slot, TapeSeries};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::force::UserForce;
@@ -16,8 +16,8 @@ pub struct UserSeries<T: SeriesNumber>([PartSeries<T>; 2]);
 #[derive(Clone, Debug)]
 enum PartSeries<T: SeriesNumber> {
     Plain(TapeSeries<T>),
-    /// Where numbers are long.
-    Long(LongTape<T>),
+    /// Where series are multiplied as factors.
+    Factored(FactorTape<T>),
 }
 
 /// What the powers of a motion of `n` elements are, as far as they are known.
@@ -66,8 +66,8 @@ impl<T: SeriesNumber> At<'_, T> {
 impl<T: SeriesNumber> PartSeries<T> {
     fn new(force: &UserForce<T::Constant>, part: &Part, order: usize) -> Self {
         let is_number = |input: u32| matches!(force.inputs[input as usize], Input::Number(_));
-        match T::IS_LONG {
-            true => Self::Long(LongTape::new(&part.tape, order, is_number)),
+        match T::HAS_CONSTANTS {
+            true => Self::Factored(FactorTape::new(&part.tape, order, is_number)),
             false => Self::Plain(TapeSeries::new(&part.tape, order)),
         }
     }
@@ -76,7 +76,7 @@ impl<T: SeriesNumber> PartSeries<T> {
     fn power(&self, slot: Slot, m: usize) -> T {
         match self {
             Self::Plain(series) => series.of(slot)[m],
-            Self::Long(series) => series.power(slot, m),
+            Self::Factored(series) => series.power(slot, m),
         }
     }
 }
@@ -91,7 +91,7 @@ impl<T: SeriesNumber> UserSeries<T> {
     pub fn is_sound(&self) -> bool {
         self.0.iter().all(|part| match part {
             PartSeries::Plain(_) => true,
-            PartSeries::Long(series) => series.is_sound(),
+            PartSeries::Factored(series) => series.is_sound(),
         })
     }
 
@@ -108,7 +108,7 @@ impl<T: SeriesNumber> UserSeries<T> {
             let input = |number: u32| at.power(force, force.inputs[number as usize], m);
             match series {
                 PartSeries::Plain(series) => series.advance(&part.tape, m, input),
-                PartSeries::Long(series) => series.advance(&part.tape, m, scale, input),
+                PartSeries::Factored(series) => series.advance(&part.tape, m, scale, input),
             }
             for &(site, [x, y]) in &part.forces {
                 force.sites[site]

@@ -22,7 +22,7 @@ impl<T: SeriesNumber> Series<T> {
                 let mut torque =
                     (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).by(terms.tree.diagonal[i]);
                 let Factors { scale, z, rest, .. } = &self.factors;
-                if T::IS_LONG {
+                if T::HAS_CONSTANTS {
                     torque += z[i].cross(&rest[i], scale, m, 0..=m);
                 } else {
                     let rest = self.rest[..=m * n + i].iter().rev().step_by(n);
@@ -31,7 +31,7 @@ impl<T: SeriesNumber> Series<T> {
                 }
                 torque -= self.applied[m * n + i];
                 self.torque[m * n + i] = torque;
-                if T::IS_LONG {
+                if T::HAS_CONSTANTS {
                     let Factors { scale, drive, torque: torques, .. } = &mut self.factors;
                     torques[i].push(scale, torque);
                     power += torques[i].product(&drive[i], scale, m, 0..=m);

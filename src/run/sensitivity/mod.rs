@@ -1,10 +1,11 @@
 //! Sensitivities: derivatives of outputs and measures of a run by any number of its scene.
 //!
 //! One run of [`taylor`](crate::stepping::taylor) carries a column for each number beside the motion (module
-//! `variation`), through impacts and events that switch something (module `saltation`); what the number does to
-//! the equations is told by neighbouring mechanisms at one and the same state (module `neighbours`).  Nothing
-//! is a difference of runs, so that the derivatives are as accurate as the motion, however fast neighbouring
-//! motions part.
+//! `variation`), through impacts and events that switch something (module `saltation`).  Columns are power
+//! series on numbers with derivatives (module `expanded`) where the scene has such, and else integrated by
+//! collocation (module `collocation`); what a number does there, to the start, to outputs and to impacts, is
+//! told by neighbouring mechanisms at one and the same state (module `neighbours`).  Nothing is a difference of
+//! runs, so that the derivatives are as accurate as the motion, however fast neighbouring motions part.
 //!
 //! ```text
 //! dy/dp = Y_x δ + Y_p       of an output Y(t, x; p)       δ  the column of p
@@ -12,6 +13,7 @@
 //! ```
 
 mod collocation;
+mod expanded;
 mod lyapunov;
 mod measure;
 mod neighbours;
@@ -19,6 +21,7 @@ mod result;
 mod saltation;
 mod variation;
 
+use expanded::Expanded;
 pub use lyapunov::{Regime, Spectrum, lyapunov};
 pub use measure::Measure;
 pub(super) use measure::{Derived, outputs};
@@ -93,6 +96,7 @@ pub fn sensitivity(
 
 /// A scene with its numbers.
 pub(super) struct Study {
+    template: Template,
     pub scene: Scene,
     pub mechanism: Arc<Mechanism>,
     pub start: Motion,
@@ -136,8 +140,16 @@ impl Study {
         let plan = Plan::of_series(&mechanism, Tolerance { relative: tolerance, absolute: tolerance }, until);
         let times = times(until, request.every)?;
         let start = mechanism.start(&scene);
-        let mut study =
-            Self { scene, mechanism, start, plan, inputs: Vec::new(), neighbours: Vec::new(), times };
+        let mut study = Self {
+            template: template.clone(),
+            scene,
+            mechanism,
+            start,
+            plan,
+            inputs: Vec::new(),
+            neighbours: Vec::new(),
+            times,
+        };
         for name in &request.to {
             study.add_number(&template, name)?;
         }
@@ -237,7 +249,16 @@ impl Study {
     pub fn variation(&self) -> Result<Variation, SensitivityError> {
         let columns = self.neighbours.iter().map(|neighbours| neighbours.start.clone()).collect();
         let neighbours = self.neighbours.iter().cloned().map(Some).collect();
-        Variation::new(&self.mechanism, columns, neighbours).map_err(SensitivityError::Unsuited)
+        let mut variation =
+            Variation::new(&self.mechanism, columns, neighbours).map_err(SensitivityError::Unsuited)?;
+        let numbers: Vec<_> = self.inputs.iter().map(|input| (input.path.as_str(), input.value)).collect();
+        let expanded =
+            Expanded::new(&self.template, &self.scene, &self.mechanism, &numbers, &variation.columns);
+        let neighbours = &mut variation.neighbours;
+        variation.expanded = expanded
+            .ok()
+            .and_then(|mut expanded| expanded.agrees(&self.start, neighbours).then_some(expanded));
+        Ok(variation)
     }
 
     /// The run with the columns beside it.
@@ -303,8 +324,9 @@ impl Study {
             slopes: seen.derived.slopes.clone(),
         });
         let rows = rows.collect();
+        let by_series = variation.expanded.is_some();
         let Self { scene, inputs, plan, .. } = self;
-        Sensitivity { scene, inputs, measures, outputs, rows, until: plan.until, lost, steps }
+        Sensitivity { scene, inputs, measures, outputs, rows, until: plan.until, lost, steps, by_series }
     }
 }
 

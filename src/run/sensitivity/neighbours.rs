@@ -112,7 +112,7 @@ impl Neighbours {
         let is_rounding = number.1.abs() < ROUNDED;
         let is_near_zero = number.1 != 0.0 && number.1.abs() < most;
         let (attempt, error) = match is_near_zero.then(|| search(true)) {
-            Some(Ok(other)) if !other.0.does_nothing() => match own {
+            Some(Ok(other)) if is_rounding || !other.0.does_nothing() => match own {
                 Ok(own) if !own.0.does_nothing() && own.1 <= other.1 => own,
                 _ => other,
             },
@@ -132,6 +132,10 @@ impl Neighbours {
                 start[k] += weight * candidate.start.unwrapped(k);
                 start[n + k] += weight * candidate.start.omega[k].hi;
             }
+        }
+        if scale >= NEAR_ZERO && attempt.does_nothing() {
+            // What there is is rounding, which would grow with time.
+            start.fill(0.0);
         }
         let is_alike = attempt.list.iter().all(|(_, candidate)| is_alike(&candidate.mechanism, base));
         let neighbour = |(weight, candidate): (f64, Candidate)| Neighbour {

@@ -105,6 +105,9 @@ pub struct Sensitivity {
     pub lost: Option<String>,
     /// Steps of the motion and of the columns.
     pub steps: [u64; 2],
+    /// True where the columns are power series beside that of the motion, false where they are integrated by
+    /// collocation.
+    pub by_series: bool,
 }
 
 impl Sensitivity {

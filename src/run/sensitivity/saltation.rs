@@ -110,6 +110,7 @@ impl Variation {
             }
         }
         if is_other {
+            self.expanded = None;
             if let Some(off) = off {
                 self.off = off;
             }

@@ -18,6 +18,7 @@ use super::super::contact::{ContactDriver, JumpLog};
 use super::super::inside::{Observer, ObserverAdapter, Step};
 use super::super::trust::Ground;
 use super::collocation::{Collocation, STAGES};
+use super::expanded::{self, Expanded};
 use super::lyapunov::Dissipation;
 use super::neighbours::{Neighbours, residuals};
 use crate::dynamics::jacobian::Jacobian;
@@ -44,6 +45,8 @@ pub(in crate::run) struct Variation {
     pub columns: Vec<Vec<f64>>,
     /// What moves each column beside the motion.
     pub neighbours: Vec<Option<Neighbours>>,
+    /// The series of the columns, where they have such.
+    pub(super) expanded: Option<Expanded>,
     /// Impacts so far.
     pub impacts: Vec<Crossing>,
     jacobian: Jacobian,
@@ -116,6 +119,7 @@ impl Variation {
             mechanism: Arc::clone(mechanism),
             columns,
             neighbours,
+            expanded: None,
             impacts: Vec::new(),
             jumps: JumpLog::with_switches(),
             method: Collocation::new(),
@@ -161,6 +165,7 @@ impl Variation {
     #[cfg(feature = "fit")]
     pub fn add(&mut self, columns: &[Vec<f64>]) {
         self.columns.extend_from_slice(columns);
+        self.expanded = None;
         self.neighbours.resize(self.columns.len(), None);
         self.forcing.resize(self.columns.len(), Vec::new());
     }
@@ -197,16 +202,17 @@ impl Variation {
             let left = to - self.now;
             let pieces = (left / self.reach).ceil().max(1.0);
             let h = left / pieces;
-            self.look_at_nodes(step, h);
-            let Self { method, pull, columns, forcing, neighbours, .. } = self;
-            let floor = |neighbours: &Option<Neighbours>| neighbours.as_ref().map_or(0.0, |some| some.floor);
-            let floors: Vec<f64> = neighbours.iter().map(floor).collect();
-            let tail = method.step(h, pull, columns, (forcing, &floors), LIMIT);
-            let growth = 0.9 * libm::pow(LIMIT / tail.max(1e-12), 1.0 / (STAGES - 1) as f64);
-            if tail <= LIMIT {
+            let (now, columns) = (self.now, &mut self.columns);
+            let tail = self.expanded.as_mut().map(|expanded| expanded.advance(step, now, h, columns));
+            let (tail, limit, order) = match tail.filter(|tail| *tail != expanded::NEAR_SINGULAR) {
+                Some(tail) => (tail, expanded::LIMIT, expanded::ORDER),
+                None => (self.collocated(step, h), LIMIT, STAGES - 1),
+            };
+            let growth = 0.9 * libm::pow(limit / tail.max(f64::MIN_POSITIVE), 1.0 / order as f64);
+            if tail <= limit {
                 self.steps += 1;
                 if let Some(dissipation) = &mut self.dissipation {
-                    let nodes = method.weights.iter().zip(&dissipation.nodes);
+                    let nodes = self.method.weights.iter().zip(&dissipation.nodes);
                     dissipation.total += h * nodes.map(|(weight, trace)| weight * trace).sum::<f64>();
                 }
                 self.now = if pieces == 1.0 { to } else { self.now + h };
@@ -221,6 +227,15 @@ impl Variation {
             }
         }
         true
+    }
+
+    /// A step by collocation, and its last Legendre coefficient.
+    fn collocated(&mut self, step: &mut Step, h: f64) -> f64 {
+        self.look_at_nodes(step, h);
+        let Self { method, pull, columns, forcing, neighbours, .. } = self;
+        let floor = |neighbours: &Option<Neighbours>| neighbours.as_ref().map_or(0.0, |some| some.floor);
+        let floors: Vec<f64> = neighbours.iter().map(floor).collect();
+        method.step(h, pull, columns, (forcing, &floors), LIMIT)
     }
 
     /// Jacobians and forcing at the nodes of a step.
@@ -258,6 +273,9 @@ impl Variation {
 
     /// Puts the columns onto the constraints, which the numbers move too.
     pub fn keep(&mut self, motion: &Motion) {
+        if let Some(expanded) = &mut self.expanded {
+            return expanded.keep(&self.mechanism, &mut self.ground, motion, &mut self.columns);
+        }
         let Self { mechanism, ground: Some(ground), columns, neighbours, .. } = self else { return };
         let (t, phi, omega) = plain(motion);
         let state = State { time: t, y: [&phi[..], &omega[..]].concat(), ..State::default() };
@@ -317,16 +335,16 @@ impl Observer for Beside<'_, '_> {
             if variation.lost.is_some() || !variation.advance(step, time) {
                 return ControlFlow::Break(());
             }
-            let motion = step.at(time).clone();
-            variation.keep(&motion);
-            look.at(variation, &motion, time);
+            let motion = step.at(time);
+            variation.keep(motion);
+            look.at(variation, motion, time);
         }
         if variation.lost.is_some() || !variation.advance(step, end) {
             return ControlFlow::Break(());
         }
-        let motion = step.at(end).clone();
-        variation.keep(&motion);
-        look.stepped(variation, &motion, end);
+        let motion = step.at(end);
+        variation.keep(motion);
+        look.stepped(variation, motion, end);
         ControlFlow::Continue(())
     }
 }

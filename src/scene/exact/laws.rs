@@ -86,6 +86,9 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// The text of a formula, which must be smooth; a number by all its digits.
     fn formula_at(&self, at: &Cursor, plain: &str) -> Result<String, SceneError> {
+        if self.known_at(at.node).is_some() {
+            return Err(self.refuse_part(at, "it stands where a formula may"));
+        }
         if let Value::Number(value) = at.node.value {
             return Ok(format!("{:?}", self.literal(at.node, value)));
         }

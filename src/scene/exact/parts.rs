@@ -58,7 +58,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         if at.child("mass").is_some() {
             return Ok(Bar {
                 name,
-                length: C::of(plain.length),
+                length: self.number(at, "length", plain.length)?,
                 mass: self.number(at, "mass", plain.mass)?,
                 centre: self.pair(at, "centre", plain.centre)?,
                 inertia: self.number(at, "inertia", plain.inertia)?,

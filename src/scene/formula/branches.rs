@@ -78,10 +78,8 @@ impl Branches<f64> for BySign {
 }
 
 /// The same over a scalar with an order.
-#[cfg(feature = "digits")]
 pub(super) struct ByOrder;
 
-#[cfg(feature = "digits")]
 impl<S: crate::arithmetic::Real> Branches<S> for ByOrder {
     fn is_positive(&mut self, _: usize, value: S) -> bool {
         value > S::ZERO

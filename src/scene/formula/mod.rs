@@ -23,7 +23,6 @@ pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
 use crate::arithmetic::Scalar;
-#[cfg(feature = "digits")]
 use crate::scene::number::Decimal;
 
 /// The longest formula \[bytes\].
@@ -194,7 +193,6 @@ impl Formula {
     }
 
     /// Its value over a scalar with an order, with the numbers of its text exactly as written.
-    #[cfg(feature = "digits")]
     pub(crate) fn exact_value<S: Decimal>(&self, values: &[S]) -> S {
         let numbers = self.numbers();
         self.run_over(values, &|node, _| numbers[node], &mut branches::ByOrder)

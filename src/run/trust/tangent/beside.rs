@@ -133,9 +133,9 @@ impl<const D: usize> Beside for Expanded<D> {
         let [u, rest, rate] = &mut self.unknowns;
         let slope = |i: usize| std::array::from_fn(|j| columns.get(j).map_or(0.0, |column| column[i]));
         for i in 0..f {
-            u[i] = Dual { value: state.y[i], slope: slope(i) };
+            u[i] = Dual::new(state.y[i], slope(i));
             rest[i] = Dual::constant(state.low[i]);
-            rate[i] = Dual { value: state.y[f + i], slope: slope(f + i) };
+            rate[i] = Dual::new(state.y[f + i], slope(f + i));
         }
         self.series.expand(mechanism, state.time, u, rest, rate);
     }

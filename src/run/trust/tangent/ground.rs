@@ -78,6 +78,12 @@ impl Ground {
         self.shift(&mut column[n..2 * n]);
     }
 
+    /// Takes M⁻¹ Gᵀ S⁻¹ of what is left of every row at the state taken last off one half of a column.
+    pub fn take_off(&mut self, left: impl Iterator<Item = f64>, half: &mut [f64]) {
+        self.kernel.multiplier.iter_mut().zip(left).for_each(|(multiplier, left)| *multiplier = left);
+        self.shift(half);
+    }
+
     /// Takes off a half of a column what is not tangent to the constraints.
     pub fn flatten(&mut self, mechanism: &Mechanism, half: &mut [f64]) {
         for r in 0..mechanism.constraints.len() {
@@ -90,8 +96,8 @@ impl Ground {
     fn rates(&mut self, mechanism: &Mechanism, state: &State, column: &[f64]) {
         let n = mechanism.coordinates();
         for k in 0..n {
-            self.phi[k] = Number { value: state.y[k], slope: [column[k]] };
-            self.omega[k] = Number { value: state.y[n + k], slope: [column[n + k]] };
+            self.phi[k] = Number::new(state.y[k], [column[k]]);
+            self.omega[k] = Number::new(state.y[n + k], [column[n + k]]);
         }
         mechanism.tree.unit_vectors::<Number, 0>(&self.phi, &mut self.z);
         let at = Posture { phi: &self.phi, z: &self.z, omega: &self.omega };

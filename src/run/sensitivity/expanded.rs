@@ -1,0 +1,363 @@
+//! Small differences on a step of the motion as power series, beside the motion's own.
+//!
+//! ```text
+//! scene, its numbers p seeded  →  mechanism, all constants (c, c')  →  series (w_m, w_m') about (q + dq, w + dw; p + dp)
+//! du(h) = du + Σ w_m' h^(m+1)/(m+1),   dw(h) = Σ w_m' h^m,   m = 0…P          driven angles: dq_i = du_base + Σ ± theta'
+//! G dq + C_p dp = 0,  (G w + C_t)' (dq, dw) + C'_p dp = 0                      residuals on the same numbers, after every step
+//! ```
+//!
+//! The scene is read once more on [`Varied`] numbers, in which the numbers asked for are seeds, and compiled
+//! like any other, so that every constant of the equations has its exact derivatives by them.  The recurrence
+//! that expands the motion then expands its derivatives, of so many numbers at once as there are lanes, in the
+//! same order and with the same multipliers.  The motion stays what it was: its value is expanded again for
+//! every block of lanes.
+
+use super::super::inside::Step;
+use super::super::trust::Ground;
+use super::neighbours::Neighbours;
+use super::variation::plain;
+use crate::arithmetic::{Scalar, Varied};
+use crate::dynamics::compile::exact::ExactMechanism;
+use crate::dynamics::schur::NEAR;
+use crate::dynamics::series::{Constants, Series};
+use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
+use crate::scene::exact::Watched;
+use crate::scene::{Scene, Template};
+use std::sync::Arc;
+
+/// Highest power P of the rates: two more than the motion has, for derivatives of its powers.
+pub(super) const ORDER: usize = 22;
+/// The largest of the last powers in a step, over what is integrated.
+pub(super) const LIMIT: f64 = 1e-12;
+/// Powers the step is judged by.
+const JUDGES: usize = 2;
+/// What is returned near singular positions, whose multipliers have fewer digits than a series asks for.
+pub(super) const NEAR_SINGULAR: f64 = f64::INFINITY;
+/// What series and neighbours may differ by, over the largest derivative, and of rounding.
+const AGREEMENT: f64 = 1e-3;
+const ROUNDING: f64 = 1e-9;
+/// Powers that may be what is integrated.
+const LEADING: usize = 4;
+/// Lanes of a block.
+const WIDE: usize = 8;
+const NARROW: usize = 4;
+
+/// Columns of numbers of a scene, in blocks of lanes.
+pub(super) struct Expanded(Vec<(usize, Box<dyn Block>)>);
+
+/// So many columns as it was made for.
+trait Block {
+    /// Accelerations of the independent coordinates of a motion, with what each number alone does to them:
+    /// coordinate, value, and derivatives, lane by lane.
+    fn forcing(&mut self, motion: &Motion) -> Vec<(usize, f64, Vec<f64>)>;
+
+    /// Expands them beside a motion; returns the last powers in a step of `h` \[s\] over what is integrated.
+    fn expand(&mut self, motion: &Motion, h: f64, columns: &[Vec<f64>]) -> f64;
+
+    /// Takes them on by `h` \[s\] along their series.
+    fn advance(&mut self, motion: &Motion, h: f64, columns: &mut [Vec<f64>]);
+
+    /// Puts them onto the constraints at a motion, which is that of `ground`.
+    fn keep(&mut self, ground: &mut Option<Ground>, motion: &Motion, columns: &mut [Vec<f64>]);
+}
+
+impl Expanded {
+    /// Of numbers at some paths of a scene, whose mechanism and derivatives of the start are these.
+    ///
+    /// # Errors
+    /// Why there are no such series.
+    pub fn new(
+        template: &Template,
+        scene: &Scene,
+        mechanism: &Arc<Mechanism>,
+        numbers: &[(&str, f64)],
+        starts: &[Vec<f64>],
+    ) -> Result<Self, String> {
+        let (mut blocks, mut first) = (Vec::new(), 0);
+        while first < numbers.len() {
+            let left = numbers.len() - first;
+            let count = left.min(if left > NARROW { WIDE } else { NARROW });
+            let own = first..first + count;
+            let (numbers, starts) = (&numbers[own.clone()], &starts[own]);
+            let block: Box<dyn Block> = match count > NARROW {
+                true => Box::new(Lanes::<WIDE>::new(template, scene, mechanism, numbers, starts)?),
+                false => Box::new(Lanes::<NARROW>::new(template, scene, mechanism, numbers, starts)?),
+            };
+            blocks.push((count, block));
+            first += count;
+        }
+        Ok(Self(blocks))
+    }
+
+    /// True where what the numbers do to the accelerations of a motion is what their neighbours say.
+    pub fn agrees(&mut self, motion: &Motion, neighbours: &mut [Option<Neighbours>]) -> bool {
+        let (t, phi, omega) = plain(motion);
+        let mut forcing: Vec<Vec<f64>> = Vec::new();
+        let mut sizes = Vec::new();
+        for neighbours in neighbours.iter_mut() {
+            let (mut sum, mut size) = (vec![0.0; phi.len()], 0.0_f64);
+            for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
+                let weight = neighbour.weight;
+                for (sum, &acceleration) in sum.iter_mut().zip(neighbour.accelerations(t, &phi, &omega)) {
+                    *sum += weight * acceleration;
+                    size = size.max((ROUNDING * weight * acceleration).abs());
+                }
+            }
+            size = sum.iter().fold(size, |size, slope| size.max(AGREEMENT * slope.abs()));
+            forcing.push(sum);
+            sizes.push(size);
+        }
+        let mut first = 0;
+        self.0.iter_mut().all(|(count, block)| {
+            let own = first..first + *count;
+            first += *count;
+            block.forcing(motion).iter().all(|(body, value, slopes)| {
+                let mut lanes = own.clone().zip(slopes);
+                let least = (ROUNDING * value).abs();
+                lanes
+                    .all(|(number, slope)| (slope - forcing[number][*body]).abs() <= sizes[number].max(least))
+            })
+        })
+    }
+
+    /// Calls `each` with all blocks and their columns.
+    fn each(&mut self, mut columns: &mut [Vec<f64>], mut each: impl FnMut(&mut dyn Block, &mut [Vec<f64>])) {
+        for (count, block) in &mut self.0 {
+            let (own, rest) = columns.split_at_mut(*count);
+            each(block.as_mut(), own);
+            columns = rest;
+        }
+    }
+
+    /// Takes columns from a time inside a step on by `h` \[s\]; returns the last powers over what is
+    /// integrated, and leaves the columns alone where that is above [`LIMIT`].
+    pub fn advance(&mut self, step: &mut Step, from: f64, h: f64, columns: &mut [Vec<f64>]) -> f64 {
+        let motion = step.at(from);
+        let mut most = 0.0_f64;
+        self.each(columns, |block, columns| most = larger(most, block.expand(motion, h, columns)));
+        if most <= LIMIT {
+            self.each(columns, |block, columns| block.advance(motion, h, columns));
+        }
+        most
+    }
+
+    /// Puts columns onto the constraints at a motion.
+    pub fn keep(
+        &mut self,
+        mechanism: &Mechanism,
+        ground: &mut Option<Ground>,
+        motion: &Motion,
+        columns: &mut [Vec<f64>],
+    ) {
+        if let Some(ground) = ground.as_mut().filter(|_| mechanism.has_multipliers()) {
+            let (time, phi, omega) = plain(motion);
+            ground.stand(mechanism, &State { time, y: [phi, omega].concat(), ..State::default() });
+        }
+        self.each(columns, |block, columns| block.keep(ground, motion, columns));
+    }
+}
+
+/// The larger one, or what is not a number.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+/// `D` columns, of which some may be idle.
+struct Lanes<const D: usize> {
+    mechanism: ExactMechanism<Varied<D>>,
+    coordinates: Coordinates,
+    series: Series<Varied<D>>,
+    /// All coordinates and rates with the columns as derivatives.
+    all: [Vec<Varied<D>>; 2],
+    /// The independent ones, and what the leading part leaves out of the coordinates.
+    own: [Vec<Varied<D>>; 2],
+    rest: Vec<Varied<D>>,
+    /// 1/(m+1).
+    fractions: [f64; ORDER + 1],
+    jacobian: Vec<Varied<D>>,
+}
+
+impl<const D: usize> Lanes<D> {
+    fn new(
+        template: &Template,
+        plain: &Scene,
+        structure: &Arc<Mechanism>,
+        numbers: &[(&str, f64)],
+        starts: &[Vec<f64>],
+    ) -> Result<Self, String> {
+        let seed = |(lane, &(path, value)): (usize, &(_, f64))| (path, Varied::<D>::unknown(value, lane));
+        let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
+        let (mut scene, _) =
+            template.exact_with(&[], &known, Watched::Changes).map_err(|error| error.to_string())?;
+        // Angles that are kept from the start are those of the start that was found.
+        let found = structure.start(plain);
+        for (k, start) in scene.start.iter_mut().enumerate() {
+            start.phi = Varied::new(found.unwrapped(k), slopes(starts, k));
+        }
+        let mechanism = ExactMechanism::new(&scene, structure)?;
+        let (n, rows) = (structure.coordinates(), structure.constraints.len());
+        if mechanism.tree.coordinates != n || mechanism.constraints.len() != rows {
+            return Err("the mechanism is of another kind".into());
+        }
+        let coordinates =
+            if structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent };
+        let series = Series::of_terms(&mechanism.terms(), coordinates, ORDER);
+        let room = |count: usize| vec![Varied::ZERO; count];
+        let f = series.coordinates();
+        Ok(Self {
+            series,
+            coordinates,
+            mechanism,
+            all: [room(n), room(n)],
+            own: [room(f), room(f)],
+            rest: room(f),
+            fractions: std::array::from_fn(|m| 1.0 / (m + 1) as f64),
+            jacobian: room(rows * n),
+        })
+    }
+
+    /// Takes the state of a motion, with its columns.
+    fn take(&mut self, motion: &Motion, columns: &[Vec<f64>]) {
+        let n = self.all[0].len();
+        let [phi, omega] = &mut self.all;
+        for k in 0..n {
+            phi[k] = Varied::new(motion.phi[k].hi, slopes(columns, k));
+            omega[k] = Varied::new(motion.omega[k].hi, slopes(columns, n + k));
+        }
+        for c in 0..self.rest.len() {
+            let body = match self.coordinates {
+                Coordinates::All => c,
+                _ => self.mechanism.partition.independent[c],
+            };
+            self.own[0][c] = self.all[0][body];
+            self.own[1][c] = self.all[1][body];
+            self.rest[c] = Varied::constant(motion.phi[body].lo);
+        }
+    }
+
+    /// Gives the derivatives of all coordinates and rates at a time, from those of the independent ones.
+    fn give(&mut self, t: Time, columns: &mut [Vec<f64>]) {
+        let n = self.all[0].len();
+        for k in 0..n {
+            let (mut phi, mut omega);
+            if self.coordinates == Coordinates::All {
+                (phi, omega) = (self.own[0][k], self.own[1][k]);
+            } else {
+                let dependent = &self.mechanism.partition.bodies[k];
+                let of = |own: &[Varied<D>]| dependent.base.map_or(Varied::ZERO, |base| own[base]);
+                (phi, omega) = (of(&self.own[0]), of(&self.own[1]));
+                for (sign, law) in &dependent.laws {
+                    phi += Varied::law_value(law, t).scale(*sign);
+                    omega += Varied::phase(law, t).rate.scale(*sign);
+                }
+            }
+            for (lane, column) in columns.iter_mut().enumerate() {
+                (column[k], column[n + k]) = (phi.slope[lane], omega.slope[lane]);
+            }
+        }
+    }
+
+    /// The largest of the last powers in a step of `h` \[s\] over what is integrated, of so many columns.
+    fn tail(&self, h: f64, count: usize) -> f64 {
+        let f = self.own[0].len();
+        let mut power = 1.0;
+        let (mut whole, mut last) = ([0.0; D], [0.0; D]);
+        let note = |sizes: &mut [f64; D], numbers: &[Varied<D>], factor: f64| {
+            for number in numbers {
+                for lane in 0..D {
+                    sizes[lane] = larger(sizes[lane], number.slope[lane].abs() * factor);
+                }
+            }
+        };
+        note(&mut whole, &self.own[0], 1.0 / h);
+        for m in 0..=ORDER {
+            let rates = &self.series.rate[m * f..(m + 1) * f];
+            if m < LEADING {
+                note(&mut whole, rates, power);
+            } else if m > ORDER - JUDGES {
+                note(&mut last, rates, power);
+            }
+            power *= h;
+        }
+        let share = |lane: usize| if whole[lane] > 0.0 { last[lane] / whole[lane] } else { whole[lane] };
+        (0..count).map(share).fold(0.0, larger)
+    }
+}
+
+/// What the columns of a block are in one place.
+#[inline]
+fn slopes<const D: usize>(columns: &[Vec<f64>], place: usize) -> [f64; D] {
+    let mut slopes = [0.0; D];
+    for (slope, column) in slopes.iter_mut().zip(columns) {
+        *slope = column[place];
+    }
+    slopes
+}
+
+impl<const D: usize> Block for Lanes<D> {
+    fn forcing(&mut self, motion: &Motion) -> Vec<(usize, f64, Vec<f64>)> {
+        self.expand(motion, 1.0, &[]);
+        let f = self.own[0].len();
+        let body = |c: usize| match self.coordinates {
+            Coordinates::All => c,
+            _ => self.mechanism.partition.independent[c],
+        };
+        let of = |c: usize| {
+            let Varied { value, slope, .. } = self.series.rate[f + c];
+            (body(c), value, slope.to_vec())
+        };
+        (0..f).map(of).collect()
+    }
+
+    fn expand(&mut self, motion: &Motion, h: f64, columns: &[Vec<f64>]) -> f64 {
+        self.take(motion, columns);
+        let [u, rate] = &self.own;
+        self.series.expand_terms(&self.mechanism.terms(), motion.time, u, &self.rest, rate);
+        if self.series.weakest().share < NEAR {
+            return NEAR_SINGULAR;
+        }
+        self.tail(h, columns.len())
+    }
+
+    fn advance(&mut self, motion: &Motion, h: f64, columns: &mut [Vec<f64>]) {
+        let f = self.own[0].len();
+        for c in 0..f {
+            let (mut turn, mut speed) = ([0.0; D], [0.0; D]);
+            for m in (0..=ORDER).rev() {
+                let power = &self.series.rate[m * f + c].slope;
+                let fraction = self.fractions[m];
+                for lane in 0..D {
+                    turn[lane] = turn[lane] * h + power[lane] * fraction;
+                    speed[lane] = speed[lane] * h + power[lane];
+                }
+            }
+            for lane in 0..D {
+                self.own[0][c].slope[lane] += h * turn[lane];
+            }
+            self.own[1][c].slope = speed;
+        }
+        self.give(motion.time + h, columns);
+    }
+
+    fn keep(&mut self, ground: &mut Option<Ground>, motion: &Motion, columns: &mut [Vec<f64>]) {
+        if self.coordinates != Coordinates::All {
+            if self.mechanism.partition.driven() {
+                self.take(motion, columns);
+                self.give(motion.time, columns);
+            }
+            return;
+        }
+        let (Some(ground), n) = (ground, self.all[0].len()) else { return };
+        for level in 0..2 {
+            self.take(motion, columns);
+            let [phi, omega] = &self.all;
+            self.jacobian.fill(Varied::ZERO);
+            let left = self.mechanism.residuals(motion.time, phi, omega, &mut self.jacobian);
+            for (lane, column) in columns.iter_mut().enumerate() {
+                let half = &mut column[level * n..(level + 1) * n];
+                ground.take_off(left.iter().map(|left| left[level].slope[lane]), half);
+            }
+        }
+    }
+}
