@@ -8,7 +8,7 @@ const G: f64 = 9.81;
 
 fn runs(text: &str) -> Vec<Outcome> {
     let scene = scene(text);
-    [(MethodId::Dp5, 1e-12), (MethodId::Dp8, 1e-12), (MethodId::Radau(5), 1e-12)]
+    [(MethodId::Taylor, 1e-13), (MethodId::Dp5, 1e-12), (MethodId::Dp8, 1e-12), (MethodId::Radau(5), 1e-12)]
         .map(|(method, tolerance)| {
             let outcome = run(&scene, &adaptive(method, tolerance));
             assert!(outcome.stop.is_none(), "{method}: {:?}", outcome.stop);

@@ -71,6 +71,7 @@ mod scaling;
 mod scenes;
 mod sensitivity;
 mod singular;
+mod spring_laws;
 mod stabilization;
 mod stiff;
 mod switched_orders;

@@ -18,7 +18,7 @@ use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, To
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) -> Motion {
+pub fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) -> Motion {
     let mechanism = compile(scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(scene));
@@ -31,7 +31,7 @@ fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) 
     motion
 }
 
-fn distance(a: &Motion, b: &Motion) -> f64 {
+pub fn distance(a: &Motion, b: &Motion) -> f64 {
     let parts = |m: &Motion| (0..m.phi.len()).flat_map(|k| [m.phi[k], m.omega[k]]).collect::<Vec<_>>();
     let angles = parts(a).into_iter().zip(parts(b)).map(|(a, b)| (a - b).hi.abs()).fold(0.0, f64::max);
     angles.max((a.work - b.work).hi.abs())
@@ -71,7 +71,7 @@ fn double_double_agrees_with_itself_at_another_order() {
 }
 
 /// The method at a tolerance and order on one kind of code.
-fn on(kernel: Kernel, tolerance: f64, order: usize) -> Taylor<f64> {
+pub fn on(kernel: Kernel, tolerance: f64, order: usize) -> Taylor<f64> {
     let mut method = Taylor::with_order(tolerance, order);
     method.kernel = kernel;
     method

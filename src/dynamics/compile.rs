@@ -723,7 +723,9 @@ impl Mechanism {
 
     /// True where a law may be flat to the last digit at one place and not at another.
     pub fn may_be_flat(&self) -> bool {
-        self.forces.iter().any(|force| force.may_be_flat)
+        let is_flat_aim =
+            |row: &ConstraintEquation| row.aim.as_ref().is_some_and(|aim| aim.tape.may_be_flat());
+        self.forces.iter().any(|force| force.may_be_flat) || self.constraints.iter().any(is_flat_aim)
     }
 
     /// True where laws have corners, places stick and slide or events change what acts, so that steps end
@@ -732,8 +734,9 @@ impl Mechanism {
         !self.frictions.is_empty() || self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
     }
 
-    /// True where the motion has a power series: the mean force of a vibration, dry friction and aims that depend
-    /// on the mechanism have none, and it takes the matrices of the tree.
+    /// True where power series are chosen and serve as references: not with the mean force of a vibration,
+    /// which has none, nor with dry friction and aims that depend on the mechanism, which `taylor` takes
+    /// where it is asked for; and it takes the matrices of the tree.
     pub fn has_series(&self) -> bool {
         self.vibration.is_none() && self.frictions.is_empty() && !self.has_aims() && self.tree.is_dense()
     }

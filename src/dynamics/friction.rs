@@ -210,7 +210,7 @@ impl Mechanism {
 
     /// The force \[N\] that presses a place, as a vector where it is that of a joint, of an evaluation with
     /// these multipliers and joint forces.
-    fn normal_force<T: Real>(
+    pub(super) fn normal_force<T: Real>(
         &self,
         friction: &Friction,
         multiplier: &[T],
@@ -224,7 +224,7 @@ impl Mechanism {
 }
 
 /// The size of a normal force, and the direction in which it grows; a wall's pressure has a sign.
-fn size<T: Real>(normal: Normal, force: Complex<T>) -> (T, Complex<T>) {
+pub(super) fn size<T: Real>(normal: Normal, force: Complex<T>) -> (T, Complex<T>) {
     if let Normal::Contact(_) = normal {
         return (-force.re, Complex::new(-T::ONE, T::ZERO));
     }
@@ -240,6 +240,51 @@ struct Response<T> {
     acceleration: Vec<T>,
     multiplier: Vec<T>,
     normal: Vec<Complex<T>>,
+}
+
+/// Finds tau of places with these coefficients c, `tau_j = c_j N_j`, whose normal forces are `start`
+/// without it and change by `response(j, k)` with that of place k, from the tau given; returns the
+/// determinant of the equations.
+pub(super) fn forces<T: Real>(
+    sliding: &[(Normal, T)],
+    start: &[Complex<T>],
+    response: impl Fn(usize, usize) -> Complex<T>,
+    tau: &mut [T],
+) -> f64 {
+    let (mut left, mut last) = (MORE_ROUNDS, f64::INFINITY);
+    let mut regularity = T::ONE.value();
+    for _ in 0..ROUNDS {
+        // F_j = tau_j - c_j N_j(tau), and its Jacobian.
+        let f = sliding.len();
+        let (mut matrix, mut change) = (vec![T::ZERO; f * f], vec![T::ZERO; f]);
+        for (j, &(normal, coefficient)) in sliding.iter().enumerate() {
+            let mut force = start[j];
+            for (k, &tau) in tau.iter().enumerate() {
+                force += response(j, k).times(tau);
+            }
+            let (size, along) = size(normal, force);
+            change[j] = coefficient * size - tau[j];
+            for k in 0..f {
+                matrix[j * f + k] = -coefficient * along.dot(response(j, k));
+            }
+            matrix[j * f + j] += T::ONE;
+        }
+        regularity = solve(&mut matrix, &mut change);
+        let mut moved = 0.0_f64;
+        for (tau, &change) in tau.iter_mut().zip(&change) {
+            *tau += change;
+            moved = moved.max(change.value().abs() / tau.value().abs().max(f64::MIN_POSITIVE));
+        }
+        // Below a few units in the last place it only goes to and fro.
+        if moved <= 1e-14 || (moved >= last && moved < 1e-12) {
+            left -= 1;
+            if T::IS_PLAIN || left == 0 {
+                break;
+            }
+        }
+        last = moved;
+    }
+    regularity
 }
 
 impl<T: Real> Kernel<T> {
@@ -267,40 +312,10 @@ impl<T: Real> Kernel<T> {
             .collect();
         let responses: Vec<Response<T>> =
             (0..sliding.len()).map(|j| self.response(mechanism, &sliding, j)).collect();
-        let coefficient: Vec<T> =
-            sliding.iter().map(|(friction, sign)| T::of(sign * friction.kinetic)).collect();
-        let (mut left, mut last) = (MORE_ROUNDS, f64::INFINITY);
-        for _ in 0..ROUNDS {
-            // F_j = tau_j - c_j N_j(tau), and its Jacobian.
-            let f = sliding.len();
-            let (mut matrix, mut change) = (vec![T::ZERO; f * f], vec![T::ZERO; f]);
-            for j in 0..f {
-                let mut force = start[j];
-                for (response, &tau) in responses.iter().zip(&self.friction) {
-                    force += response.normal[j].times(tau);
-                }
-                let (size, along) = size(sliding[j].0.normal, force);
-                change[j] = coefficient[j] * size - self.friction[j];
-                for (k, response) in responses.iter().enumerate() {
-                    matrix[j * f + k] = -coefficient[j] * along.dot(response.normal[j]);
-                }
-                matrix[j * f + j] += T::ONE;
-            }
-            self.regularity = solve(&mut matrix, &mut change);
-            let mut moved = 0.0_f64;
-            for (tau, &change) in self.friction.iter_mut().zip(&change) {
-                *tau += change;
-                moved = moved.max(change.value().abs() / tau.value().abs().max(f64::MIN_POSITIVE));
-            }
-            // Below a few units in the last place it only goes to and fro.
-            if moved <= 1e-14 || (moved >= last && moved < 1e-12) {
-                left -= 1;
-                if T::IS_PLAIN || left == 0 {
-                    break;
-                }
-            }
-            last = moved;
-        }
+        let places: Vec<(Normal, T)> = (sliding.iter())
+            .map(|(friction, sign)| (friction.normal, T::of(sign * friction.kinetic)))
+            .collect();
+        self.regularity = forces(&places, &start, |j, k| responses[k].normal[j], &mut self.friction);
         for (response, &tau) in responses.iter().zip(&self.friction) {
             for (load, &change) in self.load.iter_mut().zip(&response.acceleration) {
                 *load += change * tau;
@@ -369,7 +384,7 @@ impl<T: Real> Kernel<T> {
 }
 
 /// Solves a small system in place by elimination with exchange of rows, and returns its determinant.
-fn solve<T: Real>(matrix: &mut [T], x: &mut [T]) -> f64 {
+pub(super) fn solve<T: Real>(matrix: &mut [T], x: &mut [T]) -> f64 {
     let d = x.len();
     let mut determinant = 1.0;
     for k in 0..d {

@@ -164,6 +164,16 @@ impl Mechanism {
         for (row, &multiplier) in self.constraints.iter().zip(multipliers) {
             row.add_force(z, multiplier, carried);
         }
+        self.pass_on(multipliers, carried, forces);
+    }
+
+    /// The same where what rows push the bodies with is in what these need.
+    pub(super) fn pass_on<T: Scalar>(
+        &self,
+        multipliers: &[T],
+        carried: &mut [Complex<T>],
+        forces: &mut Vec<Complex<T>>,
+    ) {
         for &body in self.forest.order.iter().rev() {
             if let Some(parent) = self.forest.hangs[body].origin_point.parent() {
                 let force = carried[body];

@@ -25,11 +25,13 @@
 //! couplings is ours.
 
 mod action;
+mod aim;
 mod bodywise;
 mod coefficient;
 mod doubles;
 mod drive;
 mod factors;
+mod friction;
 #[cfg(feature = "digits")]
 mod long;
 mod own;
@@ -46,6 +48,7 @@ use self::bodywise::Bodywise;
 pub use self::coefficient::{Coefficient, Constants, SeriesNumber, Terms};
 pub use self::drive::powers;
 use self::factors::{Factors, Scale};
+use self::friction::FrictionSeries;
 use self::polynomial::{Fractions, UNROLLED, convolve, width, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
@@ -93,6 +96,8 @@ pub struct Series<T: SeriesNumber> {
     /// The time at the start \[s\].
     time: T,
     rows: RowSeries<T>,
+    /// What slides with dry friction.
+    friction: Option<Box<FrictionSeries<T>>>,
     turned: Vec<Complex<T>>,
     bend: Vec<Complex<T>>,
     load: Vec<T>,
@@ -145,6 +150,7 @@ impl<T: SeriesNumber> Series<T> {
             time: T::ZERO,
             springs: terms.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
             rows: RowSeries::new(terms, &partition, order, bodywise.is_none()),
+            friction: FrictionSeries::new(mechanism, order).map(Box::new),
             turned: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: zeros(n),
@@ -201,6 +207,11 @@ impl<T: SeriesNumber> Series<T> {
         self.law_series(terms, t);
         T::begin(self, t, u, u_rest, u_rate);
         T::orders(self, terms, 0);
+        if self.turn_rails(terms.structure.units.time) {
+            T::begin(self, t, u, u_rest, u_rate);
+            T::orders(self, terms, 0);
+            self.turn_back();
+        }
     }
 
     /// The row in force nearest to being left out at the start.
@@ -252,6 +263,8 @@ impl<T: SeriesNumber> Series<T> {
             self.omega[i] = dependent_angle.base.map_or(T::ZERO, |base| u_rate[base]);
         }
         self.rows.begin(t);
+        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        self.rows.advance_aims(0, at, &mut self.load);
     }
 
     /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double
@@ -304,7 +317,7 @@ impl<T: SeriesNumber> Series<T> {
             } else {
                 self.bend::<N>(m);
                 self.balance::<N>(terms, m);
-                self.solve::<N>(terms, m);
+                self.slide::<N>(terms, m);
             }
             self.work_integral(terms, m);
         }
@@ -424,9 +437,17 @@ impl<T: SeriesNumber> Series<T> {
     fn force(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let n = self.elements;
         let rest = &mut self.rest[m * n..(m + 1) * n];
+        let mut on_bodies = self.friction.as_mut().map(|friction| &mut friction.applied[..]);
+        if let Some(on_bodies) = &mut on_bodies {
+            on_bodies.fill(Complex::ZERO);
+        }
         for (spring, series) in terms.springs.iter().zip(&mut self.springs) {
             let force = series.force(spring, m, &self.z, n, &self.factors.scale);
             spring.span.spread(force, |k, force| rest[k] -= force);
+            if let Some(on_bodies) = &mut on_bodies {
+                let ends = spring.bodies.iter().zip([force, -force]);
+                ends.for_each(|(body, force)| body.iter().for_each(|&body| on_bodies[body] += force));
+            }
         }
         if !terms.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
             let applied = &mut self.applied[m * n..(m + 1) * n];
@@ -436,16 +457,29 @@ impl<T: SeriesNumber> Series<T> {
             }
             for (action, series) in terms.actions.iter().zip(&mut self.actions) {
                 series.act(action, m, &self.z, n, (rest, applied), &self.factors.scale);
+                if let Some(on_bodies) = &mut on_bodies {
+                    on_bodies[action.body] += series.force(m);
+                }
             }
             let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
             for (force, series) in terms.forces.iter().zip(&mut self.forces) {
                 series.act(force, m, at, (&mut *rest, &mut *applied), &self.factors.scale);
+                if let Some(on_bodies) = &mut on_bodies {
+                    series.forces(force, m, |body, force| on_bodies[body] += force);
+                }
             }
             for (load, &applied) in self.load.iter_mut().zip(applied.iter()) {
                 *load += applied;
             }
         }
         self.rows.geometric_terms(m, &self.z, n, rest);
+        if m > 0 {
+            let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+            self.rows.advance_aims(m, at, &mut self.load);
+        }
+        if let Some(friction) = &self.friction {
+            friction.geometric_terms(m, &self.z, n, rest);
+        }
     }
 
     /// a_m from the loads, the newest powers of w and z, and R_m completed.

@@ -134,7 +134,7 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             let mut taylor = Taylor::new(tolerance);
             taylor.extended = plan.extended;
             match plan.stabilization {
-                Stabilization::None if mechanism.constraints.is_empty() => {
+                Stabilization::None if mechanism.constraints.is_empty() && mechanism.frictions.is_empty() => {
                     driver(sized!(n, eliminated(mechanism)), taylor, start)
                 }
                 Stabilization::Projection => driver(problem(), Projected::new(taylor), start),
@@ -180,7 +180,7 @@ pub(super) fn exact(
     tolerance: f64,
 ) -> Box<dyn Driver> {
     let taylor = Taylor::<DoubleDouble>::with_order(tolerance, order);
-    match mechanism.has_multipliers() {
+    match mechanism.has_multipliers() || !mechanism.frictions.is_empty() {
         true => driver(form::<0>(mechanism, Stabilization::None, 1.0), taylor, start),
         false => driver(eliminated::<0>(mechanism), taylor, start),
     }

@@ -185,7 +185,7 @@ fn chosen(
         return (classic, format!("the vibration of rigid spring {} acts by its mean force", vibration.name));
     }
     if mechanism.has_aims() && request.step.is_none() {
-        return (classic, "motors have aims that depend on the mechanism, which have no power series".into());
+        return (classic, "motors have aims that depend on the mechanism, kept by projection".into());
     }
     if request.step.is_some() {
         let why = if mechanism.has_closed_loops() {

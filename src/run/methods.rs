@@ -80,7 +80,7 @@ pub const METHODS: &[MethodInfo] = &[
         "taylor",
         24,
         "the most accurate path, below 1e-8 (power series, order 16 to 24)",
-        "no dry friction, no Baumgarte's term",
+        "no Baumgarte's term",
     ),
     radau(3, "radau5"),
     radau(5, "radau9"),

@@ -13,7 +13,7 @@ use super::error::SceneError;
 use super::format::{LAW, SCENE, START};
 use super::locate::{Node, Value};
 use super::read::{parse_scene, put_together, read_text, source_name};
-use super::set::{Override, SEVERAL, Step, hint, name, steps};
+use super::set::{Override, SEVERAL, hint, name};
 use super::{Output, Scene};
 use std::path::Path;
 

@@ -256,8 +256,9 @@ impl<T: Coefficient> Taylor<T> {
             ));
         }
         let is_portable = self.kernel == Kernel::Portable;
-        let (tolerance, order, extended) = (self.tolerance, self.order, self.extended);
-        let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series;
+        let has_friction = !mechanism.frictions.is_empty();
+        let (tolerance, order, extended) = (self.tolerance, self.order, self.extended && !has_friction);
+        let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series && !has_friction;
         // The lanes know neither walls nor rows that are not eliminated.
         let is_simple = mechanism.contacts.is_empty()
             && (mechanism.constraints.is_empty() || coordinates == Coordinates::Independent);
@@ -300,6 +301,7 @@ impl<T: Coefficient> Taylor<T> {
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
         wanted = wanted.min(walls_known(problem.mechanism(), state.time, expansion.series().order()));
+        wanted = expansion.until_reversal(wanted);
         if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
             let singular_passage = self.singular_passage.get_or_insert_with(|| {
                 SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion)
@@ -394,8 +396,8 @@ fn trace<T: Coefficient, P: Form + ?Sized>(
     match mechanism.held.iter().position(|&held| held == contact) {
         None => series.gap(&mechanism.contacts[contact], t, powers),
         Some(place) => {
-            // The rows of the contacts that are held are the last ones.
-            let from_end = mechanism.held.len() - place;
+            // The rows of the contacts that are held are the last ones, but for those of what sticks.
+            let from_end = mechanism.held.len() - place + mechanism.sticking();
             let force = |m| {
                 series
                     .multipliers(m)

@@ -152,13 +152,12 @@ impl Tape {
         self.operations.len()
     }
 
-    /// True where it has exponentials, hyperbolic tangents or quotients.
+    /// True where it has exponentials, hyperbolic tangents or quotients by what is no constant.
     pub fn may_be_flat(&self) -> bool {
-        self.operations.iter().any(|operation| {
-            matches!(
-                operation,
-                Operation::Exponential(_) | Operation::HyperbolicTangent(_) | Operation::Divide(..)
-            )
+        self.operations.iter().any(|operation| match *operation {
+            Operation::Exponential(_) | Operation::HyperbolicTangent(_) => true,
+            Operation::Divide(_, by) => !matches!(self.operations[by as usize], Operation::Constant(_)),
+            _ => false,
         })
     }
 

@@ -18,7 +18,7 @@ use std::cell::RefCell;
 
 /// What a formula of time and place asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Input {
+pub(in crate::dynamics) enum Input {
     Time,
     Angle(usize),
     Cosine(usize),
@@ -32,14 +32,14 @@ enum Input {
 /// A formula of time and place with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aim {
-    tape: Tape,
-    inputs: Vec<Input>,
+    pub(in crate::dynamics) tape: Tape,
+    pub(in crate::dynamics) inputs: Vec<Input>,
     /// f, f_t and f'' at zero acceleration.
     value: Slot,
-    drive: Slot,
-    convective: Slot,
+    pub(in crate::dynamics) drive: Slot,
+    pub(in crate::dynamics) convective: Slot,
     /// f_q by coordinate.
-    slopes: Vec<(usize, Slot)>,
+    pub(in crate::dynamics) slopes: Vec<(usize, Slot)>,
     /// The angles it is the aim of; none where that is a travel.
     pub angles: Vec<usize>,
     /// True where it depends on time.

@@ -5,7 +5,7 @@
 //! on the other branch, so that no method ever steps across a corner.
 
 use super::UserForce;
-use super::law::Recorded;
+use super::law::{Acts, Law, Recorded};
 use crate::arithmetic::tape::Symbol;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::{Aim, Site};
@@ -86,26 +86,19 @@ impl<C: Real> Expression<C> {
         self.formula.evaluate_over(&values, modes, |node| at.constant(self.numbers[node]))
     }
 
+    /// Its value on those branches where `value` says what its names stand for; `None` where it does not.
+    pub fn over<S: Scalar>(
+        &self,
+        modes: &[bool],
+        value: impl Fn(&Meaning<Site<C>>) -> Option<S>,
+    ) -> Option<S> {
+        let values: Option<Vec<S>> = self.meanings.iter().map(value).collect();
+        Some(self.formula.evaluate(&values?, self.modes(modes)))
+    }
+
     fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
         modes.get(self.first..self.first + self.formula.conditions()).unwrap_or(&[])
     }
-}
-
-/// Where a law acts.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Acts<C = f64> {
-    Point { site: Site<C>, follows: bool, force: [Expression<C>; 2] },
-    Torque { body: usize, base: Option<usize>, torque: Expression<C> },
-    Span { sites: [Site<C>; 2], tension: Expression<C> },
-    Nowhere,
-}
-
-/// One law.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Law<C = f64> {
-    pub name: String,
-    pub potential: Option<Expression<C>>,
-    pub place: Acts<C>,
 }
 
 /// An event of a scene.
@@ -139,7 +132,7 @@ pub(crate) struct Driven {
 pub(crate) struct Formulas<C = f64> {
     /// Values of the parameters at the start.
     pub parameters: Vec<C>,
-    signals: Vec<Expression<C>>,
+    pub(super) signals: Vec<Expression<C>>,
     laws: Vec<Law<C>>,
     /// Laws of motors and walls that are formulas.
     profiles: Vec<(Driven, Expression<C>)>,
@@ -224,11 +217,8 @@ impl<C: Decimal> Formulas<C> {
                 Load::Spring { between, potential, tension } => {
                     let sites = between.each_ref().map(|place| forest.site(place));
                     let potential = potential.as_deref().map(&mut expression).transpose()?;
-                    let place = match tension {
-                        Some(tension) => Acts::Span { sites, tension: expression(tension)? },
-                        None => Acts::Nowhere,
-                    };
-                    (potential, place)
+                    let tension = tension.as_deref().map(&mut expression).transpose()?;
+                    (potential, Acts::Span { sites, tension })
                 }
                 Load::TorsionSpring { bar, relative_to, potential, torque } => {
                     let potential = potential.as_deref().map(&mut expression).transpose()?;
@@ -310,7 +300,7 @@ impl<C: Decimal> Formulas<C> {
 impl Formulas {
     /// True where a law applies forces beside potentials, on whatever branch.
     pub fn applies(&self) -> bool {
-        self.laws.iter().any(|law| law.place != Acts::Nowhere)
+        self.laws.iter().any(|law| law.place.applies())
     }
 
     /// True where it has conditions, or events that change something.
@@ -419,18 +409,5 @@ impl Formulas {
             next[*number] = self.value(expression, at, parameters);
         }
         next
-    }
-}
-
-impl<C> Law<C> {
-    /// Its formulas in the order in which they were bound.
-    fn expressions(&self) -> impl Iterator<Item = &Expression<C>> {
-        let acting: Vec<&Expression<C>> = match &self.place {
-            Acts::Point { force: [x, y], .. } => vec![x, y],
-            Acts::Torque { torque, .. } => vec![torque],
-            Acts::Span { tension, .. } => vec![tension],
-            Acts::Nowhere => Vec::new(),
-        };
-        self.potential.iter().chain(acting)
     }
 }

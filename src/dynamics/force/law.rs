@@ -1,11 +1,62 @@
 //! A law of a scene as it is recorded: on the branches of some modes, with some parameters.
 
-use super::formula::{Acts, Expression, Formulas, Law, span};
+use super::formula::{Expression, Formulas, span};
+use super::span::SpanLaw;
 use super::{Loads, UserForce};
 use crate::arithmetic::Scalar;
 use crate::arithmetic::tape::Symbol;
+use crate::dynamics::constraint::Site;
 use crate::dynamics::{CompileError, Configuration};
-use crate::scene::Decimal;
+use crate::scene::{Decimal, Meaning};
+
+/// Where a law acts.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Acts<C = f64> {
+    Point {
+        site: Site<C>,
+        follows: bool,
+        force: [Expression<C>; 2],
+    },
+    Torque {
+        body: usize,
+        base: Option<usize>,
+        torque: Expression<C>,
+    },
+    /// A spring; what of its tension has no potential.
+    Span {
+        sites: [Site<C>; 2],
+        tension: Option<Expression<C>>,
+    },
+    Nowhere,
+}
+
+impl<C: PartialEq> Acts<C> {
+    /// True where it is more than the place of a potential.
+    pub fn applies(&self) -> bool {
+        !matches!(self, Self::Nowhere | Self::Span { tension: None, .. })
+    }
+}
+
+/// One law.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Law<C = f64> {
+    pub name: String,
+    pub potential: Option<Expression<C>>,
+    pub place: Acts<C>,
+}
+
+impl<C> Law<C> {
+    /// Its formulas in the order in which they were bound.
+    pub fn expressions(&self) -> impl Iterator<Item = &Expression<C>> {
+        let acting: Vec<&Expression<C>> = match &self.place {
+            Acts::Point { force: [x, y], .. } => vec![x, y],
+            Acts::Torque { torque, .. } => vec![torque],
+            Acts::Span { tension, .. } => tension.iter().collect(),
+            Acts::Nowhere => Vec::new(),
+        };
+        self.potential.iter().chain(acting)
+    }
+}
 
 /// A law on the branches of some modes, as it is recorded.
 pub(super) struct Recorded<'a, C> {
@@ -21,7 +72,56 @@ impl<C: Decimal> Recorded<'_, C> {
     /// # Errors
     /// A potential that depends on time or rates.
     pub fn record(&self) -> Result<UserForce<C>, CompileError> {
-        UserForce::recorded(&self.law.name, |at| self.potential(at), |at, loads| self.apply(at, loads))
+        let force =
+            UserForce::recorded(&self.law.name, |at| self.potential(at), |at, loads| self.apply(at, loads))?;
+        Ok(match self.span() {
+            // What it divides by the length for is no more flat than a built-in spring is.
+            Some(span) => {
+                UserForce { may_be_flat: span.tape.may_be_flat(), span: Some(Box::new(span)), ..force }
+            }
+            None => force,
+        })
+    }
+
+    /// The law of a spring whose formulas ask for nothing but its length, its rate and time.
+    fn span(&self) -> Option<SpanLaw<C>> {
+        let Acts::Span { sites, tension } = &self.law.place else { return None };
+        if C::HAS_CONSTANTS {
+            return None;
+        }
+        let of = |expression: &Option<Expression<C>>, inputs: [Symbol; 3]| match expression {
+            Some(expression) => self.along(sites, expression, inputs, &self.signals_along(sites, inputs)),
+            None => Some(Symbol::ZERO),
+        };
+        let span = sites[0].point.minus(&sites[1].point);
+        SpanLaw::record(span, |inputs| of(&self.law.potential, inputs), |inputs| of(tension, inputs))
+    }
+
+    /// A formula of the length of a spring, its rate and time, where it is one.
+    fn along(
+        &self,
+        sites: &[Site<C>; 2],
+        expression: &Expression<C>,
+        [length, rate, time]: [Symbol; 3],
+        signals: &[Option<Symbol>],
+    ) -> Option<Symbol> {
+        expression.over(self.modes, |meaning| match meaning {
+            Meaning::Time => Some(time),
+            Meaning::Parameter(number) => Some(Symbol::of(self.parameters[*number].value())),
+            Meaning::Signal(number) => signals[*number],
+            Meaning::Length(of) if of == sites => Some(length),
+            Meaning::LengthRate(of) if of == sites => Some(rate),
+            _ => None,
+        })
+    }
+
+    /// The signals that are such formulas.
+    fn signals_along(&self, sites: &[Site<C>; 2], inputs: [Symbol; 3]) -> Vec<Option<Symbol>> {
+        let mut signals = Vec::with_capacity(self.formulas.signals.len());
+        for signal in &self.formulas.signals {
+            signals.push(self.along(sites, signal, inputs, &signals));
+        }
+        signals
     }
 
     fn signals(&self, at: &Configuration<Symbol, C>) -> Vec<Symbol> {
@@ -43,7 +143,7 @@ impl<C: Decimal> Recorded<'_, C> {
     }
 
     fn apply(&self, at: &Configuration<Symbol, C>, loads: &mut Loads<Symbol, C>) {
-        if self.law.place == Acts::Nowhere {
+        if !self.law.place.applies() {
             return;
         }
         let signals = self.signals(at);
@@ -66,14 +166,14 @@ impl<C: Decimal> Recorded<'_, C> {
                     loads.torque(*base, -torque);
                 }
             }
-            Acts::Span { sites, tension } => {
+            Acts::Span { sites, tension: Some(tension) } => {
                 let (vector, length) = span(at, sites);
                 let pull = of(tension) / length;
                 let force = [vector[0] * pull, vector[1] * pull];
                 loads.force(&sites[0], force);
                 loads.force(&sites[1], [-force[0], -force[1]]);
             }
-            Acts::Nowhere => {}
+            Acts::Span { tension: None, .. } | Acts::Nowhere => {}
         }
     }
 }

@@ -4,6 +4,7 @@ pub mod action;
 pub(crate) mod formula;
 mod law;
 mod recorder;
+pub(crate) mod span;
 pub mod spring;
 pub mod torsion;
 pub mod user;

@@ -186,6 +186,7 @@ impl<C: Real> UserForce<C> {
             name: name.into(),
             may_be_flat: parts.iter().any(|part| part.tape.may_be_flat()),
             parts,
+            span: None,
             potential: energy.1.first().map(|&slot| (energy.0, slot)),
             inputs: recorder.inputs.into_inner(),
             sites: recorder.sites.into_inner(),

@@ -9,6 +9,7 @@
 //! power accounted as work = Σ F·P' + Σ torque w  of what is applied beside
 //! ```
 
+use super::span::SpanLaw;
 use crate::arithmetic::tape::{Slot, Tape};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::configuration::Configuration;
@@ -125,6 +126,8 @@ pub struct UserForce<C = f64> {
     pub(in crate::dynamics) numbers: Vec<C>,
     /// What its potential does, and what it applies beside.
     pub(in crate::dynamics) parts: [Part; 2],
+    /// The same law over its length, where it is that of a spring and asks for nothing else.
+    pub(crate) span: Option<Box<SpanLaw<C>>>,
     /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
     pub(crate) may_be_flat: bool,
     /// Potential energy \[J\].
@@ -234,6 +237,9 @@ impl<C: Real> UserForce<C> {
 
     /// Adds all its generalized forces \[N·m, N\]; returns the power accounted as work \[W\].
     pub fn pull<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) -> T {
+        if let Some(span) = &self.span {
+            return span.pull(time, at, load);
+        }
         self.parts.iter().fold(T::ZERO, |power, part| power + self.pull_part(part, time, at, load))
     }
 

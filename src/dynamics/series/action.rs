@@ -73,6 +73,11 @@ impl<T: SeriesNumber> ActionSeries<T> {
         self.factors.as_ref().is_none_or(|factors| factors.are_sound())
     }
 
+    /// Power m of the force, zero of a torque \[N/s^m\].
+    pub fn force(&self, m: usize) -> Complex<T> {
+        self.force.get(m).copied().unwrap_or_default()
+    }
+
     /// The law's series about time `t`.
     pub fn begin(&mut self, action: &Action<T::Constant>, t: T::Time) {
         self.factor.fill(T::ZERO);

@@ -50,6 +50,9 @@ impl<T: Coefficient> Series<T> {
             force.take(first);
         }
         self.rows.take(&first.rows);
+        if let (Some(friction), Some(first)) = (&mut self.friction, &first.friction) {
+            friction.take(first);
+        }
         T::orders(self, terms, first.order.min(self.order));
     }
 

@@ -3,6 +3,7 @@
 //! ```text
 //! linear in elements:   C = c + Σ g_k·e_k - s,      J_k = g_k·(i z_k,0),   J a_m = s''_m - Σ g_k·u_k,m     force lambda g_k on e_k
 //! bilinear in them:     C = Re(conj(e_j) h e_k),    products of the powers of e_j and e_k,            force lambda conj(h) e_j on e_k
+//! less an aim f:           - f(t, q) in C, see [`aim`](super::aim)
 //! a given angle:        C = q_a - q_b - theta,      J = (1, -1),           J a_m = theta''_m          torque lambda
 //! M_0 a_m + Jᵀ lambda_m = load_m:   S = J M_0⁻¹ Jᵀ,   S lambda_m = J M_0⁻¹ load_m - (J a)_m
 //! ```
@@ -10,9 +11,11 @@
 //! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products
 //! of earlier multipliers with later powers of z enter through the loads like those of any force.
 
+use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::{copy, zeros};
-use crate::arithmetic::{Complex, Over, Real};
+use super::user::At;
+use crate::arithmetic::{Complex, DoubleDouble, Over, Real};
 use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
@@ -46,8 +49,13 @@ pub struct RowSeries<T: SeriesNumber> {
 /// A row as the series sees it.
 #[derive(Clone, Debug)]
 enum Kind<T: SeriesNumber> {
-    /// The function, and the powers of s'.
-    Place { place: Quadratic<T::Constant>, law: Option<Law<T::Constant>>, drive: Vec<T> },
+    /// The function, the powers of s', and an aim that is taken off it.
+    Place {
+        place: Quadratic<T::Constant>,
+        law: Option<Law<T::Constant>>,
+        drive: Vec<T>,
+        aim: Option<Box<AimSeries<T>>>,
+    },
     /// The bodies a and b, and the powers of theta' and of its own rate w_a - w_b.
     Angle { body: usize, base: Option<usize>, law: Law<T::Constant>, drive: Vec<T>, speed: Vec<T> },
 }
@@ -56,7 +64,10 @@ impl<T: SeriesNumber> Kind<T> {
     /// Parts of dC/dq, coordinate by coordinate; a coordinate may come up more than once.
     fn slopes(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
         match self {
-            Self::Place { place, .. } => place.slopes(z, each),
+            Self::Place { place, aim, .. } => {
+                place.slopes(z, &mut each);
+                aim.iter().for_each(|aim| aim.slopes(|k, slope| each(k, -slope)));
+            }
             Self::Angle { body, base, .. } => {
                 each(*body, T::ONE);
                 base.iter().for_each(|&base| each(base, -T::ONE));
@@ -67,8 +78,11 @@ impl<T: SeriesNumber> Kind<T> {
     /// `free`, and what else there is of power m of the second derivative, less that of its law.
     fn known(&self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], free: T) -> T {
         match self {
-            Self::Place { place, drive, .. } => {
-                let known = free + bent(place, m, z, bend);
+            Self::Place { place, drive, aim, .. } => {
+                let mut known = free + bent(place, m, z, bend);
+                if let Some(aim) = aim {
+                    known -= aim.known;
+                }
                 drive.get(m + 1).map_or(known, |&drive| known - drive.scale((m + 1) as f64))
             }
             Self::Angle { drive, .. } => free - drive[m + 1].scale((m + 1) as f64),
@@ -96,6 +110,8 @@ impl<T: SeriesNumber> RowSeries<T> {
                 place: place.clone(),
                 law: law.clone(),
                 drive: zeros(if law.is_some() { order + 1 } else { 0 }),
+                aim: (row.aim.as_ref())
+                    .map(|aim| Box::new(AimSeries::new(aim, mechanism.bodies.len(), order))),
             }),
         };
         let in_force = || mechanism.constraints.iter().filter(|row| !(row.is_angle() && partition.driven()));
@@ -150,6 +166,18 @@ impl<T: SeriesNumber> RowSeries<T> {
             if let Kind::Angle { law, drive, .. } | Kind::Place { law: Some(law), drive, .. } = kind {
                 drive.fill(T::ZERO);
                 T::add_law(law, 1.0, t, drive, 0, 1);
+            }
+        }
+    }
+
+    /// Power m of the aims, and what multipliers below that power exert on the coordinates by them into
+    /// `load`.
+    pub fn advance_aims(&mut self, m: usize, at: At<T>, load: &mut [T]) {
+        let r = self.kinds.len();
+        for (i, kind) in self.kinds.iter_mut().enumerate() {
+            if let Kind::Place { aim: Some(aim), .. } = kind {
+                aim.advance(m, at);
+                aim.turning_terms(m, |l| self.multiplier[l * r + i], load);
             }
         }
     }
@@ -244,13 +272,7 @@ impl<T: SeriesNumber> RowSeries<T> {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter().enumerate() {
             let Kind::Place { place, .. } = kind else { continue };
-            for &(j, k, h) in &place.bilinear {
-                for l in 0..m {
-                    let (multiplier, z) = (self.multiplier[l * r + i], &z[(m - l) * n..(m - l + 1) * n]);
-                    rest[k] += z[j].turn(h.conj()).times(multiplier);
-                    rest[j] += z[k].turn(h).times(multiplier);
-                }
-            }
+            turning_terms(place, m, z, n, |l| self.multiplier[l * r + i], rest);
         }
     }
 
@@ -263,18 +285,44 @@ impl<T: SeriesNumber> RowSeries<T> {
                 power -= with_rates(&self.multiplier[i..], r, &speed[..=m]);
             } else if let Kind::Place { drive, law: Some(_), .. } = kind {
                 power -= with_rates(&self.multiplier[i..], r, &drive[..=m]);
+            } else if let Kind::Place { aim: Some(aim), .. } = kind
+                && let Some(drive) = aim.drive()
+            {
+                power -= with_rates(&self.multiplier[i..], r, &drive[..=m]);
             }
         }
         power
     }
 
     /// The first powers from another series.
-    pub fn take<U: SeriesNumber>(&mut self, other: &RowSeries<U>) {
+    pub fn take(&mut self, other: &RowSeries<DoubleDouble>) {
         copy(&mut self.multiplier, &other.multiplier);
         for (kind, other) in self.kinds.iter_mut().zip(&other.kinds) {
-            if let (Kind::Angle { speed, .. }, Kind::Angle { speed: other, .. }) = (kind, other) {
+            if let (Kind::Angle { speed, .. }, Kind::Angle { speed: other, .. }) = (&mut *kind, other) {
                 copy(speed, other);
             }
+            if let (Kind::Place { aim: Some(aim), .. }, Kind::Place { aim: Some(other), .. }) = (kind, other)
+            {
+                aim.take(other);
+            }
+        }
+    }
+}
+
+/// Adds what the multipliers of a function below power m put on the elements as these turn to `rest`.
+pub fn turning_terms<T: Over<C>, C: Real>(
+    place: &Quadratic<C>,
+    m: usize,
+    z: &[Complex<T>],
+    n: usize,
+    multiplier: impl Fn(usize) -> T,
+    rest: &mut [Complex<T>],
+) {
+    for &(j, k, h) in &place.bilinear {
+        for l in 0..m {
+            let (multiplier, z) = (multiplier(l), &z[(m - l) * n..(m - l + 1) * n]);
+            rest[k] += z[j].turn(h.conj()).times(multiplier);
+            rest[j] += z[k].turn(h).times(multiplier);
         }
     }
 }

@@ -123,6 +123,16 @@ impl<T: SeriesNumber> UserSeries<T> {
         }
     }
 
+    /// Calls `each` with the body and power m of the force \[N/s^m\] at every point it acts at.
+    pub fn forces(&self, force: &UserForce<T::Constant>, m: usize, mut each: impl FnMut(usize, Complex<T>)) {
+        for (part, series) in force.parts.iter().zip(&self.0) {
+            for &(site, [x, y]) in &part.forces {
+                let pull = Complex::new(series.power(x, m), series.power(y, m));
+                force.sites[site].body.iter().for_each(|&body| each(body, pull));
+            }
+        }
+    }
+
     /// Power m of the power accounted as work \[W/s^m\].
     pub fn power(&self, force: &UserForce<T::Constant>, m: usize) -> T {
         force.parts[1].power.map_or(T::ZERO, |slot| self.0[1].power(slot, m))

@@ -60,6 +60,9 @@ impl<T: SeriesNumber> Series<T> {
         for (force, series) in terms.forces.iter().zip(&self.forces) {
             power += series.power(force, m);
         }
+        if let Some(friction) = &mut self.friction {
+            power -= friction.lose(m, &self.z, &self.omega[m * n..(m + 1) * n]);
+        }
         self.power[m] = power;
     }
 }

@@ -35,13 +35,13 @@ pub(super) fn pair(
         ));
     }
     check_friction(mechanism, method, request)?;
-    if let (MethodId::Taylor, Some(row)) =
-        (method, mechanism.constraints.iter().find(|row| row.aim.is_some()))
+    if let (MethodId::Taylor, Some(row), Some(Stabilization::Elimination)) =
+        (method, mechanism.constraints.iter().find(|row| row.aim.is_some()), request.stabilize)
     {
         return Err(mismatch(
-            format!("taylor on a scene with motor {}", row.name),
-            "its aim depends on where the mechanism is, and its constraint has no power series",
-            "--method dp8, or radau9 where it is stiff",
+            format!("taylor by elimination on a scene with motor {}", row.name),
+            "its aim depends on where the mechanism is, and its series asks for all angles",
+            "--stabilize projection",
         ));
     }
     if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
@@ -209,9 +209,11 @@ pub(super) fn check_vibration(
 fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
     let Some(friction) = mechanism.frictions.first() else { return Ok(()) };
     let place = || format!("dry friction ({} {})", friction.kind(), friction.name);
-    if !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_) | MethodId::Custom) {
+    if !matches!(
+        method,
+        MethodId::Taylor | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_) | MethodId::Custom
+    ) {
         let reason = match method {
-            MethodId::Taylor => "its forces are found with the accelerations, and have no power series",
             MethodId::Dopri5 | MethodId::Dop853 => {
                 "ode_solvers does not let what sticks be kept by projection"
             }

@@ -98,10 +98,8 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         let tree = &mechanism.tree;
         let n = tree.coordinates;
-        let is_sprung_only = mechanism.torsions.is_empty()
-            && mechanism.actions.is_empty()
-            && mechanism.forces.is_empty()
-            && mechanism.constraints.is_empty();
+        let is_sprung_only =
+            mechanism.torsions.is_empty() && mechanism.actions.is_empty() && mechanism.constraints.is_empty();
         if n == 0 || n > room(B) || tree.off_axis || !is_sprung_only || order > MOST || order % 2 == 1 {
             return None;
         }
@@ -119,7 +117,9 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
             }
         }
         let rate = tree.fastest_rate(&[]);
-        let longest = reach(order, tree.fastest_rate(&mechanism.springs));
+        // The stiffness of a law is known where a step begins.
+        let longest =
+            if springs.has_laws() { 0.0 } else { reach(order, tree.fastest_rate(&mechanism.springs)) };
         Some(Self {
             count: n,
             order,

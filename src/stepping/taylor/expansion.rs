@@ -1,5 +1,7 @@
 //! The series of any mechanism about a step's start, and how far it carries.
 
+use super::super::event::Found;
+use super::super::search::Powers;
 use super::{JUDGES, LEADING};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::series::polynomial::{integral, tail};
@@ -255,6 +257,26 @@ impl<T: Coefficient> Expansion<T> {
             }
             add(state, 2 * f, work);
         }
+        if !series.lost().is_empty() {
+            let lost = &series.lost()[..self.summed.min(series.lost().len())];
+            add(state, 2 * f + 2, integral(lost, 0, 1, 0, step).double_double());
+        }
+    }
+
+    /// Of `h` \[s\] what comes before the force across a rail that slides passes zero.
+    pub fn until_reversal(&self, h: f64) -> f64 {
+        let mut found = Found::Nothing;
+        for mut powers in self.series.across_rails() {
+            let scale = powers.iter().rev().fold(0.0, |sum: f64, power| sum * h + power.abs());
+            if !(scale > 0.0 && scale.is_finite()) {
+                continue;
+            }
+            powers.iter_mut().for_each(|power| *power /= scale);
+            // Rounding, where it begins at zero.
+            powers[0] = powers[0].max(0.0);
+            found = found.or_earlier(0, &Powers { powers: &powers, end: found.end(h) }, h);
+        }
+        found.end(h)
     }
 
     /// The first coordinate whose series is not finite, as far as there is one.

@@ -11,14 +11,20 @@
 //!
 //! κ_0 = -k (L - L0)/L takes the stretch L - L0 from spans in double-double: the difference of two lengths,
 //! rounded, times a stiff k would outweigh all other rounding.  A spring of free length zero without damper
-//! has no use for its length, and lanes without a spring have none: their q is zero but for q_0 = 1.
+//! has no use for its length, and lanes without a spring have none: their q is zero but for q_0 = 1.  A
+//! spring whose law is a formula has its κ from [`law`].
 
+mod law;
+
+use self::law::LawSeries;
 use super::terms::over;
 use super::wide::Wide;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::row::{Row, at, room, store};
 use crate::dynamics::Mechanism;
-use crate::dynamics::force::Spring;
+use crate::dynamics::force::span::SpanLaw;
+use crate::dynamics::force::{Spring, UserForce};
+use crate::dynamics::point::Point;
 
 /// Largest order there is room for.
 const MOST: usize = super::bodies::MOST;
@@ -37,8 +43,12 @@ pub struct Springs<const B: usize, const S: usize> {
     damping: Row<S>,
     /// One where the length matters, zero elsewhere.
     measured: Row<S>,
-    /// What each spring adds at most to the square of the fastest rate \[rad²/s²\].
+    /// What each spring adds at most to the square of the fastest rate \[rad²/s²\], those with laws of
+    /// their own for a stiffness of one.
     most: Row<S>,
+    /// Springs with laws of their own, in the lanes behind the built-in ones.
+    laws: Vec<LawSeries>,
+    does_work: bool,
     scratch: Box<Scratch<S>>,
 }
 
@@ -65,9 +75,14 @@ impl<const B: usize, const S: usize> Springs<B, S> {
     /// ground.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
         let (n, springs) = (mechanism.bodies.len(), &mechanism.springs);
-        if springs.len() > room(S) || (S > 0 && springs.is_empty()) || mechanism.coordinates() != n {
+        let laws: Option<Vec<&SpanLaw>> = mechanism.forces.iter().map(in_lanes).collect();
+        let laws = laws?;
+        let spans: Vec<&Point> =
+            springs.iter().map(|spring| &spring.span).chain(laws.iter().map(|law| &law.span)).collect();
+        if spans.len() > room(S) || (S > 0 && spans.is_empty()) || mechanism.coordinates() != n {
             return None;
         }
+        let is_damped = springs.iter().any(|spring| spring.damping != 0.0);
         let row = |of: &dyn Fn(usize) -> f64| {
             let mut row = [[0.0; 4]; S];
             for i in 0..springs.len() {
@@ -75,29 +90,41 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             }
             row
         };
-        let gamma = |body: usize| {
-            [row(&|i| springs[i].span.gamma(body).re), row(&|i| springs[i].span.gamma(body).im)]
+        let of_all = |of: &dyn Fn(&Point) -> f64| {
+            let mut row = [[0.0; 4]; S];
+            for (i, span) in spans.iter().enumerate() {
+                row[i / 4][i % 4] = of(span);
+            }
+            row
         };
-        let mut spread = vec![[[[0.0; 4]; B]; 2]; springs.len()];
-        for (spread, spring) in spread.iter_mut().zip(springs) {
-            for &(body, gamma) in &spring.span.terms {
+        let gamma = |body: usize| [of_all(&|span| span.gamma(body).re), of_all(&|span| span.gamma(body).im)];
+        let mut spread = vec![[[[0.0; 4]; B]; 2]; spans.len()];
+        for (spread, span) in spread.iter_mut().zip(&spans) {
+            for &(body, gamma) in &span.terms {
                 (spread[0][body / 4][body % 4], spread[1][body / 4][body % 4]) = (gamma.re, gamma.im);
             }
         }
         let zero = [[0.0; 4]; S];
+        let rate = |springs: &[Spring]| mechanism.tree.fastest_rate(springs);
+        let mut measured = row(&|i| if springs[i].needs_length() { 1.0 } else { 0.0 });
+        let mut most = row(&|i| rate(&springs[i..=i]).powi(2) - rate(&[]).powi(2));
+        for (i, law) in laws.iter().enumerate().map(|(i, law)| (springs.len() + i, law)) {
+            measured[i / 4][i % 4] = 1.0;
+            most[i / 4][i % 4] = rate(&[of_stiffness_one(&law.span)]).powi(2) - rate(&[]).powi(2);
+        }
+        let laws: Vec<LawSeries> = laws.into_iter().map(LawSeries::new).collect();
         Some(Self {
-            is_damped: mechanism.is_damped(),
-            root: [row(&|i| springs[i].span.root.re), row(&|i| springs[i].span.root.im)],
+            is_damped,
+            root: [of_all(&|span| span.root.re), of_all(&|span| span.root.im)],
             gamma: (0..n).map(gamma).collect(),
             spread,
             stiffness: row(&|i| springs[i].stiffness),
             free_length: row(&|i| springs[i].free_length),
             damping: row(&|i| springs[i].damping),
-            measured: row(&|i| if springs[i].needs_length() { 1.0 } else { 0.0 }),
-            most: row(&|i| {
-                let rate = |springs: &[Spring]| mechanism.tree.fastest_rate(springs);
-                rate(&springs[i..=i]).powi(2) - rate(&[]).powi(2)
-            }),
+            measured,
+            most,
+            does_work: is_damped || laws.iter().any(LawSeries::does_work),
+            laws,
             scratch: Box::new(Scratch {
                 inverse: zero,
                 x: [zero; MOST + 2],
@@ -112,16 +139,21 @@ impl<const B: usize, const S: usize> Springs<B, S> {
         })
     }
 
-    /// Powers below `order` of the dampers' power \[W/s^m\]; none where there are no dampers.
+    /// True where some have laws of their own.
+    pub fn has_laws(&self) -> bool {
+        !self.laws.is_empty()
+    }
+
+    /// Powers below `order` of the power of dampers and laws \[W/s^m\]; none where these do no work.
     #[inline(always)]
     pub fn power(&self, order: usize) -> &[f64] {
-        if self.is_damped { &self.scratch.power[..order] } else { &[] }
+        if self.does_work { &self.scratch.power[..order] } else { &[] }
     }
 
     /// Power zero, from cos and sin of the bodies' angles and what these leave out.
     #[inline(always)]
     pub fn begin<L: Lanes>(&mut self, units: &[[f64; 4]]) {
-        let Self { root, gamma, stiffness, free_length, measured, scratch, .. } = self;
+        let Self { root, gamma, stiffness, free_length, measured, scratch, spread, laws, .. } = self;
         for v in 0..S {
             let (mut x, mut y) = (Wide::of(L::of(root[0][v])), Wide::of(L::of(root[1][v])));
             for (&[c, s, c_low, s_low], gamma) in units.iter().zip(gamma.iter()) {
@@ -143,13 +175,18 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             scratch.factor[0][v] =
                 L::ZERO.sub(L::of(stiffness[v])).mul(relative.mul_add(measured, rest)).array();
         }
+        let first = spread.len() - laws.len();
+        for (i, law) in laws.iter_mut().enumerate() {
+            law.begin(at(&scratch.square[0], first + i).sqrt(), at(&scratch.reciprocal[0], first + i));
+        }
     }
 
     /// About the square of the fastest rate the springs cause where the step begins \[rad²/s²\], from cos and
     /// sin of the bodies' angles and M⁻¹ times a vector: k J·M⁻¹ J for the pull along the spring, J_b =
     /// (gamma_b e_b) × D/L, and at most |κ_0| |gamma|² M⁻¹ for its turning.
     pub fn rate_squared(&self, e: &[Row<B>; 2], solve: impl Fn(&Row<B>) -> Row<B>) -> f64 {
-        let Self { stiffness, measured, most, scratch, .. } = self;
+        let Self { stiffness, measured, most, scratch, spread, laws, .. } = self;
+        let first = spread.len() - laws.len();
         let of_spring = |(i, gamma): (usize, &[Row<B>; 2])| {
             let [stiffness, measured, most] = [stiffness, measured, most].map(|row| at(row, i));
             let [x, y, reciprocal, factor] =
@@ -166,7 +203,10 @@ impl<const B: usize, const S: usize> Springs<B, S> {
                 .zip(moved.as_flattened())
                 .map(|(lever, moved)| lever * moved)
                 .sum();
-            let slack = if stiffness > 0.0 { factor.abs() / stiffness } else { 0.0 };
+            let (stiffness, slack) = match i.checked_sub(first) {
+                Some(law) => (laws[law].stiffness(), factor.abs()),
+                None => (stiffness, if stiffness > 0.0 { factor.abs() / stiffness } else { 0.0 }),
+            };
             measured * stiffness * along + slack * most
         };
         self.spread.iter().enumerate().map(of_spring).sum()
@@ -175,7 +215,7 @@ impl<const B: usize, const S: usize> Springs<B, S> {
     /// Power m >= 1 of the spans, q and s, and power m-1 of a, from that power of the bodies' unit vectors.
     #[inline(always)]
     fn raise<L: Lanes>(&mut self, m: usize, e: &[Row<B>; 2]) {
-        let Self { gamma, stiffness, free_length, damping, measured, scratch, .. } = self;
+        let Self { gamma, stiffness, free_length, damping, measured, scratch, spread, laws, .. } = self;
         let (mut x, mut y) = ([L::ZERO; S], [L::ZERO; S]);
         for ((gamma, &c), &s) in gamma.iter().zip(e[0].as_flattened()).zip(e[1].as_flattened()) {
             let (c, s) = (L::splat(c), L::splat(s));
@@ -206,6 +246,11 @@ impl<const B: usize, const S: usize> Springs<B, S> {
                 scratch.factor[m - 1][v] = strain.neg_mul_add(L::of(damping[v]), elastic).array();
             }
         }
+        let first = spread.len() - laws.len();
+        for (i, law) in (first..).zip(laws.iter_mut()) {
+            let (strain, reciprocal) = (at(&scratch.strain[m - 1], i), at(&scratch.reciprocal[m], i));
+            scratch.factor[m - 1][i / 4][i % 4] = law.factor::<L>(m - 1, strain, reciprocal);
+        }
     }
 
     /// What the forces of power m add to power m+1 of P, from that power of the bodies' unit vectors; `None`
@@ -222,7 +267,7 @@ impl<const B: usize, const S: usize> Springs<B, S> {
     /// What the forces of power m add to power m+1 of P, after [`Springs::raise`] of that one.
     #[inline(always)]
     fn share<L: Lanes>(&mut self, m: usize) -> [[L; B]; 2] {
-        let Self { spread, damping, scratch, .. } = self;
+        let Self { spread, damping, scratch, laws, .. } = self;
         let [fx, fy] = products::<L, S>(&scratch.factor[..=m], &scratch.x[..=m], &scratch.y[..=m]).map(store);
         let (mut px, mut py) = ([L::ZERO; B], [L::ZERO; B]);
         for ((gamma, &x), &y) in spread.iter().zip(fx.as_flattened()).zip(fy.as_flattened()) {
@@ -244,8 +289,23 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             let each = damping.as_flattened().iter().zip(lost.as_flattened());
             scratch.power[m] = each.fold(0.0, |sum, (&damping, &lost)| sum - damping * lost);
         }
+        if !laws.is_empty() {
+            let dampers = if self.is_damped { scratch.power[m] } else { 0.0 };
+            scratch.power[m] = laws.iter().fold(dampers, |sum, law| sum + law.power::<L>(m));
+        }
         [px, py]
     }
+}
+
+/// The law of a force, where it fits: a spring's over its length and rate.
+fn in_lanes(force: &UserForce) -> Option<&SpanLaw> {
+    force.span.as_deref().filter(|law| !law.depends_on_time() && !force.may_be_flat)
+}
+
+/// A spring of 1 N/m along a span.
+fn of_stiffness_one(span: &Point) -> Spring {
+    let name = String::new();
+    Spring { name, bodies: [None; 2], span: span.clone(), stiffness: 1.0, free_length: 0.0, damping: 0.0 }
 }
 
 /// Σ a_j b_{last-j} and Σ a_j c_{last-j}, from the middle outwards in two chains each, so that the newest

@@ -1,0 +1,340 @@
+//! Dry friction in the series: the forces of places that slide, found with every order.
+//!
+//! Between its transitions friction is smooth: `tau = c |N|` with `c = sign(s') mu r`.  Accelerations,
+//! multipliers and with them the normal forces N are affine in tau, power by power with the same response
+//! `N_m = N_m0 + R tau_m`, of which N_m0 is what an order comes to without tau_m:
+//!
+//! ```text
+//! m = 0:    tau_0 = c |N_00 + R tau_0|,  as in every evaluation (module `dynamics::friction`)
+//! m > 0:    |N|_m = n·N_m + (Σ_{j=1..m-1} N_j·N_{m-j} - |N|_j |N|_{m-j}) / (2 |N|_0),    n = N_0/|N|_0
+//!           (1 - c n R) tau_m = c (n·N_m0 + what is known)
+//! ```
+//!
+//! A rail's N is one multiplier with a sign, a wall's never negative: of these |N| is linear.  A joint's
+//! follows from Newton's equation of what is beyond it, of which centre c, mass m and applied forces F are
+//! series: `N_m = Σ (m+1)(m+2) m c_{m+2} - F_m`.  Each order is solved twice, without tau_m and with it.
+//!
+//! A rail's N may pass zero in a step, and |N| has a corner there: [`Series::across_rails`] tells of it.
+
+use super::Series;
+use super::coefficient::{SeriesNumber, Terms};
+use super::polynomial::copy;
+use super::rows::{RowSeries, turning_terms};
+use crate::arithmetic::{Complex, Real};
+use crate::dynamics::Mechanism;
+use crate::dynamics::constraint::{ConstraintEquation, Measure, Push, Way};
+use crate::dynamics::friction::{self, Friction, Normal};
+use crate::dynamics::point::Point;
+use crate::scene::Place;
+
+/// Share of the time in which a normal force changes by itself below which a zero ahead counts as passed.
+const PASSED: f64 = 1e-9;
+
+/// The places that slide.
+#[derive(Clone, Debug)]
+pub struct FrictionSeries<T: SeriesNumber> {
+    places: Vec<Sliding<T>>,
+    /// The centre of mass of every body.
+    centres: Vec<Point>,
+    /// Forces applied to every body at the present power \[N/s^m\].
+    pub applied: Vec<Complex<T>>,
+    /// N of place j by tau of place k.
+    response: Vec<Complex<T>>,
+    /// R and u of the present power before tau is in them.
+    rest: Vec<Complex<T>>,
+    bend: Vec<Complex<T>>,
+    load: Vec<T>,
+    /// Power that friction takes (powers 0…P-1) \[W/s^m\].
+    pub lost: Vec<T>,
+}
+
+/// One place and its series.
+#[derive(Clone, Debug)]
+struct Sliding<T> {
+    friction: Friction,
+    /// c.
+    coefficient: T,
+    /// tau and s'.
+    force: Vec<T>,
+    speed: Vec<T>,
+    /// N, its size, and n.
+    normal: Vec<Complex<T>>,
+    size: Vec<T>,
+    along: Complex<T>,
+    /// True for a rail whose N has just passed zero, or is about to, whatever sign it has.
+    is_turned: bool,
+}
+
+impl<T: SeriesNumber> FrictionSeries<T> {
+    /// Room for the series of what slides; `None` where nothing does.
+    pub fn new(mechanism: &Mechanism, order: usize) -> Option<Self> {
+        let place = |(friction, sign): (&Friction, f64)| Sliding {
+            friction: friction.clone(),
+            coefficient: T::of(sign * friction.kinetic),
+            force: Vec::with_capacity(order),
+            speed: Vec::with_capacity(order),
+            normal: Vec::with_capacity(order),
+            size: Vec::with_capacity(order),
+            along: Complex::ZERO,
+            is_turned: false,
+        };
+        let places: Vec<Sliding<T>> = mechanism.sliding().map(place).collect();
+        let centre = |bar: usize| {
+            let point = [mechanism.bodies[bar].centre.re, mechanism.bodies[bar].centre.im];
+            mechanism.forest.site(&Place { bar: Some(bar), point }).point
+        };
+        let (n, f) = (mechanism.coordinates(), places.len());
+        (f > 0).then(|| Self {
+            places,
+            centres: (0..mechanism.bodies.len()).map(centre).collect(),
+            applied: vec![Complex::ZERO; mechanism.bodies.len()],
+            response: vec![Complex::ZERO; f * f],
+            rest: vec![Complex::ZERO; n],
+            bend: vec![Complex::ZERO; n],
+            load: vec![T::ZERO; n],
+            lost: vec![T::ZERO; order],
+        })
+    }
+
+    /// Adds what the tau below power m put on the elements as these turn to `rest`.
+    pub fn geometric_terms(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
+        for place in &self.places {
+            if let Measure::Place(tangent) = &place.friction.tangent.measure {
+                turning_terms(tangent, m, z, n, |l| place.force[l], rest);
+            }
+        }
+    }
+
+    /// Puts tau of one place on the loads and the elements' balance.
+    fn push(tangent: &ConstraintEquation, tau: T, z: &[Complex<T>], load: &mut [T], rest: &mut [Complex<T>]) {
+        match &tangent.measure {
+            Measure::Place(place) => {
+                place.slopes(z, |k, slope| load[k] -= slope * tau);
+                place.gradients(z, |k, gradient| rest[k] += gradient.times(tau));
+            }
+            Measure::Angle { body, base } => {
+                load[*body] -= tau;
+                if let Some(base) = base {
+                    load[*base] += tau;
+                }
+            }
+        }
+    }
+
+    /// Power m of the normal forces, from the powers of the elements up to m+2 and those of all multipliers
+    /// and tau.
+    fn normals(
+        &self,
+        mechanism: &Mechanism,
+        m: usize,
+        z: &[Complex<T>],
+        rows: &RowSeries<T>,
+    ) -> Vec<Complex<T>> {
+        let n = mechanism.coordinates();
+        let newest = &z[(m + 2) * n..(m + 3) * n];
+        let factor = T::of(((m + 1) * (m + 2)) as f64);
+        let gravity = if m == 0 { Complex::of(mechanism.gravity) } else { Complex::ZERO };
+        let mut needed = Vec::with_capacity(self.centres.len());
+        for ((centre, body), &applied) in self.centres.iter().zip(&mechanism.bodies).zip(&self.applied) {
+            let acceleration = centre.turned(newest).times(factor) - gravity;
+            needed.push(acceleration.times(T::of(body.mass)) - applied);
+        }
+        let mut add = |push: &Option<Push>, multiplier: &dyn Fn(usize) -> T| {
+            let Some(push) = push else { return };
+            let force = (0..=m).fold(Complex::ZERO, |sum, l| {
+                sum + direction(push, &z[(m - l) * n..(m - l + 1) * n], m - l).times(multiplier(l))
+            });
+            if let Some(body) = push.on {
+                needed[body] += force;
+            }
+            if let Some(body) = push.from {
+                needed[body] -= force;
+            }
+        };
+        for (i, row) in mechanism.constraints.iter().enumerate() {
+            add(&row.push, &|l| rows.multipliers(l)[i]);
+        }
+        for place in &self.places {
+            add(&place.friction.tangent.push, &|l| place.force[l]);
+        }
+        let mut carried = Vec::with_capacity(mechanism.joints.len());
+        mechanism.pass_on(rows.multipliers(m), &mut needed, &mut carried);
+        let normal =
+            |place: &Sliding<T>| mechanism.normal_force(&place.friction, rows.multipliers(m), &carried);
+        self.places.iter().map(normal).collect()
+    }
+
+    /// tau_0 of all places, from the normal forces without them.
+    fn begin(&mut self, start: &[Complex<T>]) {
+        let f = self.places.len();
+        let sliding: Vec<(Normal, T)> =
+            self.places.iter().map(|place| (place.friction.normal, place.coefficient)).collect();
+        let mut tau = vec![T::ZERO; f];
+        friction::forces(&sliding, start, |j, k| self.response[j * f + k], &mut tau);
+        for (j, place) in self.places.iter_mut().enumerate() {
+            let normal = (0..f).fold(start[j], |sum, k| sum + self.response[j * f + k].times(tau[k]));
+            let (size, mut along) = friction::size(place.friction.normal, normal);
+            if place.friction.normal == Normal::Rail {
+                let is_negative = (normal.re.value() < 0.0) != place.is_turned;
+                along = Complex::new(T::of(if is_negative { -1.0 } else { 1.0 }), T::ZERO);
+            }
+            (place.normal[0], place.size[0], place.along, place.force[0]) = (normal, size, along, tau[j]);
+        }
+    }
+
+    /// tau_m of all places, m above zero, likewise.
+    fn advance(&mut self, m: usize, start: &[Complex<T>]) {
+        let f = self.places.len();
+        let (mut matrix, mut tau) = (vec![T::ZERO; f * f], vec![T::ZERO; f]);
+        let mut known = vec![T::ZERO; f];
+        for (j, place) in self.places.iter().enumerate() {
+            if let Normal::Joint(_) = place.friction.normal {
+                let (normal, size) = (&place.normal, &place.size);
+                let sum =
+                    (1..m).fold(T::ZERO, |sum, l| sum + normal[l].dot(normal[m - l]) - size[l] * size[m - l]);
+                known[j] = if m > 1 { sum / (size[0] + size[0]) } else { T::ZERO };
+            }
+            tau[j] = place.coefficient * (known[j] + place.along.dot(start[j]));
+            for k in 0..f {
+                matrix[j * f + k] = -(place.coefficient * place.along.dot(self.response[j * f + k]));
+            }
+            matrix[j * f + j] += T::ONE;
+        }
+        friction::solve(&mut matrix, &mut tau);
+        for (j, place) in self.places.iter_mut().enumerate() {
+            let normal = (0..f).fold(start[j], |sum, k| sum + self.response[j * f + k].times(tau[k]));
+            (place.normal[m], place.force[m]) = (normal, tau[j]);
+            place.size[m] = known[j] + place.along.dot(normal);
+        }
+    }
+
+    /// Power m of the power that friction takes \[W/s^m\].
+    pub fn lose(&mut self, m: usize, z: &[Complex<T>], omega: &[T]) -> T {
+        let mut lost = T::ZERO;
+        let n = omega.len();
+        for place in &mut self.places {
+            let speed = match &place.friction.tangent.measure {
+                Measure::Angle { body, base } => base.map_or(omega[*body], |base| omega[*body] - omega[base]),
+                Measure::Place(tangent) => tangent.power(m + 1, z, n).scale((m + 1) as f64),
+            };
+            place.speed.push(speed);
+            lost += (0..=m).fold(T::ZERO, |sum, l| sum + place.force[l] * place.speed[m - l]);
+        }
+        self.lost[m] = lost;
+        lost
+    }
+
+    /// The first powers from another series.
+    pub fn take<U: SeriesNumber>(&mut self, other: &FrictionSeries<U>) {
+        copy(&mut self.lost, &other.lost);
+        for (place, other) in self.places.iter_mut().zip(&other.places) {
+            let round = |x: &Complex<U>| Complex::new(T::of(x.re.value()), T::of(x.im.value()));
+            place.normal = other.normal.iter().map(round).collect();
+        }
+    }
+}
+
+/// Power m of the direction of a force, from that of the elements.
+fn direction<T: Real>(push: &Push, z: &[Complex<T>], m: usize) -> Complex<T> {
+    match &push.way {
+        _ if m == 0 => push.direction(z),
+        Way::Ground(_) => Complex::ZERO,
+        Way::Body(body, direction) => z[*body].turn(*direction),
+        Way::Span(span, length) => span.turned(z).times(T::of(length.recip())),
+    }
+}
+
+impl<T: SeriesNumber> Series<T> {
+    /// Order m with the friction of what slides: solved without its tau_m, then with it.
+    pub(super) fn slide<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        let Some(mut friction) = self.friction.take() else { return self.solve::<N>(terms, m) };
+        let (n, f) = (self.elements, friction.places.len());
+        let mechanism = terms.structure;
+        friction.rest.copy_from_slice(&self.rest[m * n..(m + 1) * n]);
+        friction.bend.copy_from_slice(&self.bend);
+        friction.load.copy_from_slice(&self.load);
+        for place in &mut friction.places {
+            if m == 0 {
+                [&mut place.force, &mut place.speed, &mut place.size].into_iter().for_each(Vec::clear);
+                place.normal.clear();
+            }
+            place.force.push(T::ZERO);
+            place.size.push(T::ZERO);
+            place.normal.push(Complex::ZERO);
+        }
+        self.solve::<N>(terms, m);
+        let start = friction.normals(mechanism, m, &self.z, &self.rows);
+        if m == 0 {
+            for k in 0..f {
+                friction.places[k].force[0] = T::ONE;
+                self.solve_again::<N>(terms, 0, &friction);
+                let normals = friction.normals(mechanism, 0, &self.z, &self.rows);
+                friction.places[k].force[0] = T::ZERO;
+                for (j, normal) in normals.into_iter().enumerate() {
+                    friction.response[j * f + k] = normal - start[j];
+                }
+            }
+            friction.begin(&start);
+        } else {
+            friction.advance(m, &start);
+        }
+        self.solve_again::<N>(terms, m, &friction);
+        self.friction = Some(friction);
+    }
+
+    /// Order m once more, with tau_m.
+    fn solve_again<const N: usize>(
+        &mut self,
+        terms: &Terms<T::Constant>,
+        m: usize,
+        friction: &FrictionSeries<T>,
+    ) {
+        let n = self.elements;
+        self.bend.copy_from_slice(&friction.bend);
+        self.load.copy_from_slice(&friction.load);
+        let rest = &mut self.rest[m * n..(m + 1) * n];
+        rest.copy_from_slice(&friction.rest);
+        for place in &friction.places {
+            let (tangent, tau) = (&place.friction.tangent, place.force[m]);
+            FrictionSeries::push(tangent, tau, &self.z[..n], &mut self.load, rest);
+        }
+        self.solve::<N>(terms, m);
+    }
+
+    /// Powers of the power that friction takes \[W/s^m\]; none where nothing slides.
+    pub fn lost(&self) -> &[T] {
+        self.friction.as_ref().map_or(&[], |friction| &friction.lost)
+    }
+
+    /// Powers of the force across every rail that slides, positive where the series begins \[N/s^m\].
+    pub fn across_rails(&self) -> impl Iterator<Item = Vec<f64>> {
+        let places = self.friction.iter().flat_map(|friction| &friction.places);
+        places.filter(|place| place.friction.normal == Normal::Rail).map(|place| {
+            let side = if place.along.re.value() < 0.0 { -1.0 } else { 1.0 };
+            place.normal.iter().map(|normal| side * normal.re.value()).collect()
+        })
+    }
+
+    /// Turns n of the rails whose N passes zero here, for an expansion anew; false where there are none.
+    /// `unit` is the mechanism's unit of time \[s\].
+    pub(super) fn turn_rails(&mut self, unit: f64) -> bool {
+        let mut is_any = false;
+        for place in self.friction.iter_mut().flat_map(|friction| &mut friction.places) {
+            let power = |m: usize| place.normal.get(m).map_or(0.0, |normal| normal.re.value());
+            let (force, rate, bend) = (power(0), power(1), power(2));
+            let natural = if bend == 0.0 { unit } else { unit.min((rate / bend).abs()) };
+            let is_ahead = place.along.re.value() * rate < 0.0 && (force / rate).abs() < PASSED * natural;
+            if place.friction.normal == Normal::Rail && is_ahead {
+                place.is_turned = true;
+                is_any = true;
+            }
+        }
+        is_any
+    }
+
+    /// Forgets which rails were turned.
+    pub(super) fn turn_back(&mut self) {
+        let places = self.friction.iter_mut().flat_map(|friction| &mut friction.places);
+        places.for_each(|place| place.is_turned = false);
+    }
+}
