@@ -1,0 +1,119 @@
+//! Why a scene has no equations.
+
+use super::DENSE_LIMIT;
+use crate::dynamics::assembly::Closest;
+
+/// Why a scene has no equations.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CompileError {
+    /// Motors and locks give the same angle twice.
+    #[error("`{0}` gives an angle that the other motors and locks give already")]
+    Redundant(String),
+    /// Too many rows that act on one another.
+    #[error(
+        "{0} constraint rows that act on one another through the bodies they hang on; at most about {DENSE_LIMIT} are taken"
+    )]
+    TooMany(usize),
+    /// The mass matrix is singular: some body has no inertia about its hinge.
+    #[error(
+        "the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge"
+    )]
+    Massless(String),
+    /// No start closes the rows, or none near what is given.
+    #[error(
+        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\n{closest}\nhint: check lengths and places, and whether what `start` gives can be reached; `driftless check SCENE --chart FILE` draws the closest"
+    )]
+    Impossible {
+        /// The row that is off most.
+        row: String,
+        /// By how much.
+        left: f64,
+        /// `rad` or `m`.
+        unit: &'static str,
+        /// What comes closest.
+        closest: Box<Closest>,
+    },
+    /// No rates keep the rows at the start.
+    #[error(
+        "no rates fit the start: constraint `{row}` slips by {left:.3e} {unit}\nhint: check motors against locks, and whether the start is a dead centre for the motor"
+    )]
+    ImpossibleRates {
+        /// The row that slips most.
+        row: String,
+        /// By how much.
+        left: f64,
+        /// `rad/s` or `m/s`.
+        unit: &'static str,
+    },
+    /// Coordinates, or rates, that neither the rows nor the scene give: as many as have to be added.
+    #[error("the start leaves {} open: no constraint gives {}\nhint: add {} to the scene", quoted(.0), them(.0), them(.0))]
+    Undetermined(Vec<String>),
+    /// More than one start fits what is given.
+    #[error(
+        "the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}, and {count} configurations are found that fit\nhint: {advice}"
+    )]
+    Ambiguous {
+        /// Where the scene could say which.
+        what: String,
+        /// One value.
+        one: f64,
+        /// Another.
+        other: f64,
+        /// `rad` or `m`.
+        unit: &'static str,
+        /// Configurations that were found.
+        count: usize,
+        /// What to give, so that the first of them is told from all others.
+        advice: String,
+    },
+    /// A spring with a free length starts without a direction.
+    #[error(
+        "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; start elsewhere, move an end, or set free_length to 0"
+    )]
+    SpringWithoutLength(String),
+    /// A rigid spring that vibrates is not the only constraint.
+    #[error(
+        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only where no other constraint, wall or damper is\nhint: start it at its free length and without a rate along it, or leave its `model` out"
+    )]
+    NotAlone {
+        /// The spring.
+        spring: String,
+        /// Its energy \[J\].
+        energy: f64,
+    },
+    /// The scene was put together by hand and makes no sense.
+    #[error("the scene makes no sense: {0}")]
+    Unsound(String),
+    /// A potential depends on time or rates.
+    #[error("the potential of force `{0}` depends on time or rates\nhint: leave what does to `Force::apply`")]
+    NoPotential(String),
+    /// A force acts on a body the mechanism does not have.
+    #[error("force `{0}` is one of another mechanism: it names a body that is not there")]
+    ForeignForce(String),
+    /// No bar has the name asked for.
+    #[error("no bar is called `{0}`")]
+    NoSuchBar(String),
+    /// A point starts behind its wall.
+    #[error(
+        "wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal"
+    )]
+    BehindWall {
+        /// The wall.
+        wall: String,
+        /// How far \[m\].
+        gap: f64,
+    },
+}
+
+/// Names in backticks, with commas and an `and`.
+pub(in crate::dynamics) fn quoted(names: &[String]) -> String {
+    let all: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
+    match all.split_last() {
+        Some((last, before)) if !before.is_empty() => format!("{} and {last}", before.join(", ")),
+        _ => all.join(""),
+    }
+}
+
+fn them(names: &[String]) -> &'static str {
+    if names.len() == 1 { "it" } else { "them" }
+}

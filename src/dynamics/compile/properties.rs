@@ -1,0 +1,193 @@
+//! What a mechanism has and has not, for those that choose forms and methods.
+
+use super::{Body, Joint, Mechanism};
+use crate::dynamics::constraint::{ConstraintEquation, Site};
+use crate::dynamics::force::UserForce;
+use crate::dynamics::forest::{BodyOrigin, Hang};
+use crate::dynamics::point::Point;
+
+impl Mechanism {
+    /// Number of coordinates: the bodies' angles, and two for every origin that moves freely.
+    pub fn coordinates(&self) -> usize {
+        self.tree.coordinates
+    }
+
+    /// The number of bodies where angles are all there is and matrices are used, as code made for a size asks
+    /// for; else 0, any number.
+    pub fn size(&self) -> usize {
+        if self.coordinates() == self.bodies.len() && self.recursion.is_none() {
+            self.bodies.len()
+        } else {
+            0
+        }
+    }
+
+    /// Centre of mass of a body as a point.
+    pub fn centre(&self, body: usize) -> Point {
+        self.forest.walk(body, self.bodies[body].centre)
+    }
+
+    /// The first or second end of a bar.
+    pub fn end(&self, body: usize, end: usize) -> Site {
+        Site { body: Some(body), point: self.forest.walk(body, self.bodies[body].ends[end]) }
+    }
+
+    /// What coordinate `k` is: `phi of bar1`, `x of cart`.
+    pub fn coordinate_name(&self, k: usize) -> String {
+        let name = |body: usize| &self.bodies[body].name;
+        match k.checked_sub(self.bodies.len()) {
+            None => format!("phi of {}", name(k)),
+            Some(rest) => {
+                let origin_point = |hang: &Hang| hang.origin_point == BodyOrigin::Free(k - rest % 2);
+                let body = self.forest.hangs.iter().position(origin_point).unwrap_or(0);
+                format!("{} of {}", if rest % 2 == 0 { "x" } else { "y" }, name(body))
+            }
+        }
+    }
+
+    /// The same for its rate.
+    pub fn rate_name(&self, k: usize) -> String {
+        let name = self.coordinate_name(k);
+        match name.strip_prefix("phi") {
+            Some(rest) => format!("omega{rest}"),
+            None => format!("v{name}"),
+        }
+    }
+
+    /// The bodies of the scene itself: the rotors of integrals come after them.
+    pub fn own_bodies(&self) -> &[Body] {
+        &self.bodies[..self.bodies.len() - self.integrals]
+    }
+
+    /// The hinges and welds of the scene itself.
+    pub fn own_joints(&self) -> impl Iterator<Item = &Joint> {
+        let own = self.own_bodies().len();
+        self.joints.iter().filter(move |joint| joint.outer.is_none_or(|body| body < own))
+    }
+
+    /// True where a joint was released, so that rows constrain nothing.
+    pub fn has_released(&self) -> bool {
+        self.constraints.iter().any(|row| row.coordinates().is_empty())
+    }
+
+    /// Names of the rows in force that follow from others.
+    pub fn redundant(&self) -> Vec<&str> {
+        let in_force = self.constraints.iter().filter(|row| !row.coordinates().is_empty());
+        in_force
+            .map(|row| row.name.as_str())
+            .filter(|name| self.assembly.redundant.iter().any(|of| of == name))
+            .collect()
+    }
+
+    /// True where motors have aims that depend on the mechanism.
+    pub fn has_aims(&self) -> bool {
+        self.constraints.iter().any(|row| row.aim.is_some())
+    }
+
+    /// Names of the scene's integrals, and the coordinates whose rates they are.
+    pub fn integrals(&self) -> impl Iterator<Item = (&str, usize)> {
+        let own = self.own_bodies().len();
+        self.bodies.iter().enumerate().skip(own).map(|(k, rotor)| (rotor.name.as_str(), k))
+    }
+
+    /// Names of the scene's events.
+    pub fn event_names(&self) -> Vec<&str> {
+        let events = self.laws.as_ref().map_or(&[][..], |laws| &laws.formulas.events);
+        events.iter().map(|event| event.name.as_str()).collect()
+    }
+
+    /// True where a law may be flat to the last digit at one place and not at another.
+    pub fn may_be_flat(&self) -> bool {
+        let is_flat_aim =
+            |row: &ConstraintEquation| row.aim.as_ref().is_some_and(|aim| aim.tape.may_be_flat());
+        self.forces.iter().any(|force| force.may_be_flat) || self.constraints.iter().any(is_flat_aim)
+    }
+
+    /// True where laws have corners, places stick and slide or events change what acts, so that steps end
+    /// where a switch is.
+    pub fn is_switched(&self) -> bool {
+        !self.frictions.is_empty() || self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
+    }
+
+    /// True where power series are chosen and serve as references: not with the mean force of a vibration,
+    /// which has none, nor with dry friction and aims that depend on the mechanism, which `taylor` takes
+    /// where it is asked for; and it takes the matrices of the tree.
+    pub fn has_series(&self) -> bool {
+        self.vibration.is_none() && self.frictions.is_empty() && !self.has_aims() && self.tree.is_dense()
+    }
+
+    /// True where the scene has a damper, or a force from outside that depends on rates.
+    pub fn is_damped(&self) -> bool {
+        self.forces.iter().any(UserForce::depends_on_rates)
+            || !self.frictions.is_empty()
+            || self.springs.iter().any(|spring| spring.damping != 0.0)
+            || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
+    }
+
+    /// True where anything but gravity and rows acts.
+    pub fn is_forced(&self) -> bool {
+        !(self.springs.is_empty()
+            && self.torsions.is_empty()
+            && self.actions.is_empty()
+            && self.forces.is_empty())
+    }
+
+    /// True where forces do work that no energy stands for: dampers, applied forces and torques.
+    pub fn is_worked_on(&self) -> bool {
+        self.keeps_work
+            || self.is_damped()
+            || !self.actions.is_empty()
+            || self.forces.iter().any(UserForce::does_work)
+    }
+
+    /// True where motors, dampers or applied forces do work, so that a form must integrate it.
+    pub fn has_work_integral(&self) -> bool {
+        !self.constraints.is_empty() || self.is_worked_on()
+    }
+
+    /// True where only gravity and rows act on bodies that hang on the ground.
+    pub fn is_plain(&self) -> bool {
+        self.coordinates() == self.bodies.len() && !self.is_forced()
+    }
+
+    /// True where whole turns matter, so that angles are not wrapped.
+    pub fn is_winding(&self) -> bool {
+        let turns = |row: &ConstraintEquation| row.aim.as_ref().is_some_and(|aim| aim.counts_turns);
+        !self.torsions.is_empty()
+            || self.forces.iter().any(UserForce::counts_turns)
+            || self.constraints.iter().any(turns)
+    }
+
+    /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an
+    /// angle.
+    pub fn is_motor(&self, row: usize) -> bool {
+        let of = &self.constraints[row];
+        row < self.motors || (of.law.is_some() || of.aim.is_some()) && !of.is_angle()
+    }
+
+    /// The unit of what rows measure: `rad`, `m`, or `rad or m` where some measure angles and some lengths;
+    /// none without rows.
+    pub fn unit_of_rows(&self) -> Option<&'static str> {
+        let [angles, lengths] =
+            [true, false].map(|kind| self.constraints.iter().any(|row| row.is_angle() == kind));
+        match (angles, lengths) {
+            (true, true) => Some("rad or m"),
+            (true, false) => Some("rad"),
+            (false, true) => Some("m"),
+            (false, false) => None,
+        }
+    }
+
+    /// True where a row is left when the given angles are eliminated: loops, sliders, contacts that are held.
+    pub fn has_closed_loops(&self) -> bool {
+        self.constraints.iter().any(|row| !row.is_angle())
+    }
+
+    /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole
+    /// turns matter.
+    pub fn has_multipliers(&self) -> bool {
+        self.has_closed_loops()
+            || (self.is_winding() && self.partition.driven())
+            || self.constraints.iter().any(|row| self.may_be_off(&row.name))
+    }
+}

@@ -1,0 +1,253 @@
+//! One order of the recurrence: the factored matrices, the right sides, and the solution with what it completes.
+
+use super::action;
+use super::factors::Factors;
+use super::polynomial::{UNROLLED, convolve, width};
+use super::{At, Series, SeriesNumber, Terms};
+use crate::arithmetic::Complex;
+use crate::dynamics::schur;
+use crate::dynamics::tree::{self, Tree, size};
+
+impl<T: SeriesNumber> Series<T> {
+    /// The factors of M_0, and those of the rows.
+    #[inline(always)]
+    pub(super) fn factor<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
+        let (n, f) = (size::<N>(self.elements), self.partition.count());
+        if N == 0
+            && let Some(bodywise) = &mut self.bodywise
+        {
+            bodywise.factor(&self.z[..n], &self.omega[..n]);
+            self.rows.prepare_bodywise(&mut bodywise.evaluation, &self.z[..n]);
+            return;
+        }
+        terms.tree.mass_matrix::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
+        if self.is_tied {
+            self.partition.reduce(&self.mass, &mut self.reduced);
+            tree::factor::<T, 0>(f, &mut self.reduced, &mut self.pivot);
+        } else {
+            self.reduced.copy_from_slice(&self.mass);
+            tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
+        }
+        if !self.rows.is_empty() {
+            self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
+            let diagonal = &terms.structure.tree.diagonal;
+            let diagonal = self.partition.independent.iter().map(|&body| diagonal[body]);
+            self.rows.mark(schur::is_deep(&self.pivot[..f], diagonal));
+        }
+    }
+
+    /// f_{m+1} into `turned` and u_m into `bend`; the driven part of a_m, where there is one, is in it.
+    #[inline(always)]
+    pub(super) fn bend<const N: usize>(&mut self, m: usize) {
+        let (n, angles) = (size::<N>(self.elements), size::<N>(self.angles));
+        let (omega, z) = (&self.omega[..(m + 1) * n], &self.z[n..(m + 2) * n]);
+        let (turned, bend) = (&mut self.turned[..n], &mut self.bend[..n]);
+        let factor = T::of((m + 1) as f64);
+        bend[angles..].fill(Complex::ZERO);
+        if T::HAS_CONSTANTS {
+            let Factors { scale, z, omega, .. } = &self.factors;
+            for i in 0..angles {
+                let sum = z[i].times(&omega[i], scale, m + 1, 1..=m + 1);
+                let left = sum.left();
+                let times = |x: T| x.scale((m + 1) as f64);
+                (turned[i], bend[i]) = (sum, Complex::new(times(left.re), times(left.im)));
+            }
+            return;
+        }
+        let mut first = 0;
+        while first < angles {
+            let sums = convolve::<N, _, _, _>(n, first, omega, z, |w, z| z.times(w));
+            for i in 0..width::<N>() {
+                turned[first + i] = sums[i];
+                bend[first + i] = sums[i].left().times(factor);
+            }
+            first += width::<N>();
+        }
+    }
+
+    /// R_m, and the load -Σ Im(conj(z) R) of this order into `load`.
+    #[inline(always)]
+    pub(super) fn balance<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        let (n, angles) = (size::<N>(self.elements), size::<N>(self.angles));
+        self.load[..n].fill(T::ZERO);
+        if self.is_tied {
+            // The known part of a_m: s'' of this order.
+            for i in 0..angles {
+                let given = self.drive[(m + 1) * n + i] * T::of((m + 1) as f64);
+                self.load[i] = -given.by(terms.tree.diagonal[i]);
+                self.bend[i] += self.z[i].left().times(given);
+            }
+        }
+        self.gravity_forces(terms, m);
+        mass_terms::<T, N>(terms.tree, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
+        self.force(terms, m);
+        let (before, rest) = self.rest.split_at_mut(m * n);
+        let rest = &mut rest[..n];
+        let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
+        for x in (angles..n).step_by(2) {
+            load[x] -= rest[x].re;
+            load[x + 1] -= rest[x].im;
+        }
+        if T::HAS_CONSTANTS {
+            // Of l = 0 only, R is not complete yet.
+            let Factors { scale, z: factors, rest: known, .. } = &self.factors;
+            for k in 0..angles {
+                let sum = factors[k].cross(&known[k], scale, m, 1..=m);
+                load[k] -= sum + z[k].cross(rest[k]);
+            }
+            return;
+        }
+        let mut first = 0;
+        while first < angles {
+            // Of l = 0 only, R is not complete yet.
+            let sums: [T; UNROLLED] =
+                convolve::<N, _, _, _>(n, first, &z[n..], before, |z, rest| z.cross(rest));
+            for i in 0..width::<N>() {
+                let k = first + i;
+                load[k] -= sums[i] + z[k].cross(rest[k]);
+            }
+            first += width::<N>();
+        }
+    }
+
+    /// Gravity in R_m, and nothing else.
+    #[inline(always)]
+    pub(super) fn gravity_forces(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        for (rest, &weight) in self.rest[m * self.elements..].iter_mut().zip(&terms.tree.weight) {
+            *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
+        }
+    }
+
+    /// Adds what all other forces leave in R_m, and torques to the load.
+    #[inline(always)]
+    pub(super) fn force(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        let n = self.elements;
+        let rest = &mut self.rest[m * n..(m + 1) * n];
+        let mut on_bodies = self.friction.as_mut().map(|friction| &mut friction.applied[..]);
+        if let Some(on_bodies) = &mut on_bodies {
+            on_bodies.fill(Complex::ZERO);
+        }
+        for (spring, series) in terms.springs.iter().zip(&mut self.springs) {
+            let force = series.force(spring, m, &self.z, n, &self.factors.scale);
+            spring.span.spread(force, |k, force| rest[k] -= force);
+            if let Some(on_bodies) = &mut on_bodies {
+                let ends = spring.bodies.iter().zip([force, -force]);
+                ends.for_each(|(body, force)| body.iter().for_each(|&body| on_bodies[body] += force));
+            }
+        }
+        if !terms.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
+            let applied = &mut self.applied[m * n..(m + 1) * n];
+            applied.fill(T::ZERO);
+            for torsion in terms.torsions {
+                torsion.pull(action::twist(torsion, m, &self.phi, &self.omega, n), applied);
+            }
+            for (action, series) in terms.actions.iter().zip(&mut self.actions) {
+                series.act(action, m, &self.z, n, (rest, applied), &self.factors.scale);
+                if let Some(on_bodies) = &mut on_bodies {
+                    on_bodies[action.body] += series.force(m);
+                }
+            }
+            let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+            for (force, series) in terms.forces.iter().zip(&mut self.forces) {
+                series.act(force, m, at, (&mut *rest, &mut *applied), &self.factors.scale);
+                if let Some(on_bodies) = &mut on_bodies {
+                    series.forces(force, m, |body, force| on_bodies[body] += force);
+                }
+            }
+            for (load, &applied) in self.load.iter_mut().zip(applied.iter()) {
+                *load += applied;
+            }
+        }
+        self.rows.geometric_terms(m, &self.z, n, rest);
+        if m > 0 {
+            let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+            self.rows.advance_aims(m, at, &mut self.load);
+        }
+        if let Some(friction) = &self.friction {
+            friction.geometric_terms(m, &self.z, n, rest);
+        }
+    }
+
+    /// a_m from the loads, the newest powers of w and z, and R_m completed.
+    #[inline(always)]
+    pub(super) fn solve<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        let (n, f) = (size::<N>(self.elements), self.partition.count());
+        let angles = size::<N>(self.angles);
+        let rest = &mut self.rest[m * n..(m + 1) * n];
+        if self.is_tied {
+            self.partition.gather(&self.load, &mut self.solution);
+            tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
+        } else {
+            self.solution[..n].copy_from_slice(&self.load[..n]);
+            tree::solve::<T, N>(n, &self.reduced, &self.pivot, &mut self.solution);
+        }
+        if !self.rows.is_empty() {
+            self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+            self.rows.push(m, &self.z[..n], rest);
+        }
+        if let Some(&limbs) = self.limbs.get(m + 1) {
+            self.solution.iter_mut().for_each(|x| *x = x.kept(limbs));
+            self.turned.iter_mut().for_each(|x| *x = Complex::new(x.re.kept(limbs), x.im.kept(limbs)));
+        }
+        for c in 0..f {
+            self.rate[(m + 1) * f + c] = self.fractions.over(self.solution[c], m + 1);
+        }
+        let (known, newest) = self.z.split_at_mut((m + 2) * n);
+        let (z, newest) = (&known[..n], &mut newest[..n]);
+        let omega = &mut self.omega[(m + 1) * n..(m + 2) * n];
+        if self.is_tied {
+            for (i, dependent_angle) in self.partition.bodies.iter().enumerate() {
+                let (solved, rate) = dependent_angle
+                    .base
+                    .map_or((T::ZERO, T::ZERO), |base| (self.solution[base], self.rate[(m + 1) * f + base]));
+                omega[i] = rate + self.drive[(m + 1) * n + i];
+                self.bend[i] =
+                    if i < angles { z[i].left().times(solved) } else { Complex::new(solved, T::ZERO) };
+            }
+            for x in (angles..n).step_by(2) {
+                self.bend[x].im = self.bend[x + 1].re;
+            }
+        } else {
+            omega.copy_from_slice(&self.rate[(m + 1) * n..(m + 2) * n]);
+            for i in 0..angles {
+                self.bend[i] = z[i].left().times(self.solution[i]);
+            }
+            for x in (angles..n).step_by(2) {
+                self.bend[x] = Complex::new(self.solution[x], self.solution[x + 1]);
+            }
+        }
+        for x in (angles..n).step_by(2) {
+            newest[x] = self.fractions.vector_over(Complex::new(omega[x], omega[x + 1]), m + 2);
+        }
+        for i in 0..angles {
+            newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
+        }
+        mass_terms::<T, N>(terms.tree, &self.bend, rest);
+        if T::HAS_CONSTANTS {
+            self.factors.push(newest, omega, rest);
+        }
+    }
+}
+
+/// Adds H x to `rest`, without the diagonal.
+#[inline(always)]
+fn mass_terms<T: SeriesNumber, const N: usize>(
+    tree: &Tree<T::Constant>,
+    x: &[Complex<T>],
+    rest: &mut [Complex<T>],
+) {
+    let n = size::<N>(tree.coordinates);
+    let (coupling, x, rest) = (&tree.coupling[..n * n], &x[..n], &mut rest[..n]);
+    for i in 0..n {
+        for j in i + 1..n {
+            let h = coupling[i * n + j];
+            if tree.off_axis {
+                rest[i] += x[j].turn(h);
+                rest[j] += x[i].turn(h.conj());
+            } else {
+                rest[i] += Complex::new(x[j].re.by(h.re), x[j].im.by(h.re));
+                rest[j] += Complex::new(x[i].re.by(h.re), x[i].im.by(h.re));
+            }
+        }
+    }
+}
