@@ -1,4 +1,4 @@
-//! Impacts at several walls at once with dry friction: against closed forms.
+//! Impacts at several walls at once, with dry friction and without: against closed forms.
 
 use super::formulas::{adaptive, run, scene};
 use driftless::Mechanism;
@@ -163,6 +163,70 @@ fn a_box_that_lands_flat_slides_to_a_stop() {
         for transition in last {
             assert_eq!(transition.mode, "sticks");
             near(transition.t, falls + stops, "sticks at");
+        }
+    }
+}
+
+/// On a smooth floor both corners are pressed alike, and expand as their walls let them: without a spin only
+/// where these are equal.
+#[test]
+fn a_box_that_lands_flat_on_a_smooth_floor_turns_by_the_difference_of_its_restitutions() {
+    let [mass, width, height, inertia] = BOX;
+    let (v, x) = ((2.0 * G * FALL).sqrt(), 0.5 * width);
+    for [left, right] in [[0.5, 0.5], [0.0, 0.0], [0.7, 0.6]] {
+        let corner = |name: &str, x: f64, e: f64| {
+            format!(
+                r#"{{"name": "{name}", "body": "box", "point": [{x}, -{height}], "line": {{"through": [0, 0], "normal": [0, 1]}}, "restitution": {e}}}"#
+            )
+        };
+        let until = (2.0 * FALL / G).sqrt() + 0.05;
+        let text = format!(
+            r#"{{"name": "box", "gravity": [0, -{G}], "bars": [{{"name": "box", "mass": {mass}, "centre": [0, 0], "inertia": {inertia}}}],
+            "walls": [{}, {}], "start": {{"box": {{"phi": 0, "omega": 0, "origin": [0, {}], "velocity": [3, 0]}}}},
+            "until": {until}, "every": {until}}}"#,
+            corner("left", -x, left),
+            corner("right", x, right),
+            height + FALL,
+        );
+        let [back, spin] = [0.5 * (left + right) * v, 0.5 * (right - left) * mass * v * x / inertia];
+        assert!(back - x * spin.abs() >= 0.0);
+        for outcome in runs(&text) {
+            near(outcome.last.omega[0], spin, "spin");
+            near(outcome.last.omega[1], 3.0, "velocity along the floor");
+            // What rests there is carried.
+            near(outcome.last.omega[2], if back > 0.0 { back - 0.05 * G } else { 0.0 }, "velocity upwards");
+            for (name, e) in [("left", left), ("right", right)] {
+                let hit = outcome.impacts.iter().find(|hit| hit.wall == name).expect("an impact");
+                near(hit.impulse, 0.5 * (1.0 + e) * mass * v, name);
+            }
+        }
+    }
+}
+
+/// A ball falls straight into a corner of two equal smooth walls, whatever their angle.
+#[test]
+fn a_ball_in_a_smooth_corner_rebounds_the_way_it_came() {
+    let (v, e) = ((2.0 * G * FALL).sqrt(), 0.6);
+    for lean in [0.2, 0.7, 1.3_f64] {
+        let (sin, cos) = lean.sin_cos();
+        let wall = |name: &str, side: f64| {
+            format!(
+                r#"{{"name": "{name}", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [{}, {cos}]}}, "restitution": {e}}}"#,
+                side * sin
+            )
+        };
+        let until = (2.0 * FALL / G).sqrt() + 0.05;
+        let text = format!(
+            r#"{{"name": "corner", "gravity": [0, -{G}], "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1}}],
+            "walls": [{}, {}], "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {FALL}], "velocity": [0, 0]}}}},
+            "until": {until}, "every": {until}}}"#,
+            wall("left", 1.0),
+            wall("right", -1.0)
+        );
+        for outcome in runs(&text) {
+            near(outcome.last.omega[1], 0.0, "aside");
+            near(outcome.last.omega[2], e * v - 0.05 * G, "upwards");
+            assert_eq!(outcome.impact_count, 2);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Impulses of one impact at several walls at once, with dry friction.
+//! Impulses of one impact at several walls at once, with and without dry friction.
 //!
 //! ```text
 //! v⁺ = v⁻ + A p,   p = (n_1 … n_k, s_1 … s_k)         along the normals and the walls

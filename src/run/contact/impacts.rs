@@ -123,7 +123,7 @@ impl ContactDriver {
             });
         }
         let t = last.time.hi;
-        self.tell_impact(Some(contact), last, after);
+        self.tell_impact(Some(contact), false, last, after);
         outcome.impact_loss += energy_lost;
         // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off
         // it, and is no impact.
@@ -155,11 +155,11 @@ impl ContactDriver {
         (last, self.motion(), -change.hi)
     }
 
-    /// Tells of an impact where somebody asks.
-    pub(super) fn tell_impact(&self, contact: Option<usize>, before: Motion, after: Motion) {
+    /// Tells of an impact where somebody asks; `is_shared` where several walls take part in it.
+    pub(super) fn tell_impact(&self, contact: Option<usize>, is_shared: bool, before: Motion, after: Motion) {
         if let Some(jumps) = &self.jumps {
             let mechanism = Arc::clone(&self.mechanism);
-            jumps.push(Jump { contact, switch: None, before, after, mechanism });
+            jumps.push(Jump { contact, is_shared, switch: None, before, after, mechanism });
         }
     }
 
@@ -246,6 +246,7 @@ impl ContactDriver {
         if let (Some(jumps), Some(before)) = (&self.jumps, before) {
             jumps.push(Jump {
                 contact: None,
+                is_shared: false,
                 switch: None,
                 before,
                 after: motion.clone(),

@@ -7,8 +7,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// What happened between two steps: an impact, points held or released, or a change by an event.
 #[derive(Clone, Debug)]
 pub(in crate::run) struct Jump {
-    /// The contact of an impact.
+    /// The contact of an impact, the first of several.
     pub contact: Option<usize>,
+    /// True where several walls take part in it, which neighbouring motions meet one after the other.
+    pub is_shared: bool,
     /// The change by an event.
     pub switch: Option<Switch>,
     /// The motion on both sides.
@@ -52,5 +54,15 @@ impl JumpLog {
     /// Takes them out.
     pub fn take(&self) -> Vec<Jump> {
         std::mem::take(&mut *self.list.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+/// Why small differences do not go on through what happens at one moment, where they do not.
+pub(in crate::run) fn check_alone(jumps: &[Jump]) -> Result<(), String> {
+    match jumps.iter().any(|jump| jump.is_shared) {
+        true => {
+            Err("several walls are met at once, which neighbouring motions meet one after the other".into())
+        }
+        false => Ok(()),
     }
 }

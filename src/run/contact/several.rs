@@ -1,4 +1,4 @@
-//! Impacts at several walls at one moment, where friction makes the order of impacts matter.
+//! Impacts at several walls at one moment: their impulses are found together, as the order of impacts matters.
 
 use super::super::impact_monitor;
 use super::super::running::Outcome;
@@ -21,9 +21,9 @@ impl ContactDriver {
         (0..self.free.contacts.len()).filter(touches).collect()
     }
 
-    /// The walls that touch, where several of them are met at once and one has dry friction.
+    /// The walls that touch, where several of them are met at once.
     pub(super) fn met_together(&mut self, contact: usize) -> Option<Vec<usize>> {
-        if self.free.frictions.is_empty() {
+        if self.free.contacts.len() < 2 {
             return None;
         }
         let touching = self.touching_with(contact);
@@ -34,9 +34,7 @@ impl ContactDriver {
             let size = self.free.contacts[number].step_size(&omega).max(hardest);
             !self.mechanism.held.contains(&number) && approach(number) > NO_SPEED * size
         };
-        let met: Vec<usize> = touching.iter().filter(is_met).copied().collect();
-        let is_rough = met.iter().any(|&number| self.free.friction_at(number).is_some());
-        (met.len() > 1 && is_rough).then_some(touching)
+        (touching.iter().filter(is_met).count() > 1).then_some(touching)
     }
 
     /// True where an impact at one wall presses a point that rests on another one with dry friction.
@@ -70,7 +68,7 @@ impl ContactDriver {
             return Err(StepError { cause: Cause::ImpactCheckFailed, ..stop });
         }
         let t = last.time.hi;
-        self.tell_impact(contacts.first().copied(), last, after);
+        self.tell_impact(contacts.first().copied(), impacts.blows.len() > 1, last, after);
         outcome.impact_loss += energy_lost;
         let mut hardest = 0.0_f64;
         for blow in &impacts.blows {

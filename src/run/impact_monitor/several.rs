@@ -1,4 +1,4 @@
-//! The check of an impact at several walls with dry friction.
+//! The check of an impact at several walls at once.
 //!
 //! ```text
 //! at every wall:    gap = 0,  v_n⁺ >= 0,  |p_t| <= mu0 p_n

@@ -10,7 +10,7 @@
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
 //! Solitons & Fractals 5 (1995).
 
-use super::super::contact::{Jump, Switch};
+use super::super::contact::{Jump, Switch, check_alone};
 use super::super::event::SwitchFunction;
 use super::neighbours::Neighbour;
 use super::variation::{Crossing, Variation, plain};
@@ -81,6 +81,7 @@ impl Variation {
         if !last.mechanism.held.is_empty() {
             return Err("a point comes to rest on its wall, which small differences do not follow".into());
         }
+        check_alone(jumps)?;
         let (mut off, mut is_other) = (None, false);
         for jump in jumps {
             off = jump.switch.as_ref().map(|switch| switch.off.clone()).or(off);

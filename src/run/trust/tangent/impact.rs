@@ -12,7 +12,7 @@ use super::Tangent;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Coordinates, Mechanism, Motion};
-use crate::run::contact::Jump;
+use crate::run::contact::{Jump, check_alone};
 use std::sync::Arc;
 
 /// Normal velocity over that of the point's parts below which a wall is grazed, and neighbours may miss it.
@@ -95,6 +95,7 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
     let Some((contact, struck)) = jumps.iter().find_map(|jump| Some((jump.contact?, jump))) else {
         return Ok(());
     };
+    check_alone(jumps)?;
     let n = mechanism.coordinates();
     let here = Side::new(mechanism, &struck.before);
     let there = jumps.last().map(|last| Side::new(&last.mechanism, &last.after));
