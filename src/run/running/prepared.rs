@@ -66,7 +66,7 @@ impl Run {
         Self { error_estimator, ..self }
     }
 
-    /// The same, timed by a clock: see [`Outcome::wall`].
+    /// The same, timed by a clock: see [`Outcome::wall`](super::Outcome::wall).
     #[must_use]
     pub fn timed(self, clock: Clock) -> Self {
         Self { clock, ..self }

@@ -17,7 +17,7 @@ pub struct Totals {
     /// Points in which a bar turned over.
     pub flipped: u64,
     /// Points done whose error was estimated, and those of them that are in doubt: see
-    /// [`PointTrust::is_doubtful`].
+    /// [`PointTrust::is_doubtful`](super::PointTrust::is_doubtful).
     pub judged: u64,
     /// See `judged`.
     pub doubtful: u64,
