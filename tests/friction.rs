@@ -203,6 +203,55 @@ fn a_force_across_a_rail_that_changes_its_sign_brakes_by_its_size() {
 }
 
 /// Slope of the least-squares line.
+/// A hinge at a bar's centre of mass carries nothing, and has no friction.
+#[test]
+fn a_hinge_without_a_load_has_no_friction() {
+    let text = r#"{"name": "idle", "gravity": [0, 0],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}],
+            "friction": {"radius": 0.05, "kinetic": 0.2}}],
+        "start": {"b": {"phi": 0, "omega": 1}}, "until": 2, "every": 0.5}"#;
+    for outcome in runs(text) {
+        near(outcome.last.phi[0], 2.0, "angle");
+        near(outcome.last.omega[0], 1.0, "rate");
+    }
+}
+
+/// A torque of t N·m turns a bar from rest, without weight: the force in its hinge begins with the first power
+/// of time.
+#[test]
+fn a_force_in_a_hinge_may_begin_at_zero() {
+    let (mass, centre, inertia, lever) = (1.0, 0.4, 0.1, 0.05 * 0.2);
+    let text = format!(
+        r#"{{"name": "spun_up", "gravity": [0, 0],
+        "bars": [{{"name": "b", "mass": {mass}, "centre": [{centre}, 0], "inertia": {inertia}, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}],
+            "friction": {{"radius": 0.05, "kinetic": 0.2}}}}],
+        "torques": [{{"name": "T", "body": "b", "torque": 1, "law": {{"start": 0, "rate": 1}}}}],
+        "start": {{"b": {{"phi": 0, "omega": 0}}}}, "until": 2, "every": 0.5}}"#
+    );
+    // I alpha = t - lever m c sqrt(alpha² + omega⁴), by the classic Runge-Kutta method.
+    let about = inertia + mass * centre * centre;
+    let acceleration = |t: f64, omega: f64| {
+        (0..14).fold(t / about, |alpha, _| (t - lever * mass * centre * alpha.hypot(omega * omega)) / about)
+    };
+    let (steps, mut phi, mut omega) = (20_000, 0.0, 0.0);
+    let h = 2.0 / f64::from(steps);
+    for step in 0..steps {
+        let t = h * f64::from(step);
+        let a = acceleration(t, omega);
+        let b = acceleration(t + 0.5 * h, omega + 0.5 * h * a);
+        let c = acceleration(t + 0.5 * h, omega + 0.5 * h * b);
+        let d = acceleration(t + h, omega + h * c);
+        phi += h * omega + h * h * (a + b + c) / 6.0;
+        omega += h * (a + 2.0 * b + 2.0 * c + d) / 6.0;
+    }
+    for outcome in runs(&text) {
+        near(outcome.last.phi[0], phi, "angle");
+        near(outcome.last.omega[0], omega, "rate");
+    }
+}
+
 fn slope(points: &[[f64; 2]]) -> f64 {
     let n = points.len() as f64;
     let mean = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);

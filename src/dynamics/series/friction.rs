@@ -10,6 +10,9 @@
 //!           (1 - c n R) tau_m = c (n·N_m0 + what is known)
 //! ```
 //!
+//! Where N begins with power k, as at rest without weight, |N| does too from the start of the step on: tau_k is
+//! found as tau_0 is, and k takes the place of 0 in what follows.
+//!
 //! A rail's N is one multiplier with a sign, a wall's never negative: of these |N| is linear.  A joint's
 //! follows from Newton's equation of what is beyond it, of which centre c, mass m and applied forces F are
 //! series: `N_m = Σ (m+1)(m+2) m c_{m+2} - F_m`.  Each order is solved twice, without tau_m and with it.
@@ -29,6 +32,8 @@ use crate::scene::Place;
 
 /// Share of the time in which a normal force changes by itself below which a zero ahead counts as passed.
 const PASSED: f64 = 1e-9;
+/// Rounds of Newton's iteration on a direction.
+const ROUNDS: usize = 12;
 
 /// The places that slide.
 #[derive(Clone, Debug)]
@@ -61,8 +66,26 @@ struct Sliding<T> {
     normal: Vec<Complex<T>>,
     size: Vec<T>,
     along: Complex<T>,
+    /// The first power of N that is not zero.
+    lead: Option<usize>,
     /// True for a rail whose N has just passed zero, or is about to, whatever sign it has.
     is_turned: bool,
+}
+
+impl<T: SeriesNumber> Sliding<T> {
+    /// True where |N| is N but for a sign.
+    fn is_linear(&self) -> bool {
+        !matches!(self.friction.normal, Normal::Joint(_))
+    }
+
+    /// What power m of |N| has of the powers before, m above zero.
+    fn known(&self, m: usize) -> T {
+        let Some(lead) = self.lead.filter(|lead| m > lead + 1 && !self.is_linear()) else { return T::ZERO };
+        let (normal, size) = (&self.normal, &self.size);
+        let sum = (lead + 1..m)
+            .fold(T::ZERO, |sum, l| sum + normal[l].dot(normal[m + lead - l]) - size[l] * size[m + lead - l]);
+        sum / (size[lead] + size[lead])
+    }
 }
 
 impl<T: SeriesNumber> FrictionSeries<T> {
@@ -76,6 +99,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             normal: Vec::with_capacity(order),
             size: Vec::with_capacity(order),
             along: Complex::ZERO,
+            lead: None,
             is_turned: false,
         };
         let places: Vec<Sliding<T>> = mechanism.sliding().map(place).collect();
@@ -179,32 +203,37 @@ impl<T: SeriesNumber> FrictionSeries<T> {
                 along = Complex::new(T::of(if is_negative { -1.0 } else { 1.0 }), T::ZERO);
             }
             (place.normal[0], place.size[0], place.along, place.force[0]) = (normal, size, along, tau[j]);
+            place.lead = (place.is_linear() || size.value() != 0.0).then_some(0);
         }
     }
 
     /// tau_m of all places, m above zero, likewise.
     fn advance(&mut self, m: usize, start: &[Complex<T>]) {
         let f = self.places.len();
-        let (mut matrix, mut tau) = (vec![T::ZERO; f * f], vec![T::ZERO; f]);
-        let mut known = vec![T::ZERO; f];
-        for (j, place) in self.places.iter().enumerate() {
-            if let Normal::Joint(_) = place.friction.normal {
-                let (normal, size) = (&place.normal, &place.size);
-                let sum =
-                    (1..m).fold(T::ZERO, |sum, l| sum + normal[l].dot(normal[m - l]) - size[l] * size[m - l]);
-                known[j] = if m > 1 { sum / (size[0] + size[0]) } else { T::ZERO };
+        let known: Vec<T> = self.places.iter().map(|place| place.known(m)).collect();
+        let begins = self.places.iter().any(|place| place.lead.is_none());
+        // Newton's iteration on the direction of what begins with this power.
+        for _ in 0..if begins { ROUNDS } else { 1 } {
+            let (mut matrix, mut tau) = (vec![T::ZERO; f * f], vec![T::ZERO; f]);
+            for (j, place) in self.places.iter().enumerate() {
+                tau[j] = place.coefficient * (known[j] + place.along.dot(start[j]));
+                for k in 0..f {
+                    matrix[j * f + k] = -(place.coefficient * place.along.dot(self.response[j * f + k]));
+                }
+                matrix[j * f + j] += T::ONE;
             }
-            tau[j] = place.coefficient * (known[j] + place.along.dot(start[j]));
-            for k in 0..f {
-                matrix[j * f + k] = -(place.coefficient * place.along.dot(self.response[j * f + k]));
+            friction::solve(&mut matrix, &mut tau);
+            for (j, place) in self.places.iter_mut().enumerate() {
+                let normal = (0..f).fold(start[j], |sum, k| sum + self.response[j * f + k].times(tau[k]));
+                (place.normal[m], place.force[m]) = (normal, tau[j]);
+                if place.lead.is_none() {
+                    place.along = friction::size(place.friction.normal, normal).1;
+                }
+                place.size[m] = known[j] + place.along.dot(normal);
             }
-            matrix[j * f + j] += T::ONE;
         }
-        friction::solve(&mut matrix, &mut tau);
-        for (j, place) in self.places.iter_mut().enumerate() {
-            let normal = (0..f).fold(start[j], |sum, k| sum + self.response[j * f + k].times(tau[k]));
-            (place.normal[m], place.force[m]) = (normal, tau[j]);
-            place.size[m] = known[j] + place.along.dot(normal);
+        for place in &mut self.places {
+            place.lead = place.lead.or((place.size[m].value() != 0.0).then_some(m));
         }
     }
 
