@@ -203,27 +203,33 @@ fn a_box_that_lands_flat_on_a_smooth_floor_turns_by_the_difference_of_its_restit
     }
 }
 
-/// A ball falls straight into a corner of two equal smooth walls, whatever their angle.
+/// Runs of a ball of 2 kg that falls straight into a corner of two equal walls, which lean so far to both sides
+/// and have these further keys.
+fn ball_in_a_corner(lean: f64, e: f64, more: &str) -> Vec<Outcome> {
+    let (sin, cos) = lean.sin_cos();
+    let wall = |name: &str, side: f64| {
+        format!(
+            r#"{{"name": "{name}", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [{}, {cos}]}},
+            "restitution": {e}{more}}}"#,
+            side * sin
+        )
+    };
+    let until = (2.0 * FALL / G).sqrt() + 0.05;
+    runs(&format!(
+        r#"{{"name": "corner", "gravity": [0, -{G}], "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1}}],
+        "walls": [{}, {}], "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {FALL}], "velocity": [0, 0]}}}},
+        "until": {until}, "every": {until}}}"#,
+        wall("left", 1.0),
+        wall("right", -1.0)
+    ))
+}
+
+/// Out of a smooth corner it comes the way it went in, whatever the angle.
 #[test]
 fn a_ball_in_a_smooth_corner_rebounds_the_way_it_came() {
     let (v, e) = ((2.0 * G * FALL).sqrt(), 0.6);
-    for lean in [0.2, 0.7, 1.3_f64] {
-        let (sin, cos) = lean.sin_cos();
-        let wall = |name: &str, side: f64| {
-            format!(
-                r#"{{"name": "{name}", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [{}, {cos}]}}, "restitution": {e}}}"#,
-                side * sin
-            )
-        };
-        let until = (2.0 * FALL / G).sqrt() + 0.05;
-        let text = format!(
-            r#"{{"name": "corner", "gravity": [0, -{G}], "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1}}],
-            "walls": [{}, {}], "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {FALL}], "velocity": [0, 0]}}}},
-            "until": {until}, "every": {until}}}"#,
-            wall("left", 1.0),
-            wall("right", -1.0)
-        );
-        for outcome in runs(&text) {
+    for lean in [0.2, 0.7, 1.3] {
+        for outcome in ball_in_a_corner(lean, e, "") {
             near(outcome.last.omega[1], 0.0, "aside");
             near(outcome.last.omega[2], e * v - 0.05 * G, "upwards");
             assert_eq!(outcome.impact_count, 2);
@@ -231,29 +237,14 @@ fn a_ball_in_a_smooth_corner_rebounds_the_way_it_came() {
     }
 }
 
-/// A ball falls straight into a corner of two equal rough walls.
+/// Out of a rough one too, slower.
 #[test]
 fn a_ball_in_a_corner_rebounds_the_way_it_came() {
     let (v, e, mu, lean) = ((2.0 * G * FALL).sqrt(), 0.6, 0.3, 0.7_f64);
     let (sin, cos) = lean.sin_cos();
     // Friction brakes the way in as well as the way out.
     let back = e * v * (cos - mu * sin) / (cos + mu * sin);
-    let wall = |name: &str, side: f64| {
-        format!(
-            r#"{{"name": "{name}", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [{}, {cos}]}},
-            "restitution": {e}, "friction": {{"kinetic": {mu}}}}}"#,
-            side * sin
-        )
-    };
-    let until = (2.0 * FALL / G).sqrt() + 0.05;
-    let text = format!(
-        r#"{{"name": "corner", "gravity": [0, -{G}], "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1}}],
-        "walls": [{}, {}], "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {FALL}], "velocity": [0, 0]}}}},
-        "until": {until}, "every": {until}}}"#,
-        wall("left", 1.0),
-        wall("right", -1.0)
-    );
-    for outcome in runs(&text) {
+    for outcome in ball_in_a_corner(lean, e, &format!(r#", "friction": {{"kinetic": {mu}}}"#)) {
         near(outcome.last.omega[1], 0.0, "aside");
         near(outcome.last.omega[2], back - 0.05 * G, "upwards");
         assert_eq!(outcome.impact_count, 2);
