@@ -13,21 +13,13 @@ use super::sum;
 use std::fmt::Debug;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
-pub trait Lanes: Copy + Debug + 'static {
-    /// True where long kernels are worth unrolling; where each operation is a call, a loop is as fast and
-    /// compiles in a tenth of the time.
-    const UNROLLED: bool;
-
+/// Doubles side by side: the same operation in every lane, exactly rounded.
+pub trait Arithmetic: Copy + Debug + 'static {
     /// 0 in every lane.
     const ZERO: Self;
     /// 1 in every lane.
     const ONE: Self;
 
-    /// From an array.
-    fn of(lanes: [f64; 4]) -> Self;
-    /// As an array.
-    fn array(self) -> [f64; 4];
     /// The same number in every lane.
     fn splat(value: f64) -> Self;
     /// Sum.
@@ -38,24 +30,10 @@ pub trait Lanes: Copy + Debug + 'static {
     fn mul(self, other: Self) -> Self;
     /// Quotient.
     fn div(self, other: Self) -> Self;
-    /// Square roots.
-    fn sqrt(self) -> Self;
     /// `self · factor + addend`, rounded once.
     fn mul_add(self, factor: Self, addend: Self) -> Self;
     /// `addend - self · factor`, rounded once.
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self;
-    /// `[1, 0, 3, 2]`.
-    fn swap_pairs(self) -> Self;
-    /// `[2, 3, 0, 1]`.
-    fn swap_halves(self) -> Self;
-    /// Magnitudes.
-    fn abs(self) -> Self;
-    /// The larger ones; `other` where one is not a number.
-    fn max(self, other: Self) -> Self;
-    /// True where every lane is at most `bound` in magnitude; false where one is not a number.
-    fn are_within(self, bound: f64) -> bool;
-    /// The negatives, zeros included.
-    fn neg(self) -> Self;
 
     /// `self + other` exactly: the sum and its error, as [`sum::two_sum`].
     #[inline(always)]
@@ -71,6 +49,35 @@ pub trait Lanes: Copy + Debug + 'static {
         let sum = self.add(other);
         (sum, other.sub(sum.sub(self)))
     }
+}
+
+/// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
+pub trait Lanes: Arithmetic {
+    /// True where long kernels are worth unrolling; where each operation is a call, a loop is as fast and
+    /// compiles in a tenth of the time.
+    const UNROLLED: bool;
+
+    /// From an array.
+    fn of(lanes: [f64; 4]) -> Self;
+    /// As an array.
+    fn array(self) -> [f64; 4];
+    /// Square roots.
+    fn sqrt(self) -> Self;
+    /// `[1, 0, 3, 2]`.
+    fn swap_pairs(self) -> Self;
+    /// `[2, 3, 0, 1]`.
+    fn swap_halves(self) -> Self;
+    /// Magnitudes.
+    fn abs(self) -> Self;
+    /// The larger ones; `other` where one is not a number.
+    fn max(self, other: Self) -> Self;
+    /// True where every lane is at most `bound` in magnitude; false where one is not a number.
+    fn are_within(self, bound: f64) -> bool;
+    /// The negatives, zeros included.
+    fn neg(self) -> Self;
+
+    /// Runs code on these lanes, compiled by itself and not as a part of what calls it.
+    fn apart<C: Code>(code: C) -> C::Output;
 }
 
 /// Plain code, with a software fused multiply-add where the processor lacks one.
@@ -102,21 +109,9 @@ fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
     ]
 }
 
-impl Lanes for Portable {
-    const UNROLLED: bool = false;
-
+impl Arithmetic for Portable {
     const ZERO: Self = Self([0.0; 4]);
     const ONE: Self = Self([1.0; 4]);
-
-    #[inline(always)]
-    fn of(lanes: [f64; 4]) -> Self {
-        Self(lanes)
-    }
-
-    #[inline(always)]
-    fn array(self) -> [f64; 4] {
-        self.0
-    }
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -144,11 +139,6 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f64::sqrt))
-    }
-
-    #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         Self(fused(self.0, factor.0, addend.0))
     }
@@ -156,6 +146,25 @@ impl Lanes for Portable {
     #[inline(always)]
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
         self.neg().mul_add(factor, addend)
+    }
+}
+
+impl Lanes for Portable {
+    const UNROLLED: bool = false;
+
+    #[inline(always)]
+    fn of(lanes: [f64; 4]) -> Self {
+        Self(lanes)
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 4] {
+        self.0
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
     }
 
     #[inline(always)]
@@ -187,11 +196,17 @@ impl Lanes for Portable {
     fn neg(self) -> Self {
         Self(self.0.map(|x| -x))
     }
+
+    #[inline(never)]
+    fn apart<C: Code>(code: C) -> C::Output {
+        code.run::<Self>()
+    }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod hardware;
 pub mod row;
+pub mod wide;
 #[cfg(target_arch = "x86_64")]
 pub use hardware::Hardware;
 #[cfg(target_arch = "x86_64")]
@@ -217,6 +232,11 @@ impl Hardware {
     pub fn run<C: Code>(self, _: C) -> C::Output {
         match self {}
     }
+
+    /// Nobody holds such a proof.
+    pub fn run_in_pairs<C: wide::WideCode>(self, _: C) -> C::Output {
+        match self {}
+    }
 }
 
 /// Code written once over lanes: its [`Code::run`], and every function below it, is `#[inline(always)]`, so
@@ -237,10 +257,16 @@ pub fn disable(is_disabled: bool) {
     IS_DISABLED.store(is_disabled, Ordering::Relaxed);
 }
 
+/// True where the processor is taken for one without vectors.
+#[inline]
+fn is_disabled() -> bool {
+    IS_DISABLED.load(Ordering::Relaxed)
+}
+
 /// The proof that the processor has vectors, where it has and nobody disabled them.
 #[inline]
 pub fn hardware() -> Option<Hardware> {
-    if IS_DISABLED.load(Ordering::Relaxed) { None } else { Hardware::ask() }
+    if is_disabled() { None } else { Hardware::ask() }
 }
 
 /// Runs code in the processor's vectors where it has them and `is_portable` does not forbid it, else in

@@ -235,7 +235,7 @@ fn far_pair<L: Lanes>(angles: [f64; 4], rests: [f64; 4]) -> (Pair<L>, Pair<L>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::lanes::Portable;
+    use crate::arithmetic::lanes::{Arithmetic, Portable};
     use std::f64::consts::{PI, TAU};
 
     /// Sine and cosine in double-double; quarter turns are taken off in three parts first, which

@@ -41,7 +41,7 @@ mod rows;
 mod spring;
 mod tape;
 mod user;
-mod varied;
+pub mod varied;
 mod work_integral;
 
 use self::action::ActionSeries;
@@ -188,6 +188,11 @@ impl<T: SeriesNumber> Series<T> {
     /// Highest power of the rates.
     pub fn order(&self) -> usize {
         self.order
+    }
+
+    /// Expands up to another power of the rates from here on, at most the one there is room for.
+    pub fn expand_up_to(&mut self, order: usize) {
+        self.order = order.min(self.rate.len() / self.partition.count().max(1) - 1);
     }
 
     /// Number of coordinates f.

@@ -4,13 +4,15 @@
 //! [`Hardware`] is the proof that the processor has them: it is made only after it was asked.  What is
 //! `unsafe` here rests on this alone:
 //!
-//! - [`Hardware::run`] enters a function compiled for AVX and FMA;
-//! - the operations of [`Avx`] are such instructions.  Values of it are made and used below `run`, or by
-//!   somebody who holds a `Hardware`.
+//! - [`Hardware::run`] enters a function compiled for AVX and FMA, [`WideHardware::run`] one compiled for
+//!   AVX-512;
+//! - the operations of [`Avx`] and [`Avx512`] are such instructions.  Values of them are made and used below
+//!   `run`, or by somebody who holds a `Hardware`.
 
 #![allow(unsafe_code)]
 
-use super::{Code, Lanes};
+use super::wide::{EightLanes, WideCode};
+use super::{Arithmetic, Code, Lanes};
 use std::arch::x86_64::*;
 
 /// The proof that the processor has AVX and FMA.
@@ -37,11 +39,63 @@ impl Hardware {
         // SAFETY: the processor was asked for AVX and FMA before this proof of them was made.
         unsafe { compiled(code) }
     }
+
+    /// Runs code over eight lanes in pairs of vectors.
+    #[inline(always)]
+    pub fn run_in_pairs<C: WideCode>(self, code: C) -> C::Output {
+        // SAFETY: as above.
+        unsafe { compiled_in_pairs(code) }
+    }
+}
+
+/// The proof that the processor has AVX-512 (the foundation).
+#[derive(Clone, Copy, Debug)]
+pub struct WideHardware(());
+
+/// Eight doubles in one register of AVX-512.
+#[derive(Clone, Copy, Debug)]
+pub struct Avx512(__m512d);
+
+impl WideHardware {
+    /// Asks the processor.
+    #[inline]
+    pub fn ask() -> Option<Self> {
+        let has_four = Hardware::ask().is_some();
+        (has_four && is_x86_feature_detected!("avx512f")).then_some(Self(()))
+    }
+
+    /// Runs code in vectors of eight.
+    #[inline(always)]
+    pub fn run<C: WideCode>(self, code: C) -> C::Output {
+        // SAFETY: the processor was asked for AVX, FMA and AVX-512 before this proof of them was made.
+        unsafe { compiled_wide(code) }
+    }
+}
+
+/// Code compiled for AVX-512.
+#[target_feature(enable = "avx,fma,avx512f")]
+#[inline]
+fn compiled_wide<C: WideCode>(code: C) -> C::Output {
+    code.run::<Avx512>()
+}
+
+/// Code over eight lanes compiled for AVX and FMA.
+#[target_feature(enable = "avx,fma")]
+#[inline]
+fn compiled_in_pairs<C: WideCode>(code: C) -> C::Output {
+    code.run::<[Avx; 2]>()
 }
 
 /// Code compiled for AVX and FMA.
 #[target_feature(enable = "avx,fma")]
 fn compiled<C: Code>(code: C) -> C::Output {
+    code.run::<Avx>()
+}
+
+/// The same, never made a part of what calls it.
+#[target_feature(enable = "avx,fma")]
+#[inline(never)]
+fn compiled_apart<C: Code>(code: C) -> C::Output {
     code.run::<Avx>()
 }
 
@@ -62,23 +116,15 @@ const fn constant(value: f64) -> Avx {
     unsafe { std::mem::transmute::<[f64; 4], Avx>([value; 4]) }
 }
 
-impl Lanes for Avx {
-    const UNROLLED: bool = true;
+/// The same double in every one of eight lanes.
+const fn constant_of_eight(value: f64) -> Avx512 {
+    // SAFETY: both types are eight doubles without padding, and every pattern of bits is valid in each.
+    unsafe { std::mem::transmute::<[f64; 8], Avx512>([value; 8]) }
+}
 
+impl Arithmetic for Avx {
     const ZERO: Self = constant(0.0);
     const ONE: Self = constant(1.0);
-
-    #[inline(always)]
-    fn of(lanes: [f64; 4]) -> Self {
-        instruction!(Self(_mm256_loadu_pd(lanes.as_ptr())))
-    }
-
-    #[inline(always)]
-    fn array(self) -> [f64; 4] {
-        let mut lanes = [0.0; 4];
-        instruction!(_mm256_storeu_pd(lanes.as_mut_ptr(), self.0));
-        lanes
-    }
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -106,11 +152,6 @@ impl Lanes for Avx {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        instruction!(Self(_mm256_sqrt_pd(self.0)))
-    }
-
-    #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
         instruction!(Self(_mm256_fmadd_pd(self.0, factor.0, addend.0)))
     }
@@ -118,6 +159,27 @@ impl Lanes for Avx {
     #[inline(always)]
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
         instruction!(Self(_mm256_fnmadd_pd(self.0, factor.0, addend.0)))
+    }
+}
+
+impl Lanes for Avx {
+    const UNROLLED: bool = true;
+
+    #[inline(always)]
+    fn of(lanes: [f64; 4]) -> Self {
+        instruction!(Self(_mm256_loadu_pd(lanes.as_ptr())))
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 4] {
+        let mut lanes = [0.0; 4];
+        instruction!(_mm256_storeu_pd(lanes.as_mut_ptr(), self.0));
+        lanes
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        instruction!(Self(_mm256_sqrt_pd(self.0)))
     }
 
     #[inline(always)]
@@ -150,5 +212,78 @@ impl Lanes for Avx {
     #[inline(always)]
     fn neg(self) -> Self {
         instruction!(Self(_mm256_xor_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn apart<C: Code>(code: C) -> C::Output {
+        instruction!(compiled_apart(code))
+    }
+}
+
+impl Arithmetic for Avx512 {
+    const ZERO: Self = constant_of_eight(0.0);
+    const ONE: Self = constant_of_eight(1.0);
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        instruction!(Self(_mm512_set1_pd(value)))
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        instruction!(Self(_mm512_add_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        instruction!(Self(_mm512_sub_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        instruction!(Self(_mm512_mul_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        instruction!(Self(_mm512_div_pd(self.0, other.0)))
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        instruction!(Self(_mm512_fmadd_pd(self.0, factor.0, addend.0)))
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
+        instruction!(Self(_mm512_fnmadd_pd(self.0, factor.0, addend.0)))
+    }
+}
+
+impl EightLanes for Avx512 {
+    type Half = Avx;
+
+    const VECTORS: usize = 1;
+
+    #[inline(always)]
+    fn of(lanes: &[f64; 8]) -> Self {
+        instruction!(Self(_mm512_loadu_pd(lanes.as_ptr())))
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 8] {
+        let mut lanes = [0.0; 8];
+        instruction!(_mm512_storeu_pd(lanes.as_mut_ptr(), self.0));
+        lanes
+    }
+
+    #[inline(always)]
+    fn halves(self) -> [Avx; 2] {
+        instruction!([Avx(_mm512_castpd512_pd256(self.0)), Avx(_mm512_extractf64x4_pd::<1>(self.0))])
+    }
+
+    #[inline(always)]
+    fn join([low, high]: [Avx; 2]) -> Self {
+        instruction!(Self(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low.0), high.0)))
     }
 }

@@ -110,7 +110,7 @@ impl<T: SeriesNumber> VectorFactor<T> {
     }
 
     /// The product with a series of numbers.
-    #[inline]
+    #[inline(always)]
     pub fn times(
         &self,
         other: &T::Factor,
@@ -123,14 +123,14 @@ impl<T: SeriesNumber> VectorFactor<T> {
     }
 
     /// The dot product with a series of vectors.
-    #[inline]
+    #[inline(always)]
     pub fn dot(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
         let pairs = [[&self.re, &other.re], [&self.im, &other.im]];
         T::Factor::sum_of_products(pairs, 1.0, scale, total, of)
     }
 
     /// The cross product with a series of vectors.
-    #[inline]
+    #[inline(always)]
     pub fn cross(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
         let pairs = [[&self.re, &other.im], [&self.im, &other.re]];
         T::Factor::sum_of_products(pairs, -1.0, scale, total, of)

@@ -274,9 +274,18 @@ fn direction<T: Real>(push: &Push, z: &[Complex<T>], m: usize) -> Complex<T> {
 }
 
 impl<T: SeriesNumber> Series<T> {
-    /// Order m with the friction of what slides: solved without its tau_m, then with it.
+    /// Order m with the friction of what slides, if anything does.
+    #[inline(always)]
     pub(super) fn slide<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
-        let Some(mut friction) = self.friction.take() else { return self.solve::<N>(terms, m) };
+        match self.friction.take() {
+            None => self.solve::<N>(terms, m),
+            Some(friction) => self.slide_with(terms, m, friction),
+        }
+    }
+
+    /// The same: solved without its tau_m, then with it.
+    #[inline(never)]
+    fn slide_with(&mut self, terms: &Terms<T::Constant>, m: usize, mut friction: Box<FrictionSeries<T>>) {
         let (n, f) = (self.elements, friction.places.len());
         let mechanism = terms.structure;
         friction.rest.copy_from_slice(&self.rest[m * n..(m + 1) * n]);
@@ -291,12 +300,12 @@ impl<T: SeriesNumber> Series<T> {
             place.size.push(T::ZERO);
             place.normal.push(Complex::ZERO);
         }
-        self.solve::<N>(terms, m);
+        self.solve::<0>(terms, m);
         let start = friction.normals(mechanism, m, &self.z, &self.rows);
         if m == 0 {
             for k in 0..f {
                 friction.places[k].force[0] = T::ONE;
-                self.solve_again::<N>(terms, 0, &friction);
+                self.solve_again(terms, 0, &friction);
                 let normals = friction.normals(mechanism, 0, &self.z, &self.rows);
                 friction.places[k].force[0] = T::ZERO;
                 for (j, normal) in normals.into_iter().enumerate() {
@@ -307,17 +316,12 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             friction.advance(m, &start);
         }
-        self.solve_again::<N>(terms, m, &friction);
+        self.solve_again(terms, m, &friction);
         self.friction = Some(friction);
     }
 
     /// Order m once more, with tau_m.
-    fn solve_again<const N: usize>(
-        &mut self,
-        terms: &Terms<T::Constant>,
-        m: usize,
-        friction: &FrictionSeries<T>,
-    ) {
+    fn solve_again(&mut self, terms: &Terms<T::Constant>, m: usize, friction: &FrictionSeries<T>) {
         let n = self.elements;
         self.bend.copy_from_slice(&friction.bend);
         self.load.copy_from_slice(&friction.load);
@@ -327,7 +331,7 @@ impl<T: SeriesNumber> Series<T> {
             let (tangent, tau) = (&place.friction.tangent, place.force[m]);
             FrictionSeries::push(tangent, tau, &self.z[..n], &mut self.load, rest);
         }
-        self.solve::<N>(terms, m);
+        self.solve::<0>(terms, m);
     }
 
     /// Powers of the power that friction takes \[W/s^m\]; none where nothing slides.

@@ -5,24 +5,28 @@
 
 use super::factors::CauchyFactor;
 use super::{Constants, Series, SeriesNumber, Terms, bodywise, own};
-use crate::arithmetic::lanes::{self, Code, Hardware, Lanes, Portable};
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar, Varied};
 use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Phase};
 use std::ops::RangeInclusive;
 
+/// Eight directions.
+pub type Number = Varied<LANES>;
+
 /// rate·t + start, of which the value is less whole turns where `is_turned`.
 #[inline]
-fn grown<const D: usize>(t: Time, is_turned: bool) -> impl Fn(Varied<D>, Varied<D>) -> Varied<D> {
-    move |rate, start| {
+fn grown(t: Time, is_turned: bool) -> impl Fn(Number, Number) -> Number {
+    move |rate: Number, start: Number| {
         let exact = DoubleDouble::of(start.value) + t.scale(rate.value);
         let value = if is_turned { exact.reduced().0 } else { exact };
         let slope = std::array::from_fn(|lane| start.slope[lane] + rate.slope[lane] * t.hi);
-        Varied::new(value.hi, slope)
+        Number::new(value.hi, slope)
     }
 }
 
-impl<const D: usize> Constants for Varied<D> {
+impl Constants for Number {
     type Constant = Self;
     type Time = Time;
 
@@ -45,31 +49,18 @@ impl<const D: usize> Constants for Varied<D> {
 
 /// Values and derivatives of the powers of a series.
 #[derive(Clone, Debug)]
-pub struct VariedFactor<const D: usize> {
+pub struct VariedFactor {
     values: Vec<f64>,
-    slopes: Vec<[f64; D]>,
+    slopes: Vec<Octet>,
     /// How many there are so far.
     count: usize,
 }
 
-/// The processor's vectors, where it has them.
-#[derive(Clone, Debug)]
-pub struct Vectors(Option<Hardware>);
-
-impl Default for Vectors {
-    fn default() -> Self {
-        Self(lanes::hardware())
-    }
-}
-
-/// The most vectors of four lanes.
-const MOST: usize = 2;
-
 /// Powers of a series, values and derivatives.
 #[derive(Clone, Copy)]
-struct Powers<'a, const D: usize>(&'a [f64], &'a [[f64; D]]);
+struct Powers<'a>(&'a [f64], &'a [Octet]);
 
-impl<'a, const D: usize> Powers<'a, D> {
+impl Powers<'_> {
     /// The first ones, so many.
     #[inline(always)]
     fn first(self, count: usize) -> Self {
@@ -79,67 +70,46 @@ impl<'a, const D: usize> Powers<'a, D> {
 
 /// A sum of products on its way: its value, Σ a' b and Σ a b'.
 #[derive(Clone, Copy)]
-struct Sum<L> {
+struct Sum<W> {
     value: f64,
-    by_a: [L; MOST],
-    by_b: [L; MOST],
+    by_a: W,
+    by_b: W,
 }
 
-impl<L: Lanes> Sum<L> {
-    const ZERO: Self = Self { value: 0.0, by_a: [L::ZERO; MOST], by_b: [L::ZERO; MOST] };
+impl<W: EightLanes> Sum<W> {
+    const ZERO: Self = Self { value: 0.0, by_a: W::ZERO, by_b: W::ZERO };
 
-    /// Adds `sign` times the product of power j of a and power k of b.
+    /// Adds the product of power j of a and power k of b.
     #[inline(always)]
-    fn add<const D: usize>(&mut self, a: Powers<D>, j: usize, b: Powers<D>, k: usize, sign: f64) {
-        let (x, y) = (sign * a.0[j], sign * b.0[k]);
-        self.value += x * b.0[k];
-        let (x, y) = (L::splat(x), L::splat(y));
-        let mut part = 0;
-        while part < D / 4 {
-            self.by_a[part] = four::<L, D>(&a.1[j], part).mul_add(y, self.by_a[part]);
-            self.by_b[part] = four::<L, D>(&b.1[k], part).mul_add(x, self.by_b[part]);
-            part += 1;
-        }
+    fn add(&mut self, a: Powers, j: usize, b: Powers, k: usize) {
+        let (x, y) = (a.0[j], b.0[k]);
+        self.value += x * y;
+        self.by_a = W::of(&a.1[j].0).mul_add(W::splat(y), self.by_a);
+        self.by_b = W::of(&b.1[k].0).mul_add(W::splat(x), self.by_b);
     }
 
     #[inline(always)]
-    fn found<const D: usize>(self) -> Varied<D> {
-        let mut slope = [0.0; D];
-        let mut part = 0;
-        while part < D / 4 {
-            let four = self.by_a[part].add(self.by_b[part]).array();
-            slope[4 * part] = four[0];
-            slope[4 * part + 1] = four[1];
-            slope[4 * part + 2] = four[2];
-            slope[4 * part + 3] = four[3];
-            part += 1;
-        }
-        Varied::new(self.value, slope)
+    fn found(self) -> Number {
+        Number::new(self.value, self.by_a.add(self.by_b).array())
     }
-}
-
-/// Four lanes of a derivative.
-#[inline(always)]
-fn four<L: Lanes, const D: usize>(slope: &[f64; D], part: usize) -> L {
-    L::of([slope[4 * part], slope[4 * part + 1], slope[4 * part + 2], slope[4 * part + 3]])
 }
 
 // Iterators and closures are left out of these loops: they are not compiled into code for the vectors.
 
 /// `Σ_j a_j b_{m-j}`.
-struct Product<'a, const D: usize>(Powers<'a, D>, Powers<'a, D>);
+struct Product<'a>(Powers<'a>, Powers<'a>);
 
-impl<const D: usize> Code for Product<'_, D> {
-    type Output = Varied<D>;
+impl WideCode for Product<'_> {
+    type Output = Number;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Varied<D> {
+    fn run<W: EightLanes>(self) -> Number {
         let count = self.0.0.len();
         let (a, b) = (self.0.first(count), self.1.first(count));
-        let mut sum = Sum::<L>::ZERO;
+        let mut sum = Sum::<W>::ZERO;
         let mut j = 0;
         while j < count {
-            sum.add(a, j, b, count - 1 - j, 1.0);
+            sum.add(a, j, b, count - 1 - j);
             j += 1;
         }
         sum.found()
@@ -147,21 +117,21 @@ impl<const D: usize> Code for Product<'_, D> {
 }
 
 /// The same of two series a with one series b.
-struct Products<'a, const D: usize>([Powers<'a, D>; 2], Powers<'a, D>);
+struct Products<'a>([Powers<'a>; 2], Powers<'a>);
 
-impl<const D: usize> Code for Products<'_, D> {
-    type Output = [Varied<D>; 2];
+impl WideCode for Products<'_> {
+    type Output = [Number; 2];
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> [Varied<D>; 2] {
+    fn run<W: EightLanes>(self) -> [Number; 2] {
         let Self([a, c], b) = self;
         let count = a.0.len();
         let (a, b, c) = (a.first(count), b.first(count), c.first(count));
-        let (mut first, mut second) = (Sum::<L>::ZERO, Sum::<L>::ZERO);
+        let (mut first, mut second) = (Sum::<W>::ZERO, Sum::<W>::ZERO);
         let mut j = 0;
         while j < count {
-            first.add(a, j, b, count - 1 - j, 1.0);
-            second.add(c, j, b, count - 1 - j, 1.0);
+            first.add(a, j, b, count - 1 - j);
+            second.add(c, j, b, count - 1 - j);
             j += 1;
         }
         [first.found(), second.found()]
@@ -169,72 +139,58 @@ impl<const D: usize> Code for Products<'_, D> {
 }
 
 /// The product of the first two series, and `sign` times that of the last two.
-struct TwoProducts<'a, const D: usize>([[Powers<'a, D>; 2]; 2], f64);
+struct TwoProducts<'a>([[Powers<'a>; 2]; 2], f64);
 
-impl<const D: usize> Code for TwoProducts<'_, D> {
-    type Output = Varied<D>;
+impl WideCode for TwoProducts<'_> {
+    type Output = Number;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Varied<D> {
+    fn run<W: EightLanes>(self) -> Number {
         let Self([[a, b], [c, d]], sign) = self;
         let count = a.0.len();
         let (a, b, c, d) = (a.first(count), b.first(count), c.first(count), d.first(count));
-        let mut sum = Sum::<L>::ZERO;
+        let (mut first, mut second) = (Sum::<W>::ZERO, Sum::<W>::ZERO);
         let mut j = 0;
         while j < count {
-            sum.add(a, j, b, count - 1 - j, 1.0);
-            sum.add(c, j, d, count - 1 - j, sign);
+            first.add(a, j, b, count - 1 - j);
+            second.add(c, j, d, count - 1 - j);
             j += 1;
         }
-        sum.found()
+        first.found() + second.found().scale(sign)
     }
 }
 
-impl Vectors {
+impl VariedFactor {
     #[inline(always)]
-    fn run<C: Code>(&self, code: C) -> C::Output {
-        match self.0 {
-            Some(hardware) => hardware.run(code),
-            None => code.run::<Portable>(),
-        }
-    }
-}
-
-impl<const D: usize> VariedFactor<D> {
-    #[inline(always)]
-    fn powers(&self, (first, last): (usize, usize)) -> Powers<'_, D> {
+    fn powers(&self, (first, last): (usize, usize)) -> Powers<'_> {
         Powers(&self.values[first..=last], &self.slopes[first..=last])
     }
 }
 
-impl<const D: usize> CauchyFactor<Varied<D>> for VariedFactor<D> {
+impl CauchyFactor<Number> for VariedFactor {
     type Scale = Vectors;
 
     fn new(order: usize) -> Self {
-        Self { values: vec![0.0; order + 1], slopes: vec![[0.0; D]; order + 1], count: 0 }
+        Self { values: vec![0.0; order + 1], slopes: vec![Octet::splat(0.0); order + 1], count: 0 }
     }
 
+    #[inline(always)]
     fn restart(&mut self, _scale: &Vectors) {
         self.count = 0;
     }
 
     #[inline(always)]
-    fn push(&mut self, _scale: &Vectors, power: Varied<D>) {
-        let slope = &mut self.slopes[self.count];
-        let mut lane = 0;
-        while lane < D {
-            slope[lane] = power.slope[lane];
-            lane += 1;
-        }
+    fn push(&mut self, _scale: &Vectors, power: Number) {
         self.values[self.count] = power.value;
+        self.slopes[self.count] = Octet(power.slope);
         self.count += 1;
     }
 
     #[inline(always)]
-    fn product(&self, other: &Self, scale: &Vectors, total: usize, of: RangeInclusive<usize>) -> Varied<D> {
+    fn product(&self, other: &Self, scale: &Vectors, total: usize, of: RangeInclusive<usize>) -> Number {
         let (first, last) = of.into_inner();
         if first > last {
-            return Varied::ZERO;
+            return Number::ZERO;
         }
         let others = (total - last, total - first);
         scale.run(Product(self.powers((first, last)), other.powers(others)))
@@ -247,10 +203,10 @@ impl<const D: usize> CauchyFactor<Varied<D>> for VariedFactor<D> {
         scale: &Vectors,
         total: usize,
         of: RangeInclusive<usize>,
-    ) -> [Varied<D>; 2] {
+    ) -> [Number; 2] {
         let (first, last) = of.into_inner();
         if first > last {
-            return [Varied::ZERO; 2];
+            return [Number::ZERO; 2];
         }
         let others = (total - last, total - first);
         let [a, c] = pair;
@@ -265,10 +221,10 @@ impl<const D: usize> CauchyFactor<Varied<D>> for VariedFactor<D> {
         scale: &Vectors,
         total: usize,
         of: RangeInclusive<usize>,
-    ) -> Varied<D> {
+    ) -> Number {
         let (first, last) = of.into_inner();
         if first > last {
-            return Varied::ZERO;
+            return Number::ZERO;
         }
         let others = (total - last, total - first);
         let [[a, b], [c, d]] = pairs;
@@ -283,17 +239,17 @@ impl<const D: usize> CauchyFactor<Varied<D>> for VariedFactor<D> {
 }
 
 /// All orders, compiled for the processor's vectors.
-struct Orders<'a, 'b, const D: usize> {
-    series: &'a mut Series<Varied<D>>,
-    terms: &'a Terms<'b, Varied<D>>,
+struct Orders<'a, 'b> {
+    series: &'a mut Series<Number>,
+    terms: &'a Terms<'b, Number>,
     first: usize,
 }
 
-impl<const D: usize> Code for Orders<'_, '_, D> {
+impl WideCode for Orders<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<W: EightLanes>(self) {
         let Self { series, terms, first } = self;
         match if series.angles == series.elements { series.angles } else { 0 } {
             1 => series.orders_here::<1>(terms, first),
@@ -303,15 +259,15 @@ impl<const D: usize> Code for Orders<'_, '_, D> {
     }
 }
 
-impl<const D: usize> SeriesNumber for Varied<D> {
-    type Factor = VariedFactor<D>;
+impl SeriesNumber for Number {
+    type Factor = VariedFactor;
 
     fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
         series.begin(t, u, u_rest, u_rate);
     }
 
     fn orders(series: &mut Series<Self>, terms: &Terms<Self>, first: usize) {
-        lanes::run(Orders { series, terms, first }, false);
+        series.factors.scale.run(Orders { series, terms, first });
     }
 
     fn products(n: usize, a: &[Complex<Self>], b: &[Complex<Self>], sums: &mut [Complex<Self>]) {
@@ -325,51 +281,42 @@ mod tests {
 
     const COUNT: usize = 7;
 
-    fn number<const D: usize>(k: usize) -> Varied<D> {
+    fn number(k: usize) -> Number {
         let of = |i: usize| libm::sin(1.0 + 2.3 * k as f64 + 0.7 * i as f64);
-        Varied::new(of(100), std::array::from_fn(of))
+        Number::new(of(100), std::array::from_fn(of))
     }
 
-    fn factor<const D: usize>(from: usize) -> VariedFactor<D> {
+    fn factor(from: usize) -> VariedFactor {
         let mut factor = VariedFactor::new(COUNT - 1);
         (0..COUNT).for_each(|k| factor.push(&Vectors::default(), number(from + k)));
         factor
     }
 
-    fn products_are_sums_of_products<const D: usize>() {
-        let all: [VariedFactor<D>; 4] = std::array::from_fn(|series| factor(COUNT * series));
-        let [a, b, c, d] = &all;
-        let sum = |first: usize, second: usize| {
-            (2..=5).fold(Varied::<D>::ZERO, |sum, j| {
-                sum + number::<D>(COUNT * first + j) * number(COUNT * second + 6 - j)
-            })
-        };
-        let near = |found: Varied<D>, expected: Varied<D>| {
-            let slopes = found.slope.iter().zip(&expected.slope);
-            let apart =
-                slopes.fold((found.value - expected.value).abs(), |most, (a, b)| most.max((a - b).abs()));
-            assert!(apart < 1e-14, "{found:?} {expected:?}");
-        };
-        let found = |scale: &Vectors| {
-            let [first, second] = CauchyFactor::products([a, c], b, scale, 6, 2..=5);
-            let cross = CauchyFactor::sum_of_products([[a, b], [c, d]], -1.0, scale, 6, 2..=5);
-            [a.product(b, scale, 6, 2..=5), first, second, cross]
-        };
-        let [one, first, second, cross] = found(&Vectors::default());
-        near(one, sum(0, 1));
-        near(first, sum(0, 1));
-        near(second, sum(2, 1));
-        near(cross, sum(0, 1) - sum(2, 3));
-        // Without the processor's vectors the bits are the same.
-        for (plain, vector) in found(&Vectors(None)).into_iter().zip([one, first, second, cross]) {
-            assert!(plain.value.to_bits() == vector.value.to_bits());
-            assert_eq!(plain.slope.map(f64::to_bits), vector.slope.map(f64::to_bits));
-        }
+    /// A product, two with one factor, and a difference of two.
+    fn all(scale: &Vectors) -> [Number; 4] {
+        let [a, b, c, d]: [VariedFactor; 4] = std::array::from_fn(|series| factor(COUNT * series));
+        let [first, second] = CauchyFactor::products([&a, &c], &b, scale, 6, 2..=5);
+        let cross = CauchyFactor::sum_of_products([[&a, &b], [&c, &d]], -1.0, scale, 6, 2..=5);
+        [a.product(&b, scale, 6, 2..=5), first, second, cross]
     }
 
     #[test]
     fn products_of_factors_are_sums_of_products() {
-        products_are_sums_of_products::<4>();
-        products_are_sums_of_products::<8>();
+        let sum = |first: usize, second: usize| {
+            (2..=5)
+                .fold(Number::ZERO, |sum, j| sum + number(COUNT * first + j) * number(COUNT * second + 6 - j))
+        };
+        let found = all(&Vectors::default());
+        for (found, expected) in found.iter().zip([sum(0, 1), sum(0, 1), sum(2, 1), sum(0, 1) - sum(2, 3)]) {
+            let slopes = found.slope.iter().zip(&expected.slope);
+            let apart =
+                slopes.fold((found.value - expected.value).abs(), |most, (a, b)| most.max((a - b).abs()));
+            assert!(apart < 1e-14, "{found:?} {expected:?}");
+        }
+        // Without the processor's vectors the bits are the same.
+        for (plain, vector) in all(&Vectors::Portable).into_iter().zip(found) {
+            assert!(plain.value.to_bits() == vector.value.to_bits());
+            assert_eq!(plain.slope.map(f64::to_bits), vector.slope.map(f64::to_bits));
+        }
     }
 }

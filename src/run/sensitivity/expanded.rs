@@ -16,9 +16,11 @@ use super::super::inside::Step;
 use super::super::trust::Ground;
 use super::neighbours::Neighbours;
 use super::variation::plain;
-use crate::arithmetic::{Scalar, Varied};
+use crate::arithmetic::Scalar;
+use crate::arithmetic::eight::LANES;
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::schur::NEAR;
+use crate::dynamics::series::varied::Number;
 use crate::dynamics::series::{Constants, Series};
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
 use crate::scene::exact::Watched;
@@ -29,6 +31,12 @@ use std::sync::Arc;
 pub(super) const ORDER: usize = 22;
 /// The largest of the last powers in a step, over what is integrated.
 pub(super) const LIMIT: f64 = 1e-12;
+/// The same for powers that are left out in the next step.
+const ENOUGH: f64 = 1e-13;
+/// So many such powers in a row, since powers may be missing by symmetry.
+const SMALL: usize = 4;
+/// The least power expansions end at.
+const LEAST: usize = 12;
 /// Powers the step is judged by.
 const JUDGES: usize = 2;
 /// What is returned near singular positions, whose multipliers have fewer digits than a series asks for.
@@ -38,28 +46,9 @@ const AGREEMENT: f64 = 1e-3;
 const ROUNDING: f64 = 1e-9;
 /// Powers that may be what is integrated.
 const LEADING: usize = 4;
-/// Lanes of a block.
-const WIDE: usize = 8;
-const NARROW: usize = 4;
 
 /// Columns of numbers of a scene, in blocks of lanes.
-pub(super) struct Expanded(Vec<(usize, Box<dyn Block>)>);
-
-/// So many columns as it was made for.
-trait Block {
-    /// Accelerations of the independent coordinates of a motion, with what each number alone does to them:
-    /// coordinate, value, and derivatives, lane by lane.
-    fn forcing(&mut self, motion: &Motion) -> Vec<(usize, f64, Vec<f64>)>;
-
-    /// Expands them beside a motion; returns the last powers in a step of `h` \[s\] over what is integrated.
-    fn expand(&mut self, motion: &Motion, h: f64, columns: &[Vec<f64>]) -> f64;
-
-    /// Takes them on by `h` \[s\] along their series.
-    fn advance(&mut self, motion: &Motion, h: f64, columns: &mut [Vec<f64>]);
-
-    /// Puts them onto the constraints at a motion, which is that of `ground`.
-    fn keep(&mut self, ground: &mut Option<Ground>, motion: &Motion, columns: &mut [Vec<f64>]);
-}
+pub(super) struct Expanded(Vec<(usize, Block)>);
 
 impl Expanded {
     /// Of numbers at some paths of a scene, whose mechanism and derivatives of the start are these.
@@ -76,14 +65,10 @@ impl Expanded {
         let (mut blocks, mut first) = (Vec::new(), 0);
         while first < numbers.len() {
             let left = numbers.len() - first;
-            let count = left.min(if left > NARROW { WIDE } else { NARROW });
+            let count = left.min(LANES);
             let own = first..first + count;
             let (numbers, starts) = (&numbers[own.clone()], &starts[own]);
-            let block: Box<dyn Block> = match count > NARROW {
-                true => Box::new(Lanes::<WIDE>::new(template, scene, mechanism, numbers, starts)?),
-                false => Box::new(Lanes::<NARROW>::new(template, scene, mechanism, numbers, starts)?),
-            };
-            blocks.push((count, block));
+            blocks.push((count, Block::new(template, scene, mechanism, numbers, starts)?));
             first += count;
         }
         Ok(Self(blocks))
@@ -121,10 +106,10 @@ impl Expanded {
     }
 
     /// Calls `each` with all blocks and their columns.
-    fn each(&mut self, mut columns: &mut [Vec<f64>], mut each: impl FnMut(&mut dyn Block, &mut [Vec<f64>])) {
+    fn each(&mut self, mut columns: &mut [Vec<f64>], mut each: impl FnMut(&mut Block, &mut [Vec<f64>])) {
         for (count, block) in &mut self.0 {
             let (own, rest) = columns.split_at_mut(*count);
-            each(block.as_mut(), own);
+            each(block, own);
             columns = rest;
         }
     }
@@ -163,22 +148,24 @@ fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// `D` columns, of which some may be idle.
-struct Lanes<const D: usize> {
-    mechanism: ExactMechanism<Varied<D>>,
+/// As many columns as there are lanes, of which some may be idle.
+struct Block {
+    mechanism: ExactMechanism<Number>,
     coordinates: Coordinates,
-    series: Series<Varied<D>>,
+    series: Series<Number>,
+    /// The power the last expansion ended at.
+    order: usize,
     /// All coordinates and rates with the columns as derivatives.
-    all: [Vec<Varied<D>>; 2],
+    all: [Vec<Number>; 2],
     /// The independent ones, and what the leading part leaves out of the coordinates.
-    own: [Vec<Varied<D>>; 2],
-    rest: Vec<Varied<D>>,
+    own: [Vec<Number>; 2],
+    rest: Vec<Number>,
     /// 1/(m+1).
     fractions: [f64; ORDER + 1],
-    jacobian: Vec<Varied<D>>,
+    jacobian: Vec<Number>,
 }
 
-impl<const D: usize> Lanes<D> {
+impl Block {
     fn new(
         template: &Template,
         plain: &Scene,
@@ -186,14 +173,14 @@ impl<const D: usize> Lanes<D> {
         numbers: &[(&str, f64)],
         starts: &[Vec<f64>],
     ) -> Result<Self, String> {
-        let seed = |(lane, &(path, value)): (usize, &(_, f64))| (path, Varied::<D>::unknown(value, lane));
+        let seed = |(lane, &(path, value)): (usize, &(_, f64))| (path, Number::unknown(value, lane));
         let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
         let (mut scene, _) =
             template.exact_with(&[], &known, Watched::Changes).map_err(|error| error.to_string())?;
         // Angles that are kept from the start are those of the start that was found.
         let found = structure.start(plain);
         for (k, start) in scene.start.iter_mut().enumerate() {
-            start.phi = Varied::new(found.unwrapped(k), slopes(starts, k));
+            start.phi = Number::new(found.unwrapped(k), slopes(starts, k));
         }
         let mechanism = ExactMechanism::new(&scene, structure)?;
         let (n, rows) = (structure.coordinates(), structure.constraints.len());
@@ -203,10 +190,11 @@ impl<const D: usize> Lanes<D> {
         let coordinates =
             if structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent };
         let series = Series::of_terms(&mechanism.terms(), coordinates, ORDER);
-        let room = |count: usize| vec![Varied::ZERO; count];
+        let room = |count: usize| vec![Number::ZERO; count];
         let f = series.coordinates();
         Ok(Self {
             series,
+            order: ORDER,
             coordinates,
             mechanism,
             all: [room(n), room(n)],
@@ -222,8 +210,8 @@ impl<const D: usize> Lanes<D> {
         let n = self.all[0].len();
         let [phi, omega] = &mut self.all;
         for k in 0..n {
-            phi[k] = Varied::new(motion.phi[k].hi, slopes(columns, k));
-            omega[k] = Varied::new(motion.omega[k].hi, slopes(columns, n + k));
+            phi[k] = Number::new(motion.phi[k].hi, slopes(columns, k));
+            omega[k] = Number::new(motion.omega[k].hi, slopes(columns, n + k));
         }
         for c in 0..self.rest.len() {
             let body = match self.coordinates {
@@ -232,7 +220,7 @@ impl<const D: usize> Lanes<D> {
             };
             self.own[0][c] = self.all[0][body];
             self.own[1][c] = self.all[1][body];
-            self.rest[c] = Varied::constant(motion.phi[body].lo);
+            self.rest[c] = Number::constant(motion.phi[body].lo);
         }
     }
 
@@ -245,11 +233,11 @@ impl<const D: usize> Lanes<D> {
                 (phi, omega) = (self.own[0][k], self.own[1][k]);
             } else {
                 let dependent = &self.mechanism.partition.bodies[k];
-                let of = |own: &[Varied<D>]| dependent.base.map_or(Varied::ZERO, |base| own[base]);
+                let of = |own: &[Number]| dependent.base.map_or(Number::ZERO, |base| own[base]);
                 (phi, omega) = (of(&self.own[0]), of(&self.own[1]));
                 for (sign, law) in &dependent.laws {
-                    phi += Varied::law_value(law, t).scale(*sign);
-                    omega += Varied::phase(law, t).rate.scale(*sign);
+                    phi += Number::law_value(law, t).scale(*sign);
+                    omega += Number::phase(law, t).rate.scale(*sign);
                 }
             }
             for (lane, column) in columns.iter_mut().enumerate() {
@@ -258,44 +246,45 @@ impl<const D: usize> Lanes<D> {
         }
     }
 
-    /// The largest of the last powers in a step of `h` \[s\] over what is integrated, of so many columns.
-    fn tail(&self, h: f64, count: usize) -> f64 {
-        let f = self.own[0].len();
-        let mut power = 1.0;
-        let (mut whole, mut last) = ([0.0; D], [0.0; D]);
-        let note = |sizes: &mut [f64; D], numbers: &[Varied<D>], factor: f64| {
+    /// The last powers in a step of `h` \[s\] over what is integrated, of so many columns, and the power up to
+    /// which the next step is worth expanding.
+    fn tail(&self, h: f64, count: usize) -> (f64, usize) {
+        let (f, order) = (self.own[0].len(), self.series.order());
+        let note = |sizes: &mut [f64; LANES], numbers: &[Number], factor: f64| {
             for number in numbers {
-                for lane in 0..D {
+                for lane in 0..LANES {
                     sizes[lane] = larger(sizes[lane], number.slope[lane].abs() * factor);
                 }
             }
         };
+        let mut whole = [0.0; LANES];
         note(&mut whole, &self.own[0], 1.0 / h);
-        for m in 0..=ORDER {
+        let (mut power, mut tail, mut small, mut enough) = (1.0, 0.0, 0, None);
+        for m in 0..=order {
             let rates = &self.series.rate[m * f..(m + 1) * f];
             if m < LEADING {
                 note(&mut whole, rates, power);
-            } else if m > ORDER - JUDGES {
-                note(&mut last, rates, power);
+            } else {
+                let mut sizes = [0.0; LANES];
+                note(&mut sizes, rates, power);
+                let share =
+                    |lane: usize| if whole[lane] > 0.0 { sizes[lane] / whole[lane] } else { whole[lane] };
+                let share = (0..count).map(share).fold(0.0, larger);
+                small = if share <= ENOUGH { small + 1 } else { 0 };
+                if small >= SMALL && m >= LEAST {
+                    enough.get_or_insert(m + 1);
+                }
+                if m > order - JUDGES {
+                    tail = larger(tail, share);
+                }
             }
             power *= h;
         }
-        let share = |lane: usize| if whole[lane] > 0.0 { last[lane] / whole[lane] } else { whole[lane] };
-        (0..count).map(share).fold(0.0, larger)
+        (tail, enough.unwrap_or(order + 2).min(ORDER))
     }
-}
 
-/// What the columns of a block are in one place.
-#[inline]
-fn slopes<const D: usize>(columns: &[Vec<f64>], place: usize) -> [f64; D] {
-    let mut slopes = [0.0; D];
-    for (slope, column) in slopes.iter_mut().zip(columns) {
-        *slope = column[place];
-    }
-    slopes
-}
-
-impl<const D: usize> Block for Lanes<D> {
+    /// Accelerations of the independent coordinates of a motion, with what each number alone does to them:
+    /// coordinate, value, and derivatives, lane by lane.
     fn forcing(&mut self, motion: &Motion) -> Vec<(usize, f64, Vec<f64>)> {
         self.expand(motion, 1.0, &[]);
         let f = self.own[0].len();
@@ -304,12 +293,13 @@ impl<const D: usize> Block for Lanes<D> {
             _ => self.mechanism.partition.independent[c],
         };
         let of = |c: usize| {
-            let Varied { value, slope, .. } = self.series.rate[f + c];
+            let Number { value, slope, .. } = self.series.rate[f + c];
             (body(c), value, slope.to_vec())
         };
         (0..f).map(of).collect()
     }
 
+    /// Expands them beside a motion; returns the last powers in a step of `h` \[s\] over what is integrated.
     fn expand(&mut self, motion: &Motion, h: f64, columns: &[Vec<f64>]) -> f64 {
         self.take(motion, columns);
         let [u, rate] = &self.own;
@@ -317,22 +307,33 @@ impl<const D: usize> Block for Lanes<D> {
         if self.series.weakest().share < NEAR {
             return NEAR_SINGULAR;
         }
-        self.tail(h, columns.len())
+        self.order = self.series.order();
+        if columns.is_empty() {
+            return 0.0;
+        }
+        let (tail, enough) = self.tail(h, columns.len());
+        if tail > LIMIT && self.order < ORDER {
+            self.series.expand_up_to(ORDER);
+            return self.expand(motion, h, columns);
+        }
+        self.series.expand_up_to(enough);
+        tail
     }
 
+    /// Takes them on by `h` \[s\] along their series.
     fn advance(&mut self, motion: &Motion, h: f64, columns: &mut [Vec<f64>]) {
         let f = self.own[0].len();
         for c in 0..f {
-            let (mut turn, mut speed) = ([0.0; D], [0.0; D]);
-            for m in (0..=ORDER).rev() {
+            let (mut turn, mut speed) = ([0.0; LANES], [0.0; LANES]);
+            for m in (0..=self.order).rev() {
                 let power = &self.series.rate[m * f + c].slope;
                 let fraction = self.fractions[m];
-                for lane in 0..D {
+                for lane in 0..LANES {
                     turn[lane] = turn[lane] * h + power[lane] * fraction;
                     speed[lane] = speed[lane] * h + power[lane];
                 }
             }
-            for lane in 0..D {
+            for lane in 0..LANES {
                 self.own[0][c].slope[lane] += h * turn[lane];
             }
             self.own[1][c].slope = speed;
@@ -340,6 +341,7 @@ impl<const D: usize> Block for Lanes<D> {
         self.give(motion.time + h, columns);
     }
 
+    /// Puts them onto the constraints at a motion, which is that of `ground`.
     fn keep(&mut self, ground: &mut Option<Ground>, motion: &Motion, columns: &mut [Vec<f64>]) {
         if self.coordinates != Coordinates::All {
             if self.mechanism.partition.driven() {
@@ -352,7 +354,7 @@ impl<const D: usize> Block for Lanes<D> {
         for level in 0..2 {
             self.take(motion, columns);
             let [phi, omega] = &self.all;
-            self.jacobian.fill(Varied::ZERO);
+            self.jacobian.fill(Number::ZERO);
             let left = self.mechanism.residuals(motion.time, phi, omega, &mut self.jacobian);
             for (lane, column) in columns.iter_mut().enumerate() {
                 let half = &mut column[level * n..(level + 1) * n];
@@ -360,4 +362,14 @@ impl<const D: usize> Block for Lanes<D> {
             }
         }
     }
+}
+
+/// What the columns of a block are in one place.
+#[inline]
+fn slopes(columns: &[Vec<f64>], place: usize) -> [f64; LANES] {
+    let mut slopes = [0.0; LANES];
+    for (slope, column) in slopes.iter_mut().zip(columns) {
+        *slope = column[place];
+    }
+    slopes
 }

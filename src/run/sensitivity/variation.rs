@@ -208,7 +208,11 @@ impl Variation {
                 Some(tail) => (tail, expanded::LIMIT, expanded::ORDER),
                 None => (self.collocated(step, h), LIMIT, STAGES - 1),
             };
-            let growth = 0.9 * libm::pow(limit / tail.max(f64::MIN_POSITIVE), 1.0 / order as f64);
+            // No step asks for more than four times its length.
+            let growth = match tail <= limit && pieces == 1.0 && self.reach >= 4.0 * h {
+                true => 4.0,
+                false => 0.9 * libm::pow(limit / tail.max(f64::MIN_POSITIVE), 1.0 / order as f64),
+            };
             if tail <= limit {
                 self.steps += 1;
                 if let Some(dissipation) = &mut self.dissipation {

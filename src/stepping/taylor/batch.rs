@@ -10,22 +10,18 @@ use self::series::{expand, finish};
 use super::step_size::{self, StepSize};
 use super::{JUDGES, Kernel, stop};
 use crate::arithmetic::angle;
-use crate::arithmetic::lanes::{self, Code, Lanes};
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 
 /// Largest order there is room for.
 const MOST: usize = 24;
-/// Lanes of a vector.
-const WIDTH: usize = 4;
-/// Vectors integrated in step with each other: while one waits for its newest coefficients, the other keeps
-/// the multipliers busy.
+/// Vectors of eight integrated in step with each other: while one waits for its newest coefficients, the
+/// other keeps the multipliers busy, as the halves of eight lanes in two vectors do.
 const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
-
-/// One number a trajectory.
-type Quad = [f64; WIDTH];
 
 /// One trajectory: its mechanism, its state in the form of
 /// [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
@@ -127,11 +123,12 @@ impl Batch {
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
         let Some(bodies) = members.first().map(|first| first.mechanism.tree.coordinates) else { return };
+        let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
         match bodies {
-            1 => lanes::run(Integration::<1> { batch: self, members, until, watch }, self.is_portable),
-            2 => lanes::run(Integration::<2> { batch: self, members, until, watch }, self.is_portable),
-            3 => lanes::run(Integration::<3> { batch: self, members, until, watch }, self.is_portable),
-            _ => lanes::run(Integration::<4> { batch: self, members, until, watch }, self.is_portable),
+            1 => vectors.run(Integration::<1> { batch: self, members, until, watch }),
+            2 => vectors.run(Integration::<2> { batch: self, members, until, watch }),
+            3 => vectors.run(Integration::<3> { batch: self, members, until, watch }),
+            _ => vectors.run(Integration::<4> { batch: self, members, until, watch }),
         }
     }
 }
@@ -143,41 +140,47 @@ struct Integration<'a, 'b, const N: usize> {
     watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
 }
 
-impl<const N: usize> Code for Integration<'_, '_, N> {
+impl<const N: usize> WideCode for Integration<'_, '_, N> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        integrate::<L, N>(self.batch, self.members, self.until, self.watch);
+    fn run<W: EightLanes>(self) {
+        let Self { batch, members, until, watch } = self;
+        if W::VECTORS == 1 && members.len() > LANES {
+            integrate::<W, N, TEAMS>(batch, members, until, watch);
+        } else {
+            integrate::<W, N, 1>(batch, members, until, watch);
+        }
     }
 }
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
-#[repr(align(64))]
 struct Team<const N: usize> {
+    slots: [LaneSlot; LANES],
     /// A \[kg·m²\], zero on the diagonal.
-    coupling: [[Quad; N]; N],
-    diagonal: [Quad; N],
+    coupling: [[Octet; N]; N],
+    diagonal: [Octet; N],
     /// W \[N·m\].
-    weight: [[Quad; 2]; N],
+    weight: [[Octet; 2]; N],
     /// M_0⁻¹.
-    inverse: [[Quad; N]; N],
+    inverse: [[Octet; N]; N],
     /// Leading parts of angles and rates, and what they leave out.
-    high: [[Quad; N]; 2],
-    low: [[Quad; N]; 2],
+    high: [[Octet; N]; 2],
+    low: [[Octet; N]; 2],
+    /// Angles at the start of the step.
+    before: [Octet; N],
     powers: [Power<N>; MOST + 1],
 }
 
 /// Coefficients of one power: cos, sin, v, and the two components of P.
 #[derive(Clone, Copy, Debug)]
-#[repr(align(32))]
 struct Power<const N: usize> {
-    c: [Quad; N],
-    s: [Quad; N],
-    v: [Quad; N],
-    px: [Quad; N],
-    py: [Quad; N],
+    c: [Octet; N],
+    s: [Octet; N],
+    v: [Octet; N],
+    px: [Octet; N],
+    py: [Octet; N],
 }
 
 /// What a lane is doing.
@@ -189,7 +192,8 @@ struct LaneSlot {
     time: Time,
     /// The mechanism's unit of time \[s\].
     unit: f64,
-    /// The last step wanted and the one taken \[s\].
+    /// What is left to go, the last step wanted and the one taken \[s\].
+    left: f64,
     wanted: f64,
     taken: f64,
 }
@@ -212,20 +216,126 @@ impl LaneSlot {
 }
 
 impl<const N: usize> Team<N> {
+    /// Empty lanes.
+    fn new(order: usize, until: Time) -> Self {
+        let zero = [Octet::splat(0.0); N];
+        let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
+        let empty = || LaneSlot {
+            member: None,
+            step_size: StepSize::new(1.0, order, 0.0),
+            time: until,
+            unit: 1.0,
+            left: 0.0,
+            wanted: 0.0,
+            taken: 0.0,
+        };
+        Self {
+            slots: std::array::from_fn(|_| empty()),
+            coupling: [zero; N],
+            diagonal: [Octet::splat(1.0); N],
+            weight: [[Octet::splat(0.0); 2]; N],
+            inverse: [zero; N],
+            high: [zero; 2],
+            low: [zero; 2],
+            before: zero,
+            powers: [power; MOST + 1],
+        }
+    }
+
+    /// Seats trajectories that wait in the lanes that are free.
+    fn fill(&mut self, batch: &Batch, members: &mut [BatchMember], waiting: &mut usize, until: Time) {
+        for lane in 0..LANES {
+            if self.slots[lane].member.is_none() {
+                let next = next::<N>(members, waiting, until);
+                self.slots[lane].member = next;
+                match next {
+                    Some(index) => self.slot(lane, batch, &members[index]),
+                    None => self.park(lane),
+                }
+            }
+            let slot = &mut self.slots[lane];
+            slot.left = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
+        }
+        self.before = self.high[0];
+    }
+
+    /// True where no lane has a trajectory.
+    fn is_idle(&self) -> bool {
+        self.slots.iter().all(|slot| slot.member.is_none())
+    }
+
+    /// The steps \[s\] that the series just expanded allow.
+    fn choose_steps(&mut self, order: usize) -> Octet {
+        let mut taken = Octet::splat(0.0);
+        for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
+            let coefficient = |k: usize, i: usize| self.powers[k].v[i].0[lane];
+            let mut sizes = [0.0; JUDGES];
+            for (back, size) in sizes.iter_mut().enumerate() {
+                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
+            }
+            let finite = (0..N).all(|i| coefficient(order, i).is_finite());
+            slot.wanted = if finite { slot.step_size.step_of(order, &sizes) } else { f64::NAN };
+            slot.taken = if finite { step_size::taken(slot.wanted, slot.left) } else { 0.0 };
+            *taken = slot.taken;
+        }
+        taken
+    }
+
+    /// Takes note of the steps just taken, and lets go whoever has arrived.
+    fn arrive(
+        &mut self,
+        order: usize,
+        members: &mut [BatchMember],
+        until: Time,
+        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+    ) {
+        for lane in 0..LANES {
+            let slot = &mut self.slots[lane];
+            let Some(index) = slot.member else { continue };
+            let member = &mut members[index];
+            let (from, step) = (slot.time, slot.taken);
+            match slot.failure(&member.statistics) {
+                Err(stop) => member.stopped = Some(stop),
+                Ok(()) => {
+                    slot.time = if step == slot.left { until } else { from + step };
+                    member.statistics.steps += 1;
+                    member.statistics.evaluations += 1;
+                }
+            }
+            let time = slot.time;
+            let mut turned = [0; BODIES];
+            for i in 0..N {
+                turned[i] = angle::wrap(&mut self.high[0][i].0[lane], &mut self.low[0][i].0[lane]);
+                member.state.turns[i] += turned[i];
+            }
+            let series = |body: usize, after: f64| self.at(order, lane, body, after);
+            let passage = Passage { from, step, turned, series: &series };
+            if member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until {
+                self.leave(lane, &mut member.state);
+                member.state.time = time;
+                self.slots[lane].member = None;
+            }
+        }
+    }
+
     /// Sits a trajectory down.
-    fn slot(&mut self, lane: usize, member: &BatchMember) {
-        let tree = &member.mechanism.tree;
+    fn slot(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
+        let (tree, unit) = (&member.mechanism.tree, member.mechanism.units.time);
+        let longest = batch.order as f64 / 3.0 / tree.fastest_rate(&[]);
+        let slot = &mut self.slots[lane];
+        slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
+        (slot.time, slot.unit) = (member.state.time, unit);
         for i in 0..N {
-            self.diagonal[i][lane] = tree.diagonal[i];
-            self.weight[i][0][lane] = tree.weight[i].re;
-            self.weight[i][1][lane] = tree.weight[i].im;
+            self.diagonal[i].0[lane] = tree.diagonal[i];
+            self.weight[i][0].0[lane] = tree.weight[i].re;
+            self.weight[i][1].0[lane] = tree.weight[i].im;
             for j in i + 1..N {
-                self.coupling[i][j][lane] = tree.coupling[i * N + j].re;
-                self.coupling[j][i][lane] = tree.coupling[i * N + j].re;
+                self.coupling[i][j].0[lane] = tree.coupling[i * N + j].re;
+                self.coupling[j][i].0[lane] = tree.coupling[i * N + j].re;
             }
             for part in 0..2 {
-                self.high[part][i][lane] = member.state.y[part * N + i];
-                self.low[part][i][lane] = member.state.low[part * N + i];
+                self.high[part][i].0[lane] = member.state.y[part * N + i];
+                self.low[part][i].0[lane] = member.state.low[part * N + i];
             }
         }
     }
@@ -234,7 +344,7 @@ impl<const N: usize> Team<N> {
     fn park(&mut self, lane: usize) {
         for part in [&mut self.high, &mut self.low] {
             for numbers in part.iter_mut().flatten() {
-                numbers[lane] = 0.0;
+                numbers.0[lane] = 0.0;
             }
         }
     }
@@ -243,21 +353,21 @@ impl<const N: usize> Team<N> {
     fn leave(&self, lane: usize, state: &mut State) {
         for part in 0..2 {
             for i in 0..N {
-                state.y[part * N + i] = self.high[part][i][lane];
-                state.low[part * N + i] = self.low[part][i][lane];
+                state.y[part * N + i] = self.high[part][i].0[lane];
+                state.low[part * N + i] = self.low[part][i].0[lane];
             }
         }
     }
 
-    /// Angle and rate of a body `after` \[s\] from the start of the step last expanded, where it was at
-    /// `start`.
-    fn at(&self, order: usize, lane: usize, body: usize, start: f64, after: f64) -> (f64, f64) {
+    /// Angle and rate of a body `after` \[s\] from the start of the step last expanded.
+    fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
+        let start = self.before[body].0[lane];
         if after == 0.0 {
-            return (start, self.powers[0].v[body][lane]);
+            return (start, self.powers[0].v[body].0[lane]);
         }
         let (mut angle, mut rate) = (0.0, 0.0);
         for k in (0..=order).rev() {
-            let v = self.powers[k].v[body][lane];
+            let v = self.powers[k].v[body].0[lane];
             rate = rate * after + v;
             angle = angle * after + v / (k + 1) as f64;
         }
@@ -266,101 +376,26 @@ impl<const N: usize> Team<N> {
 }
 
 #[inline(always)]
-fn integrate<L: Lanes, const N: usize>(
+fn integrate<W: EightLanes, const N: usize, const T: usize>(
     batch: &Batch,
     members: &mut [BatchMember],
     until: Time,
     watch: &mut dyn FnMut(usize, &Passage) -> Going,
 ) {
-    let (order, zero) = (batch.order, [[0.0; WIDTH]; N]);
-    let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
-    let team = Team {
-        coupling: [zero; N],
-        diagonal: [[1.0; WIDTH]; N],
-        weight: [[[0.0; WIDTH]; 2]; N],
-        inverse: [zero; N],
-        high: [zero; 2],
-        low: [zero; 2],
-        powers: [power; MOST + 1],
-    };
-    let mut teams = Box::new([team.clone(), team]);
-    let empty = LaneSlot {
-        member: None,
-        step_size: StepSize::new(1.0, order, 0.0),
-        time: until,
-        unit: 1.0,
-        wanted: 0.0,
-        taken: 0.0,
-    };
-    let mut slots: [LaneSlot; WIDTH * TEAMS] = std::array::from_fn(|_| empty.clone());
+    let mut teams: Box<[Team<N>; T]> = Box::new(std::array::from_fn(|_| Team::new(batch.order, until)));
     let mut waiting = 0;
     loop {
-        let mut left = [0.0; WIDTH * TEAMS];
-        for (place, slot) in slots.iter_mut().enumerate() {
-            let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
-            if slot.member.is_none() {
-                slot.member = next::<N>(members, &mut waiting, until);
-                match slot.member {
-                    Some(index) => {
-                        let member = &members[index];
-                        team.slot(lane, member);
-                        let longest = order as f64 / 3.0 / member.mechanism.tree.fastest_rate(&[]);
-                        (slot.step_size, slot.time) = (
-                            StepSize::new(batch.tolerance, order, longest).over(member.mechanism.units.time),
-                            member.state.time,
-                        );
-                        slot.unit = member.mechanism.units.time;
-                    }
-                    None => team.park(lane),
-                }
-            }
-            left[place] = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
+        for team in teams.iter_mut() {
+            team.fill(batch, members, &mut waiting, until);
         }
-        if slots.iter().all(|slot| slot.member.is_none()) {
+        if teams.iter().all(Team::is_idle) {
             return;
         }
-        let before = [teams[0].high[0], teams[1].high[0]];
-        expand::<L, N>(&mut teams, order);
-        for (slot, (place, &left)) in slots.iter_mut().zip(left.iter().enumerate()) {
-            let (team, lane) = (&teams[place / WIDTH], place % WIDTH);
-            let coefficient = |k: usize, i: usize| team.powers[k].v[i][lane];
-            let mut sizes = [0.0; JUDGES];
-            for (back, size) in sizes.iter_mut().enumerate() {
-                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
-            }
-            let finite = (0..N).all(|i| coefficient(order, i).is_finite());
-            slot.wanted = if finite { slot.step_size.step_of(order, &sizes) } else { f64::NAN };
-            slot.taken = if finite { step_size::taken(slot.wanted, left) } else { 0.0 };
-        }
-        for (team, slots) in teams.iter_mut().zip(slots.chunks_exact(WIDTH)) {
-            finish::<L, N>(team, order, [slots[0].taken, slots[1].taken, slots[2].taken, slots[3].taken]);
-        }
-        for (place, slot) in slots.iter_mut().enumerate() {
-            let Some(index) = slot.member else { continue };
-            let (team, lane) = (&mut teams[place / WIDTH], place % WIDTH);
-            let member = &mut members[index];
-            let (from, step) = (slot.time, slot.taken);
-            match slot.failure(&member.statistics) {
-                Err(stop) => member.stopped = Some(stop),
-                Ok(()) => {
-                    slot.time = if step == left[place] { until } else { from + step };
-                    member.statistics.steps += 1;
-                    member.statistics.evaluations += 1;
-                }
-            }
-            let mut turned = [0; BODIES];
-            for i in 0..N {
-                turned[i] = angle::wrap(&mut team.high[0][i][lane], &mut team.low[0][i][lane]);
-                member.state.turns[i] += turned[i];
-            }
-            let (view, start) = (&*team, &before[place / WIDTH]);
-            let series = |body: usize, after: f64| view.at(order, lane, body, start[body][lane], after);
-            let passage = Passage { from, step, turned, series: &series };
-            if member.stopped.is_some() || watch(index, &passage) == Going::Enough || slot.time >= until {
-                team.leave(lane, &mut member.state);
-                member.state.time = slot.time;
-                slot.member = None;
-            }
+        expand::<W, N, T>(&mut teams, batch.order);
+        for team in teams.iter_mut() {
+            let taken = team.choose_steps(batch.order);
+            finish::<W, N>(team, batch.order, &taken);
+            team.arrive(batch.order, members, until, watch);
         }
     }
 }
@@ -380,4 +415,62 @@ fn next<const N: usize>(members: &mut [BatchMember], waiting: &mut usize, until:
         }
     }
     None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arithmetic::lanes::Hardware;
+    use crate::arithmetic::lanes::wide::WideHardware;
+    use crate::dynamics::Form;
+    use crate::dynamics::elimination::Elimination;
+    use crate::scene::parse_scene;
+    use std::sync::Arc;
+
+    /// More trajectories than there are lanes, of which some end early.
+    fn ends(vectors: Vectors) -> Vec<State> {
+        let scene = parse_scene(
+            r#"{"name": "two", "gravity": [9.81, 0], "bars": [
+                {"name": "a", "length": 0.5, "width": 0.05, "thickness": 0.003, "density": 670},
+                {"name": "b", "length": 0.4, "width": 0.05, "thickness": 0.003, "density": 700}],
+                "hinges": [
+                    {"name": "h", "between": [
+                        {"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                    {"name": "k", "between": [
+                        {"body": "a", "point": [0.5, 0]}, {"body": "b", "point": [0, 0]}]}],
+                "start": {"a": {"phi": 1.5, "omega": 0}, "b": {"phi": 1.0, "omega": 0}},
+                "until": 1, "every": 1}"#,
+            "scene",
+            &[],
+        )
+        .expect("a scene");
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
+        let state = Elimination::<0>::new(Arc::clone(&mechanism)).state(&mechanism.start(&scene));
+        let mut members: Vec<BatchMember> = (0..21)
+            .map(|k| {
+                let mut state = state.clone();
+                (state.y[0], state.y[1]) = (1.5 - 0.1 * k as f64, 1.0 + 0.03 * k as f64);
+                BatchMember::new(&mechanism, state)
+            })
+            .collect();
+        let batch = Batch::new(Tolerance { relative: 1e-10, absolute: 1e-10 });
+        let until = Time::from(3.0);
+        let mut watch = |member: usize, passage: &Passage| match passage.from.hi > 0.1 * member as f64 {
+            true => Going::Enough,
+            false => Going::On,
+        };
+        vectors.run(Integration::<2> { batch: &batch, members: &mut members, until, watch: &mut watch });
+        members.into_iter().map(|member| member.state).collect()
+    }
+
+    #[test]
+    fn all_vectors_have_the_same_bits() {
+        let expected = ends(Vectors::Portable);
+        if let Some(four) = Hardware::ask() {
+            assert_eq!(ends(Vectors::Two(four)), expected);
+        }
+        if let Some(wide) = WideHardware::ask() {
+            assert_eq!(ends(Vectors::One(wide)), expected);
+        }
+    }
 }

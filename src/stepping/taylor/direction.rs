@@ -82,7 +82,7 @@ pub fn unit<L: Lanes>(angle: L, rest: L) -> L {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::lanes::Portable;
+    use crate::arithmetic::lanes::{Arithmetic, Portable};
     use crate::arithmetic::{DoubleDouble, Scalar};
     use proptest::prelude::*;
 

@@ -4,7 +4,7 @@
 //! low order is in two terms, and what the double leaves out joins *before* the rounding, since afterwards it
 //! is below half a unit in the last place and changes nothing.
 
-use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::{Arithmetic, Lanes};
 
 /// Signs that turn swapped pairs to the left.
 pub const LEFT: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
@@ -45,9 +45,9 @@ pub const fn reciprocal(k: usize) -> (f64, f64) {
 
 /// x/k, rounded once.
 #[inline(always)]
-pub fn over<L: Lanes>(x: L, k: usize) -> L {
+pub fn over<A: Arithmetic>(x: A, k: usize) -> A {
     let (r, rest) = reciprocal(k);
-    if rest == 0.0 { x.mul(L::splat(r)) } else { x.mul_add(L::splat(r), x.mul(L::splat(rest))) }
+    if rest == 0.0 { x.mul(A::splat(r)) } else { x.mul_add(A::splat(r), x.mul(A::splat(rest))) }
 }
 
 /// `a - x/k` likewise.
@@ -79,7 +79,7 @@ pub fn over_first<L: Lanes>(x: L, k: usize) -> L {
 
 /// `[high, low] + increment + rest` as pairs: a two-sum, then the low parts, then a quick two-sum.
 #[inline(always)]
-pub fn add_to<L: Lanes>([high, low]: [L; 2], increment: L, rest: L) -> [L; 2] {
+pub fn add_to<A: Arithmetic>([high, low]: [A; 2], increment: A, rest: A) -> [A; 2] {
     let (sum, error) = high.two_sum(increment);
     let (high, low) = sum.fast_two_sum(error.add(low.add(rest)));
     [high, low]

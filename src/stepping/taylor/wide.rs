@@ -180,7 +180,7 @@ pub fn unit<L: Lanes>(angle: Wide<L>) -> Wide<L> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::arithmetic::lanes::Portable;
+    use crate::arithmetic::lanes::{Arithmetic, Portable};
     use proptest::prelude::*;
 
     fn wide(value: DoubleDouble) -> Wide<Portable> {

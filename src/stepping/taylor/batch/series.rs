@@ -1,120 +1,143 @@
 //! The series of all lanes of a team, and its sum.
 
 use super::super::terms::{add_to, over};
-use super::{Quad, TEAMS, Team};
-use crate::arithmetic::lanes::Lanes;
+use super::{Octet, Team};
+use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
 
 /// Expands all lanes to an order.
 #[inline(always)]
-pub(super) fn expand<L: Lanes, const N: usize>(teams: &mut [Team<N>; TEAMS], order: usize) {
-    let mut products = [[[L::splat(0.0); N]; 2]; TEAMS];
+pub(super) fn expand<W: EightLanes, const N: usize, const T: usize>(teams: &mut [Team<N>; T], order: usize) {
+    let mut products = [[[W::ZERO; N]; 2]; T];
     for (team, f) in teams.iter_mut().zip(&mut products) {
         for i in 0..N {
-            let (s, c) = sincos::sin_cos::<L>(L::of(team.high[0][i]), L::of(team.low[0][i]));
-            (team.powers[0].c[i], team.powers[0].s[i], team.powers[0].v[i]) =
-                (c.array(), s.array(), team.high[1][i]);
-            let v = L::of(team.high[1][i]);
+            let ([high, other_high], [low, other_low]) =
+                (load::<W>(&team.high[0][i]).halves(), load::<W>(&team.low[0][i]).halves());
+            let (s, c) = sincos::sin_cos::<W::Half>(high, low);
+            let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
+            let (s, c) = (W::join([s, other_s]), W::join([c, other_c]));
+            let power = &mut team.powers[0];
+            (power.c[i], power.s[i], power.v[i]) = (store(c), store(s), team.high[1][i]);
+            let v = load::<W>(&team.high[1][i]);
             (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
         }
-        invert::<L, N>(team);
+        invert::<W, N>(team);
     }
     for k in 0..order {
         for (team, f) in teams.iter_mut().zip(&mut products) {
-            raise::<L, N>(team, f, k);
+            raise::<W, N>(team, f, k);
         }
     }
 }
 
+#[inline(always)]
+fn load<W: EightLanes>(octet: &Octet) -> W {
+    W::of(&octet.0)
+}
+
+#[inline(always)]
+fn store<W: EightLanes>(lanes: W) -> Octet {
+    Octet(lanes.array())
+}
+
 /// Order k: from e_k, v_k and f_k = v e to those of the next one.
 #[inline(always)]
-pub(super) fn raise<L: Lanes, const N: usize>(team: &mut Team<N>, f: &mut [[L; N]; 2], k: usize) {
-    let zero = L::splat(0.0);
-    let order = L::splat((k + 1) as f64);
+pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut Team<N>, f: &mut [[W; N]; 2], k: usize) {
+    let zero = W::ZERO;
+    let order = W::splat((k + 1) as f64);
     let (mut gx, mut gy, mut torque) = ([zero; N], [zero; N], [zero; N]);
     for i in 0..N {
         let s = over(f[0][i], k + 1);
         let c = zero.sub(over(f[1][i], k + 1));
-        (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (c.array(), s.array());
+        (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (store(c), store(s));
     }
-    // Two bodies at a time keep the multipliers busy; the newest coefficients come last.
-    for first in (0..N).step_by(2) {
-        let count = if first + 1 < N { 2 } else { 1 };
+    // Eight sums at a time keep the multipliers busy, those of one body in two vectors or of two bodies in one;
+    // the newest coefficients come last.
+    let at_once = 2 / W::VECTORS;
+    for first in (0..N).step_by(at_once) {
+        let count = at_once.min(N - first);
         let mut sums = [[zero; 4]; 2];
         let past = &team.powers[1..=k];
         for (early, late) in past.iter().zip(past.iter().rev()) {
             for b in 0..count {
-                let (c, s, v) =
-                    (L::of(late.c[first + b]), L::of(late.s[first + b]), L::of(early.v[first + b]));
+                let (c, s, v) = (
+                    load::<W>(&late.c[first + b]),
+                    load::<W>(&late.s[first + b]),
+                    load::<W>(&early.v[first + b]),
+                );
                 let [x, y, load_x, load_y] = &mut sums[b];
                 (*x, *y) = (v.mul_add(c, *x), v.mul_add(s, *y));
-                *load_x = c.mul_add(L::of(early.px[first + b]), *load_x);
-                *load_y = s.mul_add(L::of(early.py[first + b]), *load_y);
+                *load_x = c.mul_add(load::<W>(&early.px[first + b]), *load_x);
+                *load_y = s.mul_add(load::<W>(&early.py[first + b]), *load_y);
             }
         }
         for b in 0..count {
             let i = first + b;
             let [x, y, load_x, load_y] = sums[b];
             let (start, next, this) = (&team.powers[0], &team.powers[k + 1], &team.powers[k]);
-            let v0 = L::of(start.v[i]);
-            (gx[i], gy[i]) = (v0.mul_add(L::of(next.c[i]), x), v0.mul_add(L::of(next.s[i]), y));
-            let weights = L::of(this.s[i])
-                .neg_mul_add(L::of(team.weight[i][0]), L::of(this.c[i]).mul(L::of(team.weight[i][1])));
+            let v0 = load::<W>(&start.v[i]);
+            (gx[i], gy[i]) = (v0.mul_add(load::<W>(&next.c[i]), x), v0.mul_add(load::<W>(&next.s[i]), y));
+            let weights = load::<W>(&this.s[i]).neg_mul_add(
+                load::<W>(&team.weight[i][0]),
+                load::<W>(&this.c[i]).mul(load::<W>(&team.weight[i][1])),
+            );
             torque[i] = weights.sub(load_x.add(load_y));
         }
     }
     for i in 0..N {
         let (ax, ay) =
-            (mass_terms::<L, N>(&team.coupling[i], &gx, i), mass_terms::<L, N>(&team.coupling[i], &gy, i));
-        let inner = L::of(team.powers[0].c[i]).mul_add(ax, L::of(team.powers[0].s[i]).mul(ay));
+            (mass_terms::<W, N>(&team.coupling[i], &gx, i), mass_terms::<W, N>(&team.coupling[i], &gy, i));
+        let inner = load::<W>(&team.powers[0].c[i]).mul_add(ax, load::<W>(&team.powers[0].s[i]).mul(ay));
         torque[i] = order.neg_mul_add(inner, torque[i]);
     }
-    let mut x = solve::<L, N>(team, &torque);
+    let mut x = solve::<W, N>(team, &torque);
     if k < 2 {
         // x is rounded, not merely computed: one step of the residual.
         let mut residual = torque;
         for i in 0..N {
-            residual[i] = L::of(team.diagonal[i]).neg_mul_add(x[i], residual[i]);
+            residual[i] = load::<W>(&team.diagonal[i]).neg_mul_add(x[i], residual[i]);
             for j in 0..N {
                 if j != i {
                     let (ci, si, cj, sj) = (
-                        L::of(team.powers[0].c[i]),
-                        L::of(team.powers[0].s[i]),
-                        L::of(team.powers[0].c[j]),
-                        L::of(team.powers[0].s[j]),
+                        load::<W>(&team.powers[0].c[i]),
+                        load::<W>(&team.powers[0].s[i]),
+                        load::<W>(&team.powers[0].c[j]),
+                        load::<W>(&team.powers[0].s[j]),
                     );
-                    let mass = L::of(team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+                    let mass = load::<W>(&team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
                     residual[i] = mass.neg_mul_add(x[j], residual[i]);
                 }
             }
         }
-        let correction = solve::<L, N>(team, &residual);
+        let correction = solve::<W, N>(team, &residual);
         for i in 0..N {
             x[i] = x[i].add(correction[i]);
         }
     }
     for i in 0..N {
         let v = over(x[i], k + 1);
-        team.powers[k + 1].v[i] = v.array();
-        (f[0][i], f[1][i]) =
-            (v.mul_add(L::of(team.powers[0].c[i]), gx[i]), v.mul_add(L::of(team.powers[0].s[i]), gy[i]));
+        team.powers[k + 1].v[i] = store(v);
+        (f[0][i], f[1][i]) = (
+            v.mul_add(load::<W>(&team.powers[0].c[i]), gx[i]),
+            v.mul_add(load::<W>(&team.powers[0].s[i]), gy[i]),
+        );
     }
     for i in 0..N {
         let (ax, ay) = (
-            mass_terms::<L, N>(&team.coupling[i], &f[0], i),
-            mass_terms::<L, N>(&team.coupling[i], &f[1], i),
+            mass_terms::<W, N>(&team.coupling[i], &f[0], i),
+            mass_terms::<W, N>(&team.coupling[i], &f[1], i),
         );
-        (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (ax.mul(order).array(), ay.mul(order).array());
+        (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (store(ax.mul(order)), store(ay.mul(order)));
     }
 }
 
 /// Σ_{j≠i} A_ij x_j.
 #[inline(always)]
-pub(super) fn mass_terms<L: Lanes, const N: usize>(row: &[Quad; N], x: &[L; N], i: usize) -> L {
-    let mut sum = L::splat(0.0);
+pub(super) fn mass_terms<W: EightLanes, const N: usize>(row: &[Octet; N], x: &[W; N], i: usize) -> W {
+    let mut sum = W::ZERO;
     for j in 0..N {
         if j != i {
-            sum = L::of(row[j]).mul_add(x[j], sum);
+            sum = load::<W>(&row[j]).mul_add(x[j], sum);
         }
     }
     sum
@@ -122,12 +145,12 @@ pub(super) fn mass_terms<L: Lanes, const N: usize>(row: &[Quad; N], x: &[L; N], 
 
 /// M_0⁻¹ x.
 #[inline(always)]
-pub(super) fn solve<L: Lanes, const N: usize>(team: &Team<N>, x: &[L; N]) -> [L; N] {
-    let mut solution = [L::splat(0.0); N];
+pub(super) fn solve<W: EightLanes, const N: usize>(team: &Team<N>, x: &[W; N]) -> [W; N] {
+    let mut solution = [W::ZERO; N];
     for i in 0..N {
-        let mut sum = L::of(team.inverse[i][0]).mul(x[0]);
+        let mut sum = load::<W>(&team.inverse[i][0]).mul(x[0]);
         for j in 1..N {
-            sum = L::of(team.inverse[i][j]).mul_add(x[j], sum);
+            sum = load::<W>(&team.inverse[i][j]).mul_add(x[j], sum);
         }
         solution[i] = sum;
     }
@@ -136,25 +159,25 @@ pub(super) fn solve<L: Lanes, const N: usize>(team: &Team<N>, x: &[L; N]) -> [L;
 
 /// M_0⁻¹ by elimination without interchanges, M_0 being positive definite.
 #[inline(always)]
-pub(super) fn invert<L: Lanes, const N: usize>(team: &mut Team<N>) {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+pub(super) fn invert<W: EightLanes, const N: usize>(team: &mut Team<N>) {
+    let (zero, one) = (W::ZERO, W::ONE);
     let mut mass = [[zero; N]; N];
     for i in 0..N {
-        mass[i][i] = L::of(team.diagonal[i]);
+        mass[i][i] = load::<W>(&team.diagonal[i]);
         for j in 0..N {
             if j != i {
                 let (ci, si, cj, sj) = (
-                    L::of(team.powers[0].c[i]),
-                    L::of(team.powers[0].s[i]),
-                    L::of(team.powers[0].c[j]),
-                    L::of(team.powers[0].s[j]),
+                    load::<W>(&team.powers[0].c[i]),
+                    load::<W>(&team.powers[0].s[i]),
+                    load::<W>(&team.powers[0].c[j]),
+                    load::<W>(&team.powers[0].s[j]),
                 );
-                mass[i][j] = L::of(team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+                mass[i][j] = load::<W>(&team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
             }
         }
     }
     for p in 0..N {
-        let pivot = L::ONE.div(mass[p][p]);
+        let pivot = W::ONE.div(mass[p][p]);
         mass[p][p] = one;
         for j in 0..N {
             mass[p][j] = mass[p][j].mul(pivot);
@@ -171,30 +194,31 @@ pub(super) fn invert<L: Lanes, const N: usize>(team: &mut Team<N>) {
     }
     for i in 0..N {
         for j in 0..N {
-            team.inverse[i][j] = mass[i][j].array();
+            team.inverse[i][j] = store(mass[i][j]);
         }
     }
 }
 
 /// Every lane's state at the end of its step.
 #[inline(always)]
-pub(super) fn finish<L: Lanes, const N: usize>(team: &mut Team<N>, order: usize, taken: Quad) {
-    let h = L::of(taken);
+pub(super) fn finish<W: EightLanes, const N: usize>(team: &mut Team<N>, order: usize, taken: &Octet) {
+    let h = load::<W>(taken);
     let square = h.mul(h);
     for i in 0..N {
-        let (mut angles, mut rates) = ([L::splat(0.0); 2], [L::splat(0.0); 2]);
+        let (mut angles, mut rates) = ([W::ZERO; 2], [W::ZERO; 2]);
         let mut k = order;
         while k > 0 {
-            let v = L::of(team.powers[k].v[i]);
+            let v = load::<W>(&team.powers[k].v[i]);
             angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
             rates[k % 2] = rates[k % 2].mul_add(square, v);
             k -= 1;
         }
-        let angle = angles[0].mul_add(h, angles[1]).mul_add(h, L::of(team.powers[0].v[i])).mul(h);
+        let angle = angles[0].mul_add(h, angles[1]).mul_add(h, load::<W>(&team.powers[0].v[i])).mul(h);
         let rate = rates[0].mul_add(h, rates[1]).mul(h);
-        for (part, increment, rest) in [(0, angle, L::of(team.low[1][i]).mul(h)), (1, rate, L::ZERO)] {
-            let sum = add_to([L::of(team.high[part][i]), L::of(team.low[part][i])], increment, rest);
-            (team.high[part][i], team.low[part][i]) = (sum[0].array(), sum[1].array());
+        for (part, increment, rest) in [(0, angle, load::<W>(&team.low[1][i]).mul(h)), (1, rate, W::ZERO)] {
+            let sum =
+                add_to([load::<W>(&team.high[part][i]), load::<W>(&team.low[part][i])], increment, rest);
+            (team.high[part][i], team.low[part][i]) = (store(sum[0]), store(sum[1]));
         }
     }
 }

@@ -91,7 +91,7 @@ impl LawSeries {
     }
 
     /// Power zero of the length, and of s; nothing else is known.
-    #[inline(always)]
+    #[inline(never)]
     pub fn begin(&mut self, length: f64, reciprocal: f64) {
         let Self { length: own, rate, strain, reciprocal: inverse, results, .. } = self;
         for series in [&mut *own, rate, strain, &mut *inverse].into_iter().chain(results) {
@@ -129,6 +129,7 @@ impl LawSeries {
     }
 
     /// |dT/dL| \[N/m\] where the step begins.
+    #[inline(never)]
     pub fn stiffness(&self) -> f64 {
         self.law.slope(self.length.at(0), self.rate.at(0)).abs()
     }

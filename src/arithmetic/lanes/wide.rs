@@ -1,0 +1,199 @@
+//! Eight doubles at once, in one vector of AVX-512 or two of four lanes, with the same bits.
+
+use super::{Arithmetic, Hardware, Lanes, Portable, hardware, is_disabled};
+
+#[cfg(target_arch = "x86_64")]
+pub use super::hardware::WideHardware;
+
+/// Eight doubles.
+pub trait EightLanes: Arithmetic {
+    /// Four of them.
+    type Half: Lanes;
+
+    /// How many vectors they are in, 1 or 2.
+    const VECTORS: usize;
+
+    /// From an array.
+    fn of(lanes: &[f64; 8]) -> Self;
+    /// As an array.
+    fn array(self) -> [f64; 8];
+    /// The first four, and the others.
+    fn halves(self) -> [Self::Half; 2];
+    /// Of these.
+    fn join(halves: [Self::Half; 2]) -> Self;
+}
+
+impl<L: Lanes> Arithmetic for [L; 2] {
+    const ZERO: Self = [L::ZERO; 2];
+    const ONE: Self = [L::ONE; 2];
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        [L::splat(value); 2]
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        [self[0].add(other[0]), self[1].add(other[1])]
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        [self[0].sub(other[0]), self[1].sub(other[1])]
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        [self[0].mul(other[0]), self[1].mul(other[1])]
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        [self[0].div(other[0]), self[1].div(other[1])]
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        [self[0].mul_add(factor[0], addend[0]), self[1].mul_add(factor[1], addend[1])]
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
+        [self[0].neg_mul_add(factor[0], addend[0]), self[1].neg_mul_add(factor[1], addend[1])]
+    }
+}
+
+impl<L: Lanes> EightLanes for [L; 2] {
+    type Half = L;
+
+    const VECTORS: usize = 2;
+
+    #[inline(always)]
+    fn of(&[a, b, c, d, e, f, g, h]: &[f64; 8]) -> Self {
+        [L::of([a, b, c, d]), L::of([e, f, g, h])]
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 8] {
+        let ([a, b, c, d], [e, f, g, h]) = (self[0].array(), self[1].array());
+        [a, b, c, d, e, f, g, h]
+    }
+
+    #[inline(always)]
+    fn halves(self) -> [L; 2] {
+        self
+    }
+
+    #[inline(always)]
+    fn join(halves: [L; 2]) -> Self {
+        halves
+    }
+}
+
+/// Code written once over eight lanes, as [`Code`](super::Code) is over four.
+pub trait WideCode {
+    /// What comes of it.
+    type Output;
+
+    /// Runs it on one kind of lanes.
+    fn run<W: EightLanes>(self) -> Self::Output;
+}
+
+/// The proof that the processor has AVX-512; never, on this architecture.
+#[cfg(not(target_arch = "x86_64"))]
+#[derive(Clone, Copy, Debug)]
+pub enum WideHardware {}
+
+#[cfg(not(target_arch = "x86_64"))]
+impl WideHardware {
+    /// None.
+    pub fn ask() -> Option<Self> {
+        None
+    }
+
+    /// Nobody holds such a proof.
+    pub fn run<C: WideCode>(self, _: C) -> C::Output {
+        match self {}
+    }
+}
+
+/// The vectors that eight lanes are in.
+#[derive(Clone, Copy, Debug)]
+pub enum Vectors {
+    /// Plain code.
+    Portable,
+    /// Two of four lanes.
+    Two(Hardware),
+    /// One of eight.
+    One(WideHardware),
+}
+
+impl Default for Vectors {
+    #[inline]
+    fn default() -> Self {
+        match (WideHardware::ask(), hardware()) {
+            (Some(wide), Some(_)) if !is_disabled() => Self::One(wide),
+            (_, Some(four)) => Self::Two(four),
+            _ => Self::Portable,
+        }
+    }
+}
+
+impl Vectors {
+    /// Runs code in them.
+    #[inline(always)]
+    pub fn run<C: WideCode>(self, code: C) -> C::Output {
+        match self {
+            Self::One(wide) => wide.run(code),
+            Self::Two(four) => four.run_in_pairs(code),
+            Self::Portable => code.run::<[Portable; 2]>(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Everything([[f64; 8]; 3]);
+
+    impl WideCode for Everything {
+        type Output = Vec<[u64; 8]>;
+
+        #[inline(always)]
+        fn run<W: EightLanes>(self) -> Vec<[u64; 8]> {
+            let [x, y, z] = [W::of(&self.0[0]), W::of(&self.0[1]), W::of(&self.0[2])];
+            let all = [
+                x.add(y),
+                x.sub(y),
+                x.mul(y),
+                x.div(y),
+                x.neg_mul_add(y, z),
+                x.mul_add(y, z),
+                W::join([y.halves()[1], x.halves()[0]]),
+                W::splat(self.0[0][0]),
+                W::ZERO,
+                W::ONE,
+            ];
+            all.iter().map(|lanes| lanes.array().map(f64::to_bits)).collect()
+        }
+    }
+
+    #[test]
+    fn all_vectors_have_the_same_bits() {
+        let number = |k: usize| libm::sin(1.0 + 2.3 * k as f64) * libm::exp2((k % 7) as f64);
+        for case in 0..100 {
+            let operands: [[f64; 8]; 3] =
+                std::array::from_fn(|row| std::array::from_fn(|lane| number(24 * case + 8 * row + lane)));
+            let expected = Vectors::Portable.run(Everything(operands));
+            let [x, y, z] = operands.map(|row| row[5]);
+            assert_eq!(expected[5][5], crate::arithmetic::sum::fused(x, y, z).to_bits());
+            if let Some(four) = Hardware::ask() {
+                assert_eq!(Vectors::Two(four).run(Everything(operands)), expected);
+            }
+            if let Some(wide) = WideHardware::ask() {
+                assert_eq!(Vectors::One(wide).run(Everything(operands)), expected);
+            }
+        }
+    }
+}
