@@ -64,6 +64,7 @@ mod radau;
 #[path = "mechanisms.rs"]
 mod random_mechanisms;
 mod rattle;
+mod rattle_couplings;
 mod release;
 mod restart;
 mod rigid;
