@@ -41,6 +41,7 @@ mod formulas;
 mod formulas_in_digits;
 mod friction;
 mod friction_impacts;
+mod friction_reversals;
 mod gauss;
 mod identities;
 mod impact;
