@@ -53,6 +53,8 @@ mod linkages;
 mod looped;
 #[cfg(feature = "digits")]
 mod many_digits;
+#[cfg(feature = "digits")]
+mod many_digits_walls;
 mod metamorphic;
 mod modes;
 mod moving_walls;
