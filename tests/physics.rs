@@ -82,4 +82,5 @@ mod switched_orders;
 mod tables;
 mod taylor;
 mod walls;
+mod windows;
 mod work;
