@@ -112,3 +112,21 @@ fn a_disc_on_a_carriage_pushed_to_and_fro_is_slowed_by_the_size_of_the_push() {
     let free = r#", "origin": [0, 0], "velocity": [0, 0]"#;
     assert_slowed(&carried(0.0, ["[3, 4]", free], start, until, push), expected, 120);
 }
+
+/// With a little weight aside the force turns round beside zero, however near: the corner becomes round as that of
+/// a cone, and between what is told from zero and what is not there is no gap.
+#[test]
+fn forces_that_pass_beside_zero_are_taken_however_near() {
+    let shaker = r#""motors": [{"name": "shaker", "slider": "guide", "law": "0.05*sin(20*t)"}]"#;
+    for aside in [1e-3, 1e-6, 1e-8, 3e-10, 1e-12] {
+        let text = carried(9.81, ["[0, 1]", ""], 40.0, 0.7, shaker);
+        let scene = scene(&text.replace(r#""gravity": [0,"#, &format!(r#""gravity": [{aside},"#)));
+        let [by_series, by_values] = [MethodId::Taylor, MethodId::Dp8].map(|method| {
+            let outcome = run(&scene, &adaptive(method, 1e-14));
+            assert!(outcome.stop.is_none(), "{aside:e}: {:?}", outcome.stop);
+            [outcome.last.phi[1], outcome.last.omega[1]]
+        });
+        let off = [0, 1].map(|i| (by_series[i] - by_values[i]).abs());
+        assert!(off[0].max(off[1]) < 2.0 * CLOSE, "{aside:e}: {off:?}");
+    }
+}
