@@ -1,5 +1,5 @@
 //! The targets of `fuzz/` on inputs of a fixed seed, so that every change meets some; `FUZZ=1000000 cargo
-//! test --test reports fuzz::` has more.
+//! test --test reports fuzz::` has more, and `SEED=2` others.
 #![cfg(feature = "cli")]
 
 use crate::extremes;
@@ -33,7 +33,15 @@ fn run(name: &str) {
     }
     let cases = std::env::var("FUZZ").ok().and_then(|count| count.parse().ok()).unwrap_or(USUAL);
     let config = Config { cases, failure_persistence: None, max_shrink_iters: 500, ..Config::default() };
-    let mut runner = TestRunner::new_with_rng(config, TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let rng = match std::env::var("SEED").ok().and_then(|seed| seed.parse::<u64>().ok()) {
+        Some(seed) => {
+            let mut bytes = [0; 32];
+            bytes[..8].copy_from_slice(&seed.to_le_bytes());
+            TestRng::from_seed(RngAlgorithm::ChaCha, &bytes)
+        }
+        None => TestRng::deterministic_rng(RngAlgorithm::ChaCha),
+    };
+    let mut runner = TestRunner::new_with_rng(config, rng);
     let bytes = proptest::collection::vec(any::<u8>(), 0..400);
     runner
         .run(&bytes, |bytes| {

@@ -30,10 +30,6 @@ fn ends_at(text: &str, angle: f64, rate: f64) {
         let outcome = run(&scene, &request);
         assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
         let errors = (outcome.last.phi[0] - angle, outcome.last.omega[0] - rate);
-        println!(
-            "ZZ {:?} {errors:?} drift {:e} t {}",
-            request.method, outcome.drift.energy.max, outcome.statistics.steps
-        );
         assert!(errors.0.abs().max(errors.1.abs()) < CLOSE, "{:?}: {errors:?}", request.method);
         balanced(&outcome, &request);
     }

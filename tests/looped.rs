@@ -316,7 +316,8 @@ fn what_does_not_fit_is_left_to_the_angle_form() {
     let z: Vec<Complex<f64>> = start.phi.iter().map(|phi| Complex::unit(phi.hi)).collect();
     let natural = Natural::new(mechanism).expect("a natural form");
     // The published accelerations of the crank and the coupler, and the first two multipliers.
-    let (acceleration, multiplier) = natural.accelerations(Time::default(), &z, &[Complex::ZERO; 7]);
+    let (acceleration, multiplier) =
+        natural.accelerations(Time::default(), (&z, &[0; 7]), &[Complex::ZERO; 7]);
     assert!((z[0].cross(acceleration[0]) - 14_222.443_919_954_114).abs() < 1e-7);
     assert!((z[1].cross(acceleration[1]) - (14_222.443_919_954_114 - 10_666.832_939_965_545)).abs() < 1e-7);
     assert_eq!(multiplier.len(), 6);

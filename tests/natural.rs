@@ -166,7 +166,7 @@ fn natural(mechanism: &Mechanism, motion: &Motion) -> (Vec<C>, Vec<C>, Vec<C>, V
     let vectors: Vec<C> = state.y.as_chunks::<2>().0.iter().map(|x| C::new(x[0], x[1])).collect();
     let (z, rate) = vectors.split_at(mechanism.coordinates());
     let (z, rate) = (z.to_vec(), rate[..mechanism.coordinates()].to_vec());
-    let (acceleration, multiplier) = natural.accelerations(Time::default(), &z, &rate);
+    let (acceleration, multiplier) = natural.accelerations(Time::default(), (&z, &vec![0; z.len()]), &rate);
     (z, rate, acceleration, multiplier)
 }
 

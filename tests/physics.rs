@@ -41,6 +41,7 @@ mod formulas;
 mod formulas_in_digits;
 mod friction;
 mod friction_impacts;
+mod friction_reversals;
 mod gauss;
 mod identities;
 mod impact;
@@ -52,6 +53,8 @@ mod linkages;
 mod looped;
 #[cfg(feature = "digits")]
 mod many_digits;
+#[cfg(feature = "digits")]
+mod many_digits_walls;
 mod metamorphic;
 mod modes;
 mod moving_walls;
@@ -64,6 +67,7 @@ mod radau;
 #[path = "mechanisms.rs"]
 mod random_mechanisms;
 mod rattle;
+mod rattle_couplings;
 mod release;
 mod restart;
 mod rigid;
@@ -78,4 +82,5 @@ mod switched_orders;
 mod tables;
 mod taylor;
 mod walls;
+mod windows;
 mod work;

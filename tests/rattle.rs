@@ -265,7 +265,7 @@ proptest! {
         let natural = Natural::new(mechanism.clone()).unwrap();
         let z: Vec<Complex<f64>> = phi.iter().map(|&phi| Complex::unit(phi)).collect();
         let rate: Vec<Complex<f64>> = z.iter().zip(&omega).map(|(z, &omega)| z.left().times(omega)).collect();
-        let (acceleration, multiplier) = natural.accelerations(time, &z, &rate);
+        let (acceleration, multiplier) = natural.accelerations(time, (&z, &vec![0; n]), &rate);
         let largest = |values: &[f64]| values.iter().fold(1.0f64, |largest, value| largest.max(value.abs()));
         let (fastest, strongest) = (largest(&kernel.load), largest(&kernel.multiplier));
         for k in 0..n {

@@ -182,6 +182,31 @@ fn a_parameter_moves_every_formula_it_is_in() {
     }
 }
 
+/// 0.64 kg·m² on a spring of 0.8 N·m: x = x0 cos(w t), w² = k/I.
+#[test]
+fn numbers_with_units_are_numbers() {
+    let scene = template(
+        r#"{"name": "units", "gravity": [0, 0], "parameters": {"k": "800 N*mm", "soft": "k/2"},
+            "bars": [{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": 0.64, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "torques": [{"name": "t", "body": "bar", "torque": "-2*soft*bar.phi"}],
+            "start": {"bar": {"phi": "40 deg", "omega": 0}}, "until": 5, "every": 0.1}"#,
+    );
+    let (t, start, w) = (3.1, 40.0_f64.to_radians(), 1.25_f64.sqrt());
+    let found = derived(&scene, &["bar.phi"], &["k", "bar.phi"], t);
+    let expected = [-start * t * (w * t).sin() * 0.5 * w / 0.8, (w * t).cos()];
+    for (slope, expected) in found.measures[0].slopes.iter().zip(expected) {
+        assert_near(*slope, expected, 1e-10, "number with a unit");
+    }
+    let request = SensitivityRequest {
+        of: vec!["bar.phi".parse().expect("a measure")],
+        to: vec!["soft".into()],
+        ..SensitivityRequest::default()
+    };
+    let error = sensitivity(&scene, &request, &mut || false).expect_err("a formula").to_string();
+    assert!(error.contains("parameters.soft is not a number written in the scene"), "{error}");
+}
+
 /// Angles and rates at a time of the reference motion with another value of a number.
 fn reference_at(template: &Template, path: &str, value: f64, at: f64) -> Option<Vec<f64>> {
     let variable = template.variable(path).ok()?;

@@ -5,7 +5,8 @@
 //! D z'' + Σ_k mu_k z_k + Σ_r lambda_r g_r = F(z)            [N m, N]   D = H + diag(I), Hermitian, constant
 //! (|z_k|² - 1) / 2             = 0                          one row per body, gradient z_k; none for an origin
 //! c + Σ g_k·z_k                = 0                          pins, lines of the ground, locked angles: linear
-//! C(z, t)                      = 0                          slots, travels, motors, locked relative angles: module `guide`
+//! C(z, t)                      = 0                          slots, travels, motors, locked relative angles: module `guide`;
+//!                                                           gears and cams: module `coupling`
 //! W = D⁻¹ less the linear rows (module `reduced`),   S_pq = g_p·W g_q,   S mu = g·W F + convective terms,   z'' = W (F - g mu)
 //! ```
 //!
@@ -24,10 +25,12 @@
 //! chapter 2, for natural coordinates.
 
 pub mod columns;
+pub mod coupling;
 mod guide;
 pub mod keeper;
 mod reduced;
 
+use coupling::Coupling;
 pub use guide::{Demand, Guide};
 pub use reduced::{Block, Linear, Reduced, times};
 
@@ -60,9 +63,6 @@ pub enum NaturalError {
     /// Impacts are not handled.
     #[error("wall `{0}`: the natural form has no impacts")]
     Wall(String),
-    /// Rows must be of elements.
-    #[error("motor `{0}` has an aim that depends on the mechanism: the natural form takes laws of time only")]
-    Aim(String),
     /// The constant mass matrix is singular.
     #[error("bar `{0}` has no inertia of its own: the constant mass matrix of the natural form is singular")]
     Singular(String),
@@ -97,6 +97,7 @@ pub struct Natural {
     mechanism: Arc<Mechanism>,
     reduced: Reduced,
     guides: Vec<Guide>,
+    couplings: Vec<Coupling>,
     /// Gravity and constant forces on every element (n) \[N·m, N\].
     weight: Vec<Complex<f64>>,
     /// The share of the latter.
@@ -124,9 +125,6 @@ impl Natural {
         if let Some(contact) = mechanism.contacts.first() {
             return Err(NaturalError::Wall(contact.row.name.clone()));
         }
-        if let Some(row) = mechanism.constraints.iter().find(|row| row.aim.is_some()) {
-            return Err(NaturalError::Aim(row.name.clone()));
-        }
         if let Some(force) = mechanism.forces.iter().find(|force| !force.is_potential_of_place()) {
             return Err(NaturalError::Applied(force.name.clone()));
         }
@@ -144,11 +142,12 @@ impl Natural {
             }
         }
         let (linear, guides) = sorted_rows(&mechanism);
+        let couplings = coupling::couplings(&mechanism, guides.iter().map(|guide| guide.row));
         let name = |body: usize| mechanism.bodies.get(body).map_or(String::new(), |body| body.name.clone());
         let reduced = Reduced::new(&mechanism, linear).map_err(|body| NaturalError::Singular(name(body)))?;
         let weight =
             mechanism.tree.weight.iter().zip(&applied).map(|(&weight, &applied)| weight + applied).collect();
-        Ok(Self { mechanism, reduced, guides, weight, applied, torques })
+        Ok(Self { mechanism, reduced, guides, couplings, weight, applied, torques })
     }
 
     /// W and what belongs to it.
@@ -161,6 +160,12 @@ impl Natural {
     #[inline(always)]
     pub fn guides(&self) -> &[Guide] {
         &self.guides
+    }
+
+    /// Those of them that a formula of time and place is taken off.
+    #[inline(always)]
+    pub fn couplings(&self) -> &[Coupling] {
+        &self.couplings
     }
 
     /// Number of elements n: bodies, and two for every origin that moves freely, of which the second is not
@@ -219,11 +224,11 @@ impl Natural {
     }
 
     /// z'' \[1/s², m/s²\] and the multipliers \[N·m, N\] of all rows, in the order of the mechanism's, at
-    /// elements `z` with rates `rate` \[1/s, m/s\].
+    /// elements `z` with whole turns of the bodies and rates `rate` \[1/s, m/s\].
     pub fn accelerations(
         &self,
         t: Time,
-        z: &[Complex<f64>],
+        (z, turns): (&[Complex<f64>], &[i64]),
         rate: &[Complex<f64>],
     ) -> (Vec<Complex<f64>>, Vec<f64>) {
         let (n, bodies, rows) = (z.len(), self.mechanism.bodies.len(), self.rows());
@@ -240,6 +245,7 @@ impl Natural {
             guide.gradient(&demand, z, &mut gradients[bodies + r]);
             multiplier[bodies + r] = guide.convective(&demand, z, rate);
         }
+        self.couple(t, (z, turns), rate, (&mut gradients[bodies..], &mut multiplier[bodies..]));
         let free = self.reduced.spread(&force);
         let minv_jt: Vec<Vec<Complex<f64>>> =
             gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
@@ -276,6 +282,10 @@ impl Natural {
         scales.clear();
         scales.extend_from_slice(&free[..self.mechanism.bodies.len()]);
         scales.extend(self.guides.iter().map(|guide| guide.measure.scale(|k| free[k])));
+        let guides = &mut scales[self.mechanism.bodies.len()..];
+        for coupling in &self.couplings {
+            guides[coupling.guide] += coupling.angles().iter().map(|&k| free[k]).sum::<f64>();
+        }
     }
 
     /// How far a state is from its constraints, in double-double.
@@ -294,9 +304,11 @@ impl Natural {
         for linear in &self.reduced.rows {
             see(linear.place.value(&z), reduced::slip(&linear.place, &rate));
         }
-        for guide in &self.guides {
+        let coupled = self.coupled_residuals(state, &z, &rate);
+        for (guide, [position, velocity]) in self.guides.iter().zip(coupled) {
             let demand = guide.demand::<DoubleDouble>(state.time);
-            see(guide.value(&demand, &z), guide.slip(&demand, &z, &rate) + guide.drive(&demand, &z));
+            let slip = guide.slip(&demand, &z, &rate) + guide.drive(&demand, &z);
+            see(guide.value(&demand, &z) + position, slip + velocity);
         }
         defect
     }
@@ -337,6 +349,9 @@ pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<Linear>, Vec<Guide>) {
 
 /// A row as a linear one with constant coefficients, where it is one.
 fn linear_place(row: &ConstraintEquation, angles: usize) -> Option<Quadratic> {
+    if row.aim.is_some() {
+        return None;
+    }
     let is_constant = row.law.as_ref().is_none_or(Law::is_constant);
     match (&row.measure, &row.law) {
         (&Measure::Angle { body, base: None }, Some(law)) if is_constant => {
@@ -392,6 +407,11 @@ impl Form for Natural {
         for k in 0..bodies {
             motion.phi[k] = angle(z[k]);
             motion.omega[k] = z[k].cross(rate[k]);
+        }
+        if self.mechanism.is_winding() {
+            for (phi, turns) in motion.phi.iter_mut().zip(&mut motion.turns[..bodies]) {
+                *phi += DoubleDouble::TAU.scale(std::mem::take(turns) as f64);
+            }
         }
         for x in (bodies..n).step_by(2) {
             (motion.phi[x], motion.phi[x + 1]) = (z[x].re, z[x].im);

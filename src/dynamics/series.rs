@@ -213,10 +213,10 @@ impl<T: SeriesNumber> Series<T> {
         self.law_series(terms, t);
         T::begin(self, t, u, u_rest, u_rate);
         T::orders(self, terms, 0);
-        if self.turn_rails(terms.structure.units.time) {
+        if self.find_reversals(terms.structure.units.time) {
             T::begin(self, t, u, u_rest, u_rate);
             T::orders(self, terms, 0);
-            self.turn_back();
+            self.forget_reversals();
         }
     }
 

@@ -11,6 +11,7 @@ pub(super) use walk::Walk;
 
 use super::error::SceneError;
 use super::format::{LAW, SCENE, START};
+use super::formula::Formula;
 use super::locate::{Node, Value};
 use super::read::{parse_scene, put_together, read_text, source_name};
 use super::set::{Override, SEVERAL, hint, name};
@@ -155,8 +156,8 @@ impl Template {
         Ok(Variable { path, unit, start })
     }
 
-    /// The value of a number as it is written in the scene, or given by an override; `None` where it is left to
-    /// its default, or follows from a formula.
+    /// The value of a number as it is written in the scene, or given by an override, with or without a unit;
+    /// `None` where it is left to its default, or follows from other numbers.
     ///
     /// # Errors
     /// As [`parse_scene`] where the text is no JSON or an override does not fit it.
@@ -164,6 +165,10 @@ impl Template {
         let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
         Ok(tree.at(&variable.path).and_then(|node| match &node.value {
             Value::Number(value) => Some(*value),
+            Value::Text(text) => {
+                let formula = Formula::parse(text).ok()?;
+                formula.names().next().is_none().then(|| formula.value(&[]))
+            }
             _ => None,
         }))
     }

@@ -15,18 +15,20 @@
 //! - Fixed-size vectors are 3 to 4 times faster than dynamic ones: chosen here by length.
 //! - What is between two rows is a shorter step from the first of them.
 //! - Rows cannot be changed while a window lasts: no projection, no walls.  `dp5` and `dp8` are for those.
+//! - A window may run into a pole of a law that the motion leaves before: its rows up to there are handed out,
+//!   and only if nobody changes the motion in them does the run stop.
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
 mod rows;
+mod window;
 
 use self::rows::{Rows, begin};
+pub use self::window::Window;
 use super::{Cause, Integrator, Statistics, StepError, Tolerance, interruption};
-use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{OdeSystem, State, Time};
 use nalgebra::{DVector, SVector};
 use ode_solvers::dop_shared::{IntegrationError, OutputType, Stats, System};
-use std::cell::RefCell;
 use std::marker::PhantomData;
 
 /// Dormand–Prince 5(4) of `ode_solvers`: everyday runs at 1e-3…1e-6.
@@ -57,47 +59,13 @@ impl<M> Windows<M> {
     }
 }
 
-/// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over
-/// their units.
-pub struct Window<'a, F: ?Sized> {
-    field: RefCell<&'a mut F>,
-    start: Time,
-    n: usize,
-    /// The units of the unknowns and of time, and room for the unknowns.
-    unit: &'a [f64],
-    time_unit: f64,
-    y: RefCell<Vec<f64>>,
-    /// Rows that may still be kept.
-    rows: usize,
-}
-
-impl<F: OdeSystem + ?Sized> Window<'_, F> {
-    fn rate(&self, y: &[f64], rate: &mut [f64]) {
-        let mut unknowns = self.y.borrow_mut();
-        unknowns.iter_mut().zip(y).zip(self.unit).for_each(|((unknown, y), unit)| *unknown = y * unit);
-        self.field.borrow_mut().rhs(
-            self.start + DoubleDouble::of(y[self.n] * self.time_unit),
-            &unknowns,
-            &mut rate[..self.n],
-        );
-        rate.iter_mut().zip(self.unit).for_each(|(rate, unit)| *rate = *rate * self.time_unit / unit);
-        rate[self.n] = 1.0;
-    }
-
-    /// Counts a row; true where it was the last that may be kept, or nobody waits for more.
-    fn is_full(&mut self) -> bool {
-        self.rows = self.rows.saturating_sub(1);
-        self.rows == 0 || interruption::is_asked()
-    }
-}
-
 impl<F: OdeSystem + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<'_, F> {
     fn system(&self, _: f64, y: &SVector<f64, D>, rate: &mut SVector<f64, D>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
 
-    fn solout(&mut self, _: f64, _: &SVector<f64, D>, _: &SVector<f64, D>) -> bool {
-        self.is_full()
+    fn solout(&mut self, _: f64, y: &SVector<f64, D>, _: &SVector<f64, D>) -> bool {
+        self.is_full(y.as_slice())
     }
 }
 
@@ -106,8 +74,8 @@ impl<F: OdeSystem + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
 
-    fn solout(&mut self, _: f64, _: &DVector<f64>, _: &DVector<f64>) -> bool {
-        self.is_full()
+    fn solout(&mut self, _: f64, y: &DVector<f64>, _: &DVector<f64>) -> bool {
+        self.is_full(y.as_slice())
     }
 }
 
@@ -242,17 +210,8 @@ fn part<F: OdeSystem + ?Sized>(
         .div_ceil(stepper.attempt)
         .min(u64::from(u32::MAX)) as u32;
     let most_rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
-    let (times, rows, outcome) = {
-        let room = RefCell::new(vec![0.0; n]);
-        let window = Window {
-            field: RefCell::new(field),
-            start: state.time,
-            n,
-            unit: &unit,
-            time_unit,
-            y: room,
-            rows: most_rows,
-        };
+    let (mut times, mut rows, outcome) = {
+        let window = Window::new(field, state.time, &unit, most_rows);
         integrate(window, &y, span / time_unit, first, most)
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
@@ -273,28 +232,31 @@ fn part<F: OdeSystem + ?Sized>(
         }
         Err(IntegrationError::MaxNumStepReached { x, .. }) => {
             statistics.evaluations = statistics.max_evaluations;
-            return Err(statistics.exhausted(name, reached_time(x), 0.0));
+            kept.failure = Some(statistics.exhausted(name, reached_time(x), 0.0));
         }
         Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
             let what = "the step fell below the resolution of time, or a rate became not finite".into();
             let hint = "loosen the tolerance, or take --method taylor or radau9";
-            let failure = stop(Cause::StepTooSmall, reached_time(x), 0.0, what, hint);
-            let steps = times.len().saturating_sub(1);
-            if steps == 0 || rows.len() != times.len() * (n + 1) || !rows.iter().all(|y| y.is_finite()) {
-                return Err(failure);
-            }
+            kept.failure = Some(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, hint));
             // What the crate does not tell: at least its accepted steps were evaluated.
+            let steps = times.len().saturating_sub(1);
             statistics.evaluations += (stepper.attempt + stepper.accepted) * steps as u64;
-            kept.failure = Some(failure);
         }
     }
-    let last = rows.rchunks(n + 1).next().unwrap_or_default();
-    if let Some(i) = last.iter().take(n).position(|y| !y.is_finite()) {
-        let what = format!("{} is not finite", field.label(i));
-        return Err(stop(Cause::NotFinite, state.time.hi, span, what, "tighten the tolerance"));
+    let finite = rows.chunks(n + 1).take_while(|row| row.iter().all(|y| y.is_finite())).count();
+    if let Some(row) = rows.chunks(n + 1).nth(finite) {
+        let lost = row.iter().take(n).position(|y| !y.is_finite()).unwrap_or(0);
+        let (what, t) = (format!("{} is not finite", field.label(lost)), reached_time(times[finite]));
+        let not_finite = || stop(Cause::NotFinite, t, 0.0, what, "tighten the tolerance");
+        kept.failure = kept.failure.take().or_else(|| Some(not_finite()));
+        times.truncate(finite);
+        rows.truncate(finite * (n + 1));
     }
     let times: Vec<f64> = times.iter().map(|t| t * time_unit).collect();
     if times.len() < 2 || rows.len() != times.len() * (n + 1) {
+        if let Some(failure) = kept.failure.take() {
+            return Err(failure);
+        }
         let what = "the crate made no step".into();
         return Err(stop(Cause::StepTooSmall, state.time.hi, span, what, "take --method taylor or dp8"));
     }

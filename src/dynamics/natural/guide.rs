@@ -24,6 +24,8 @@ pub struct Guide {
     pub measure: Measure,
     /// What that is to be; `None`: zero.
     pub law: Option<Law>,
+    /// True where C is an angle.
+    pub is_in_radians: bool,
 }
 
 /// What a guide asks for at one moment.
@@ -55,7 +57,13 @@ impl Demand<DoubleDouble> {
 impl Guide {
     /// The row `row` of a mechanism.
     pub fn new(number: usize, row: &ConstraintEquation) -> Self {
-        Self { row: number, name: row.name.clone(), measure: row.measure.clone(), law: row.law.clone() }
+        Self {
+            row: number,
+            name: row.name.clone(),
+            measure: row.measure.clone(),
+            law: row.law.clone(),
+            is_in_radians: row.is_in_radians(),
+        }
     }
 
     /// What it asks for at time `t`.

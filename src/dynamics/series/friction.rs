@@ -17,7 +17,9 @@
 //! follows from Newton's equation of what is beyond it, of which centre c, mass m and applied forces F are
 //! series: `N_m = Σ (m+1)(m+2) m c_{m+2} - F_m`.  Each order is solved twice, without tau_m and with it.
 //!
-//! A rail's N may pass zero in a step, and |N| has a corner there: [`Series::across_rails`] tells of it.
+//! N may pass zero in a step, and |N| has a corner there; its series goes on below zero instead, and
+//! [`Series::pressing`] tells where.  From there on n of a rail is turned, and N of a joint begins at zero: what
+//! rounding has left of it has no direction.
 
 use super::Series;
 use super::coefficient::{SeriesNumber, Terms};
@@ -68,7 +70,7 @@ struct Sliding<T> {
     along: Complex<T>,
     /// The first power of N that is not zero.
     lead: Option<usize>,
-    /// True for a rail whose N has just passed zero, or is about to, whatever sign it has.
+    /// True where N has just passed zero, or is about to, whatever is left of it.
     is_turned: bool,
 }
 
@@ -204,6 +206,10 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             }
             (place.normal[0], place.size[0], place.along, place.force[0]) = (normal, size, along, tau[j]);
             place.lead = (place.is_linear() || size.value() != 0.0).then_some(0);
+            if place.is_turned && !place.is_linear() {
+                (place.normal[0], place.size[0], place.force[0]) = (Complex::ZERO, T::ZERO, T::ZERO);
+                (place.along, place.lead) = (Complex::ZERO, None);
+            }
         }
     }
 
@@ -257,8 +263,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
     pub fn take<U: SeriesNumber>(&mut self, other: &FrictionSeries<U>) {
         copy(&mut self.lost, &other.lost);
         for (place, other) in self.places.iter_mut().zip(&other.places) {
-            let round = |x: &Complex<U>| Complex::new(T::of(x.re.value()), T::of(x.im.value()));
-            place.normal = other.normal.iter().map(round).collect();
+            place.size = other.size.iter().map(|size| T::of(size.value())).collect();
         }
     }
 }
@@ -339,34 +344,43 @@ impl<T: SeriesNumber> Series<T> {
         self.friction.as_ref().map_or(&[], |friction| &friction.lost)
     }
 
-    /// Powers of the force across every rail that slides, positive where the series begins \[N/s^m\].
-    pub fn across_rails(&self) -> impl Iterator<Item = Vec<f64>> {
+    /// Powers of the force that presses every hinge and rail that slides, negative from where it passes zero
+    /// \[N/s^m\].
+    pub fn pressing(&self) -> impl Iterator<Item = Vec<f64>> {
         let places = self.friction.iter().flat_map(|friction| &friction.places);
-        places.filter(|place| place.friction.normal == Normal::Rail).map(|place| {
-            let side = if place.along.re.value() < 0.0 { -1.0 } else { 1.0 };
-            place.normal.iter().map(|normal| side * normal.re.value()).collect()
-        })
+        let has_corner = |place: &&Sliding<T>| !matches!(place.friction.normal, Normal::Contact(_));
+        places.filter(has_corner).map(|place| place.size.iter().map(|size| size.value()).collect())
     }
 
-    /// Turns n of the rails whose N passes zero here, for an expansion anew; false where there are none.
-    /// `unit` is the mechanism's unit of time \[s\].
-    pub(super) fn turn_rails(&mut self, unit: f64) -> bool {
+    /// Marks the places whose N passes zero here, for an expansion anew; false where there are none.  `unit` is
+    /// the mechanism's unit of time \[s\].
+    pub(super) fn find_reversals(&mut self, unit: f64) -> bool {
         let mut is_any = false;
         for place in self.friction.iter_mut().flat_map(|friction| &mut friction.places) {
-            let power = |m: usize| place.normal.get(m).map_or(0.0, |normal| normal.re.value());
-            let (force, rate, bend) = (power(0), power(1), power(2));
-            let natural = if bend == 0.0 { unit } else { unit.min((rate / bend).abs()) };
-            let is_ahead = place.along.re.value() * rate < 0.0 && (force / rate).abs() < PASSED * natural;
-            if place.friction.normal == Normal::Rail && is_ahead {
-                place.is_turned = true;
-                is_any = true;
-            }
+            let power = |m: usize| {
+                place.normal.get(m).map_or([0.0; 2], |normal| [normal.re.value(), normal.im.value()])
+            };
+            let [force, rate, bend] = [power(0), power(1), power(2)];
+            place.is_turned = match place.friction.normal {
+                Normal::Contact(_) => false,
+                Normal::Rail => {
+                    let natural = if bend[0] == 0.0 { unit } else { unit.min((rate[0] / bend[0]).abs()) };
+                    let is_near = (force[0] / rate[0]).abs() < PASSED * natural;
+                    place.along.re.value() * rate[0] < 0.0 && is_near
+                }
+                // Powers beyond the second are those of the direction that rounding has left.
+                Normal::Joint(_) => {
+                    let [force, rate] = [force, rate].map(|[x, y]| libm::hypot(x, y));
+                    force != 0.0 && force < PASSED * unit * rate
+                }
+            };
+            is_any |= place.is_turned;
         }
         is_any
     }
 
-    /// Forgets which rails were turned.
-    pub(super) fn turn_back(&mut self) {
+    /// Forgets which places were marked.
+    pub(super) fn forget_reversals(&mut self) {
         let places = self.friction.iter_mut().flat_map(|friction| &mut friction.places);
         places.for_each(|place| place.is_turned = false);
     }

@@ -10,6 +10,7 @@ mod keep;
 mod motion;
 mod pair;
 mod precision;
+mod several;
 mod wall;
 
 pub use self::growth::{Forecast, forecast, planned};

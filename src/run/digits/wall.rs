@@ -1,5 +1,5 @@
 //! Walls met by a motion in many digits: the moment by Newton's iteration on the series of the gap, the jump
-//! by Newton's law of impact.
+//! by Newton's law of impact; at several walls at one moment see module `several`.
 //!
 //! ```text
 //! gap(t) = c + Σ_m t^m Σ_k Re(conj(g_k) z_k,m) = 0;      w⁺ = w⁻ - (1 + e) (g·w⁻) a / (g·a),   a = response to an impulse along g
@@ -9,6 +9,7 @@
 //! the length of a contact are not told from touching.
 
 use super::motion::Motion;
+use super::several::Meeting;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::{ConstraintEquation, Measure};
@@ -90,8 +91,13 @@ fn refined<const W: usize>(motion: &Motion<W>, powers: &[Digits<W>], mut t: Digi
     t.shortened(limbs)
 }
 
-/// The jump of the rates at a wall.
+/// The jump of the rates at a wall, and at all others that are met at the same moment.
 pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(), StepError> {
+    if let Some(meeting) = Meeting::at(motion, wall) {
+        let (change, pressing) = meeting.change(motion)?;
+        jump(motion, &change, pressing);
+        return Ok(());
+    }
     let state = motion.state.clone();
     let (phi, omega) = motion.bodies(state.t, &state.u, &state.rate);
     let n = phi.len();
@@ -112,22 +118,29 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
         let what = format!("the constraints leave the point no freedom at wall `{name}`");
         return Err(motion.stop(Cause::Unsuited, 0.0, &what, "move the wall"));
     }
-    let limbs = motion.precision.limbs;
-    let after: Vec<_> =
-        omega.iter().zip(&response).map(|(&w, &a)| (w + a * impulse).shortened(limbs)).collect();
+    let change: Vec<_> = response.iter().map(|&a| a * impulse).collect();
+    jump(motion, &change, 1);
+    Ok(())
+}
+
+/// Changes the rates of all coordinates by the impulses of so many walls.
+fn jump<const W: usize>(motion: &mut Motion<W>, change: &[Digits<W>], walls: u64) {
+    let (posture, limbs) = (motion.state_posture(), motion.precision.limbs);
+    let (phi, omega) = (&posture.phi, &posture.omega);
+    let z = motion.mechanism.elements(phi);
+    let after: Vec<_> = omega.iter().zip(change).map(|(&w, &change)| (w + change).shortened(limbs)).collect();
     let energy = |omega: &[Digits<W>]| {
-        let [kinetic, potential] = motion.mechanism.energy(&phi, omega, &z);
+        let [kinetic, potential] = motion.mechanism.energy(phi, omega, &z);
         kinetic + potential
     };
-    motion.state.impact_energy += energy(&after) - energy(&omega);
+    motion.state.impact_energy += energy(&after) - energy(omega);
     let independent = motion.mechanism.partition.independent.clone();
-    let has_all = motion.state.rate.len() == n;
+    let has_all = motion.state.rate.len() == phi.len();
     for (c, rate) in motion.state.rate.iter_mut().enumerate() {
         let k = if has_all { c } else { independent[c] };
         *rate += after[k] - omega[k];
     }
-    motion.state.impacts += 1;
+    motion.state.impacts += walls;
     // The next series is another one.
     motion.state.radius = None;
-    Ok(())
 }

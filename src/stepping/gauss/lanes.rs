@@ -206,13 +206,16 @@ impl Step<'_> {
             statistics.evaluations += self.tableau.nodes.len() as u64;
             self.restage::<L>(state);
             idle = if self.scratch.falls() { 0 } else { idle + 1 };
-            let is_over =
-                idle == IDLE_SWEEPS || self.scratch.is_within(if self.exact > 0 { NEARLY } else { 0.0 });
             sizes[iteration % 5] = self.scratch.size_of_change();
             let (now, before) = (sizes[iteration % 5], sizes[(iteration + 1) % 5]);
             // Over four iterations, because coordinates and momenta take turns, and well above rounding; the
             // first iterations are still finding their direction.
             let contraction = (now / before).sqrt().sqrt();
+            if idle == IDLE_SWEEPS && contraction < self.slow && self.scratch.goes_on(self.angles) {
+                idle = 0;
+            }
+            let is_over =
+                idle == IDLE_SWEEPS || self.scratch.is_within(if self.exact > 0 { NEARLY } else { 0.0 });
             let is_slow = now > NOISE && (is_over || iteration >= EARLY && contraction > self.slow);
             if is_slow && !self.scratch.is_sweeping && self.differentiate(problem, state, statistics) {
                 return false;

@@ -1,9 +1,10 @@
 //! One substep of RATTLE: its unknowns and how they are moved.
 
+mod coupling;
 mod velocity;
+use self::coupling::Couplings;
 use super::newton::{Matrix, project};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::constraint::Measure;
 use crate::dynamics::natural::{Demand, Guide, Natural};
 use crate::dynamics::tree::size;
 use crate::dynamics::{Form, State, Time};
@@ -64,6 +65,8 @@ pub struct Work {
     plain_demand: Vec<Demand<f64>>,
     /// C_t of the guides at `here`.
     drive: Vec<f64>,
+    /// What is left of gears and cams.
+    couplings: Couplings,
     /// mu (R).
     multiplier: Vec<f64>,
     /// mu at the beginning of the iterations (R).
@@ -116,8 +119,7 @@ impl Work {
         self.drive.resize(guides, 0.0);
         natural.scales(&mut self.scales);
         self.length = natural.mechanism().units.length;
-        let of =
-            |guide: &Guide| if matches!(guide.measure, Measure::Angle { .. }) { 1.0 } else { self.length };
+        let of = |guide: &Guide| if guide.is_in_radians { 1.0 } else { self.length };
         self.unit.clear();
         self.unit.resize(rows - guides, 1.0);
         self.unit.extend(natural.guides().iter().map(of));
@@ -142,6 +144,7 @@ impl Work {
             self.work_integral = state.unknown(4 * n);
         }
         self.ask(natural, state.time);
+        self.count_turns(natural);
         self.unit_vectors::<N, GUIDED>(natural);
         if state.memory.len() == self.multiplier.len() {
             self.multiplier.copy_from_slice(&state.memory);
@@ -183,6 +186,9 @@ impl Work {
         self.settle::<N, GUIDED>(natural, h)?;
         self.work_integral::<GUIDED>(h);
         self.turn::<N, GUIDED>(natural, h)?;
+        if GUIDED {
+            self.count_turns(natural);
+        }
         self.unit_vectors::<N, GUIDED>(natural);
         self.solve_velocity::<N, GUIDED>(natural, h)?;
         self.kick::<N, false>(h);
@@ -205,6 +211,7 @@ impl Work {
             *demand = guide.demand(t);
             *plain = demand.plain();
         }
+        self.couple(t);
     }
 
     /// z0 + h v0, and by how much it violates the constraints at time `end`: in plain doubles, since the last
@@ -356,6 +363,7 @@ impl Work {
                 change[bodies + r] =
                     offset[bodies + r] + (linear + push * guide.square(demand, acceleration));
             }
+            self.coupled_residuals(natural, push, 1.0 / push);
         }
     }
 
@@ -384,6 +392,7 @@ impl Work {
         {
             guide.gradient(demand, &self.here, gradient);
         }
+        self.coupled_gradients(natural);
     }
 
     /// v += h/2 a and, where `DRIFT`, the predicted end with it by h times the very same change: with h²/2

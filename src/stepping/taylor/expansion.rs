@@ -263,10 +263,10 @@ impl<T: Coefficient> Expansion<T> {
         }
     }
 
-    /// Of `h` \[s\] what comes before the force across a rail that slides passes zero.
+    /// Of `h` \[s\] what comes before the force that presses a hinge or rail that slides passes zero.
     pub fn until_reversal(&self, h: f64) -> f64 {
         let mut found = Found::Nothing;
-        for mut powers in self.series.across_rails() {
+        for mut powers in self.series.pressing() {
             let scale = powers.iter().rev().fold(0.0, |sum: f64, power| sum * h + power.abs());
             if !(scale > 0.0 && scale.is_finite()) {
                 continue;

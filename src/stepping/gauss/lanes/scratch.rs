@@ -87,6 +87,18 @@ impl Scratch {
         })
     }
 
+    /// True where the last changes are too large for the end of an iteration, which is to go on: earlier ones
+    /// were small by accident, as from next to rest, where coordinates and momenta take turns at it.
+    #[cold]
+    pub(super) fn goes_on(&mut self, angles: usize) -> bool {
+        self.judge();
+        let is_open = self.unsettled(angles).is_some();
+        if is_open {
+            self.least.copy_from_slice(&self.change);
+        }
+        is_open
+    }
+
     /// Keeps what convergence is judged by.
     pub(super) fn judge(&mut self) {
         self.rest.copy_from_slice(&self.change);

@@ -30,7 +30,9 @@ impl Work {
             for (r, guide) in natural.guides().iter().enumerate() {
                 change[bodies + r] = guide.value(&self.demand[r], predicted).hi * per_push;
             }
+            self.coupled_residuals(natural, 0.0, per_push);
         }
+        let change = &mut self.change[..rows];
         for (row, change) in change.iter().enumerate() {
             let is_kept = change.abs() <= KEPT * per_push * self.unit[row];
             if !is_kept {
@@ -133,6 +135,7 @@ impl Work {
                     *minv_jt = w.iter().zip(gradient).fold(Complex::ZERO, |sum, (w, &g)| sum + times(w, g));
                 }
             }
+            self.coupled_drives(natural);
         }
     }
 
@@ -166,6 +169,7 @@ impl Work {
                 let direct: f64 = gradient.iter().zip(free).map(|(gradient, free)| gradient.dot(*free)).sum();
                 self.multiplier[bodies + r] = direct + slip.value() * (2.0 / h);
             }
+            self.coupled_rates(natural, 2.0 / h);
         }
         let (multiplier, schur, pivot) = (&mut self.multiplier[..rows], &mut self.schur, &mut self.pivot);
         if GUIDED {

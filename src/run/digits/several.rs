@@ -1,0 +1,200 @@
+//! Impacts at several walls at one moment in many digits: their impulses are found together, by Poisson's law.
+//!
+//! ```text
+//! v⁺ = v⁻ + A n,   A = G M⁻¹ Gᵀ with the constraints kept
+//! least_i <= n_i,  0 <= v⁺_i,  (n_i - least_i) v⁺_i = 0      compression  least = 0;   expansion  least_i = e_i n_i of the compression
+//! ```
+//!
+//! The complementarity problem of both phases as in doubles (`dynamics::friction::simultaneous`), without
+//! friction: every set of walls that press is looked at, in the same order; equations and signs are in all
+//! digits.  Walls whose point does not approach have no restitution.
+
+use super::motion::Motion;
+use crate::arithmetic::digits::Digits;
+use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::constraint::Measure;
+use crate::dynamics::kernel::dot;
+use crate::stepping::{Cause, StepError};
+
+/// Walls that are taken at once.
+const MOST: usize = 12;
+/// Part of the bits carried that a gap has to be zero in, of what touches; and velocities and impulses, of what
+/// does not move or press.
+const SURE: f64 = 0.75;
+
+/// What the walls that touch do to each other.
+pub(super) struct Meeting<const W: usize> {
+    /// Their numbers.
+    pub walls: Vec<usize>,
+    /// G, wall by wall.
+    gradients: Vec<Vec<Digits<W>>>,
+    /// v⁻ \[m/s\].
+    velocity: Vec<Digits<W>>,
+    /// log2 of the part of a number that is rounding.
+    rounding: f64,
+}
+
+impl<const W: usize> Meeting<W> {
+    /// The walls that touch at the impact of one of them; `None` where that is the only one that is approached.
+    pub fn at(motion: &Motion<W>, wall: usize) -> Option<Self> {
+        if motion.mechanism.walls.len() < 2 {
+            return None;
+        }
+        let rounding = -SURE * motion.precision.bits as f64;
+        let posture = motion.state_posture();
+        let z = motion.mechanism.elements(&posture.phi);
+        let touches = |&other: &usize| {
+            let gap = motion.mechanism.walls[other].0.gap(&z).abs();
+            let length = motion.mechanism.structure.contacts[other].length;
+            other == wall || gap.log2() - libm::log2(length) < rounding
+        };
+        let walls: Vec<usize> = (0..motion.mechanism.walls.len()).filter(touches).collect();
+        let gradient = |&wall: &usize| {
+            let mut gradient = vec![Digits::ZERO; posture.phi.len()];
+            if let Measure::Place(place) = &motion.mechanism.walls[wall].0.measure {
+                place.slopes(&z, |k, slope| gradient[k] += slope);
+            }
+            gradient
+        };
+        let gradients: Vec<_> = walls.iter().map(gradient).collect();
+        let velocity: Vec<_> = gradients.iter().map(|gradient| dot(gradient, &posture.omega)).collect();
+        let still = largest(&velocity) + rounding;
+        let approached = velocity.iter().filter(|v| **v < Digits::ZERO && v.log2() > still).count();
+        (approached > 1).then_some(Self { walls, gradients, velocity, rounding })
+    }
+
+    /// The change of the rates, and how many of the walls press.
+    ///
+    /// # Errors
+    /// No impulses fit.
+    pub fn change(&self, motion: &mut Motion<W>) -> Result<(Vec<Digits<W>>, u64), StepError> {
+        let names: Vec<&str> =
+            self.walls.iter().map(|&wall| motion.mechanism.structure.contacts[wall].row.name()).collect();
+        let names = names.join(", ");
+        if self.walls.len() > MOST {
+            let what = format!("more than {MOST} walls are met at one moment: {names}");
+            return Err(motion.stop(Cause::Unsuited, 0.0, &what, "leave out walls that others imply"));
+        }
+        let (t, posture) = (motion.state().t, motion.state_posture());
+        let responses: Vec<Vec<Digits<W>>> = (self.gradients.iter())
+            .map(|gradient| {
+                let at = [&posture.phi[..], &posture.omega[..]];
+                motion.keeper.response(&motion.mechanism, t, at, gradient)
+            })
+            .collect();
+        let matrix: Vec<Vec<Digits<W>>> = (self.gradients.iter())
+            .map(|row| responses.iter().map(|response| dot(row, response)).collect())
+            .collect();
+        let still = largest(&self.velocity) + self.rounding;
+        let restitution = |(i, &wall): (usize, &usize)| {
+            let is_met = self.velocity[i] < Digits::ZERO && self.velocity[i].log2() > still;
+            if is_met { motion.mechanism.walls[wall].1 } else { Digits::ZERO }
+        };
+        let restitution: Vec<_> = self.walls.iter().enumerate().map(restitution).collect();
+        let problem = Problem { matrix, still, rounding: self.rounding };
+        let Some(impulses) = problem.impulses(&self.velocity, &restitution) else {
+            let what = format!("no impulses fit the law of impact at walls {names}");
+            return Err(motion.stop(Cause::Unsuited, 0.0, &what, "move one of the walls"));
+        };
+        let mut change = vec![Digits::ZERO; posture.omega.len()];
+        for (response, &impulse) in responses.iter().zip(&impulses) {
+            change.iter_mut().zip(response).for_each(|(change, &a)| *change += a * impulse);
+        }
+        let least = largest(&impulses) + self.rounding;
+        let pressing = impulses.iter().filter(|impulse| impulse.log2() > least).count();
+        Ok((change, pressing as u64))
+    }
+}
+
+/// log2 of the largest of numbers.
+fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
+    numbers.iter().fold(f64::NEG_INFINITY, |most, number| most.max(number.log2()))
+}
+
+/// The complementarity problem.
+struct Problem<const W: usize> {
+    /// A \[1/kg\].
+    matrix: Vec<Vec<Digits<W>>>,
+    /// log2 of a velocity that is rounding.
+    still: f64,
+    rounding: f64,
+}
+
+impl<const W: usize> Problem<W> {
+    /// The impulses \[N·s\] of both phases.
+    fn impulses(&self, velocity: &[Digits<W>], restitution: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
+        let mut all = self.phase(velocity, &vec![Digits::ZERO; velocity.len()])?;
+        if restitution.iter().any(|e| !e.is_zero()) {
+            let least: Vec<_> = restitution.iter().zip(&all).map(|(&e, &n)| e * n).collect();
+            let second = self.phase(&self.after(velocity, &all), &least)?;
+            all.iter_mut().zip(second).for_each(|(all, more)| *all += more);
+        }
+        Some(all)
+    }
+
+    /// Velocities after impulses.
+    fn after(&self, velocity: &[Digits<W>], impulse: &[Digits<W>]) -> Vec<Digits<W>> {
+        self.matrix.iter().zip(velocity).map(|(row, &v)| v + dot(row, impulse)).collect()
+    }
+
+    /// The impulses of a phase from these velocities on, none below the least.
+    fn phase(&self, from: &[Digits<W>], least: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
+        (0..1_usize << from.len()).find_map(|free| {
+            let pressed: Vec<usize> = (0..from.len()).filter(|i| free >> i & 1 == 0).collect();
+            let impulse = self.pressed(from, least, &pressed)?;
+            let after = self.after(from, &impulse);
+            let push = largest(&impulse) + self.rounding;
+            let is_at_least =
+                |x: Digits<W>, least: Digits<W>, open: f64| x >= least || (least - x).log2() < open;
+            let fits = (0..from.len()).all(|i| {
+                is_at_least(impulse[i], least[i], push) && is_at_least(after[i], Digits::ZERO, self.still)
+            });
+            fits.then_some(impulse)
+        })
+    }
+
+    /// The impulses after which the points of these walls stand still, the others with the least; `None` where
+    /// there are none.
+    fn pressed(&self, from: &[Digits<W>], least: &[Digits<W>], pressed: &[usize]) -> Option<Vec<Digits<W>>> {
+        let mut impulse = least.to_vec();
+        pressed.iter().for_each(|&i| impulse[i] = Digits::ZERO);
+        let known = self.after(from, &impulse);
+        let mut left: Vec<_> = pressed.iter().map(|&i| -known[i]).collect();
+        let mut matrix: Vec<Vec<_>> =
+            pressed.iter().map(|&i| pressed.iter().map(|&j| self.matrix[i][j]).collect()).collect();
+        let size = matrix.iter().map(|row| largest(row)).fold(f64::NEG_INFINITY, f64::max);
+        let mut columns: Vec<usize> = (0..pressed.len()).collect();
+        let mut rank = 0;
+        // Elimination with exchange of rows and columns; what is left open is zero.
+        while rank < pressed.len() {
+            let entries = (rank..pressed.len()).flat_map(|i| (rank..pressed.len()).map(move |j| (i, j)));
+            let weight = |&(i, j): &(usize, usize)| matrix[i][j].log2();
+            let (i, j) = entries.max_by(|a, b| weight(a).total_cmp(&weight(b)))?;
+            if weight(&(i, j)) <= size + self.rounding {
+                break;
+            }
+            matrix.swap(rank, i);
+            left.swap(rank, i);
+            matrix.iter_mut().for_each(|row| row.swap(rank, j));
+            columns.swap(rank, j);
+            for other in rank + 1..pressed.len() {
+                let share = matrix[other][rank] / matrix[rank][rank];
+                for k in rank..pressed.len() {
+                    let part = share * matrix[rank][k];
+                    matrix[other][k] -= part;
+                }
+                let part = share * left[rank];
+                left[other] -= part;
+            }
+            rank += 1;
+        }
+        if left[rank..].iter().any(|left| left.log2() > self.still) {
+            return None;
+        }
+        for k in (0..rank).rev() {
+            let sum = (k + 1..rank).fold(left[k], |sum, j| sum - matrix[k][j] * impulse[pressed[columns[j]]]);
+            impulse[pressed[columns[k]]] = sum / matrix[k][k];
+        }
+        impulse.iter().all(|impulse| impulse.is_finite()).then_some(impulse)
+    }
+}

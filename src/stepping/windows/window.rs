@@ -1,0 +1,62 @@
+//! A window as the crate calls it.
+
+use super::super::interruption;
+use crate::arithmetic::{DoubleDouble, Scalar};
+use crate::dynamics::{OdeSystem, Time};
+use std::cell::RefCell;
+
+/// Rows in which less than this part of the window's time passes end it: the crate goes to and fro at a
+/// singularity, which may be one of a law that the motion has left before.
+const STALLED: (u64, f64) = (1000, 1e-3);
+
+/// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over
+/// their units.
+pub struct Window<'a, F: ?Sized> {
+    field: RefCell<&'a mut F>,
+    start: Time,
+    n: usize,
+    /// The units of the unknowns and of time, and room for the unknowns.
+    unit: &'a [f64],
+    time_unit: f64,
+    y: RefCell<Vec<f64>>,
+    /// Rows that may still be kept.
+    rows: usize,
+    /// Rows made, and the time of the last one that was looked at.
+    made: u64,
+    mark: f64,
+}
+
+impl<'a, F: OdeSystem + ?Sized> Window<'a, F> {
+    /// A window from a time on, in these units, that may keep so many rows.
+    pub fn new(field: &'a mut F, start: Time, unit: &'a [f64], rows: usize) -> Self {
+        let (n, time_unit) = (unit.len(), field.time_unit());
+        let y = RefCell::new(vec![0.0; n]);
+        Self { field: RefCell::new(field), start, n, unit, time_unit, y, rows, made: 0, mark: 0.0 }
+    }
+
+    /// The rate of scaled unknowns and time.
+    pub fn rate(&self, y: &[f64], rate: &mut [f64]) {
+        let mut unknowns = self.y.borrow_mut();
+        unknowns.iter_mut().zip(y).zip(self.unit).for_each(|((unknown, y), unit)| *unknown = y * unit);
+        self.field.borrow_mut().rhs(
+            self.start + DoubleDouble::of(y[self.n] * self.time_unit),
+            &unknowns,
+            &mut rate[..self.n],
+        );
+        rate.iter_mut().zip(self.unit).for_each(|(rate, unit)| *rate = *rate * self.time_unit / unit);
+        rate[self.n] = 1.0;
+    }
+
+    /// Counts a row; true where it was the last that may be kept, time hardly passes, or nobody waits for more.
+    pub fn is_full(&mut self, y: &[f64]) -> bool {
+        self.rows = self.rows.saturating_sub(1);
+        self.made += 1;
+        let mut is_stalled = false;
+        if self.made.is_multiple_of(STALLED.0) {
+            let time = y[self.n];
+            is_stalled = time - self.mark < STALLED.1 * time;
+            self.mark = time;
+        }
+        self.rows == 0 || is_stalled || interruption::is_asked()
+    }
+}
