@@ -48,6 +48,7 @@ mod impact;
 mod kinematics;
 mod latches;
 mod laws;
+mod laws_tangent;
 mod linkage_scenes;
 mod linkages;
 mod looped;

@@ -158,13 +158,16 @@ fn search(curve: &impl Curve, level: f64, from: f64, to: f64) -> (Option<f64>, u
     let mut parts = [(from, to); 40];
     let (mut count, mut seen) = (1, 0);
     let least = CLOSE * (to - from);
+    // What the curve was last, wherever it was not zero.
+    let mut side = 0.0_f64;
     while count > 0 {
         count -= 1;
         seen += 1;
         let (low, high) = parts[count];
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low));
-        match curve.about(centre, radius).tells(level, radius) {
-            Told::NoZero => {}
+        let part = curve.about(centre, radius);
+        match part.tells(level, radius) {
+            Told::NoZero => side = part.value - level,
             Told::Open if radius >= least && seen < MOST && count + 2 <= parts.len() => {
                 (parts[count], parts[count + 1]) = ((centre, high), (low, centre));
                 count += 2;
@@ -176,6 +179,11 @@ fn search(curve: &impl Curve, level: f64, from: f64, to: f64) -> (Option<f64>, u
                 if before != 0.0 && (before > 0.0) != (after > 0.0) {
                     return (Some(bracketed(curve, level, low, high, before > 0.0)), seen);
                 }
+                // Between two parts, it is passed where the sides differ.
+                if before == 0.0 && side < 0.0 && after > 0.0 {
+                    return (Some(low), seen);
+                }
+                side = [after, before, side].into_iter().find(|value| *value != 0.0).unwrap_or(0.0);
             }
         }
     }

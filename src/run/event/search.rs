@@ -20,6 +20,10 @@ const SLOPE: f64 = 1e-3;
 const LEAVES: f64 = 1e-5;
 /// Share of the largest value within a step up to which a condition is at its zero where the step begins.
 const NO_VALUE: f64 = 1e-12;
+/// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a side, and
+/// the part of a step within which that is looked for: at a zero of a higher order it takes a while.
+const CLEAR: f64 = 10.0;
+const SOON: f64 = 1e-2;
 /// Steps of this share of the time are rounding.
 const INSTANT: f64 = 8.0 * f64::EPSILON;
 
@@ -28,6 +32,17 @@ pub(super) struct Passage {
     pub t: Time,
     pub event: usize,
     pub rises: bool,
+}
+
+/// Where a curve has left what it may be `off` by about its zero, from `share` on; `share` itself where that is not
+/// soon.
+fn clear(curve: &Chebyshev, share: f64, off: f64) -> f64 {
+    let is_clear = |at: &f64| *at >= 1.0 || curve.at(*at)[0].abs() > CLEAR * off;
+    let mut ahead =
+        std::iter::successors(Some(0.0), |&step| Some(if step == 0.0 { SAME } else { 4.0 * step }))
+            .take_while(|&step| step < SOON)
+            .map(|step| share + step);
+    ahead.find(is_clear).unwrap_or(share)
 }
 
 impl EventDetector {
@@ -75,6 +90,7 @@ impl EventDetector {
                     all.push(Passage { t: begin, event, rises: !mode });
                 }
             }
+            let is_condition = matches!(self.owner(event), Owner::Condition(..));
             let side = &mut self.memory.sides[event];
             if mode.is_none() && first == 0.0 && *side != 0 && sign(next) == -*side {
                 all.push(Passage { t: begin, event, rises: *side < 0 });
@@ -90,7 +106,11 @@ impl EventDetector {
                 *side = sign(curve.at(share)[0]);
             }
             while let Some(zero) = root(curve, 0.0, share, 1.0) {
-                share = zero + SAME;
+                share = if is_condition {
+                    clear(curve, zero + SAME, self.resolved * curve.most())
+                } else {
+                    zero + SAME
+                };
                 let after = sign(curve.at(share.min(1.0))[0]);
                 // At the very end of a step what follows is not known: it is on the other side.
                 *side = if after == 0 || share >= 1.0 { -*side } else { after };

@@ -29,6 +29,21 @@ fn the_first_of_several_zeros_is_found() {
     assert_eq!(crossing(&[1e-3, -0.5, 0.5 * 0.5 / 4e-3 + 1.0], 1.0), Crossing::Nothing);
 }
 
+/// A zero of order three in the middle of the step, where it is halved and the value is exactly zero.
+#[test]
+fn zeros_between_two_parts_are_found() {
+    for place in [0.25, 0.5, 0.75] {
+        for factor in [1.0, -1.0] {
+            let powers = through(&[place; 3], factor);
+            let found = root(&Powers { powers: &powers, end: 1.0 }, 0.0, 0.0, 1.0);
+            assert!(found.is_some_and(|t| (t - place).abs() < 1e-5), "{place} {factor}: {found:?}");
+        }
+        // Touched, not passed.
+        let powers = through(&[place; 2], -1.0);
+        assert_eq!(root(&Powers { powers: &powers, end: 1.0 }, 0.0, 0.0, 1.0), None);
+    }
+}
+
 #[test]
 fn where_rounding_is_all_there_is_signs_tell_and_few_parts_are_looked_at() {
     for (roots, level, falls) in
