@@ -17,9 +17,6 @@ use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 
 /// Largest order there is room for.
 const MOST: usize = 24;
-/// Vectors of eight integrated in step with each other: while one waits for its newest coefficients, the
-/// other keeps the multipliers busy, as the halves of eight lanes in two vectors do.
-const TEAMS: usize = 2;
 /// Largest number of bodies.
 const BODIES: usize = 4;
 
@@ -145,12 +142,7 @@ impl<const N: usize> WideCode for Integration<'_, '_, N> {
 
     #[inline(always)]
     fn run<W: EightLanes>(self) {
-        let Self { batch, members, until, watch } = self;
-        if W::VECTORS == 1 && members.len() > LANES {
-            integrate::<W, N, TEAMS>(batch, members, until, watch);
-        } else {
-            integrate::<W, N, 1>(batch, members, until, watch);
-        }
+        integrate::<W, N>(self.batch, self.members, self.until, self.watch);
     }
 }
 
@@ -376,27 +368,23 @@ impl<const N: usize> Team<N> {
 }
 
 #[inline(always)]
-fn integrate<W: EightLanes, const N: usize, const T: usize>(
+fn integrate<W: EightLanes, const N: usize>(
     batch: &Batch,
     members: &mut [BatchMember],
     until: Time,
     watch: &mut dyn FnMut(usize, &Passage) -> Going,
 ) {
-    let mut teams: Box<[Team<N>; T]> = Box::new(std::array::from_fn(|_| Team::new(batch.order, until)));
+    let mut team = Box::new(Team::<N>::new(batch.order, until));
     let mut waiting = 0;
     loop {
-        for team in teams.iter_mut() {
-            team.fill(batch, members, &mut waiting, until);
-        }
-        if teams.iter().all(Team::is_idle) {
+        team.fill(batch, members, &mut waiting, until);
+        if team.is_idle() {
             return;
         }
-        expand::<W, N, T>(&mut teams, batch.order);
-        for team in teams.iter_mut() {
-            let taken = team.choose_steps(batch.order);
-            finish::<W, N>(team, batch.order, &taken);
-            team.arrive(batch.order, members, until, watch);
-        }
+        expand::<W, N>(&mut team, batch.order);
+        let taken = team.choose_steps(batch.order);
+        finish::<W, N>(&mut team, batch.order, &taken);
+        team.arrive(batch.order, members, until, watch);
     }
 }
 

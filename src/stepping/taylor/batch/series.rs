@@ -7,26 +7,22 @@ use crate::arithmetic::sincos;
 
 /// Expands all lanes to an order.
 #[inline(always)]
-pub(super) fn expand<W: EightLanes, const N: usize, const T: usize>(teams: &mut [Team<N>; T], order: usize) {
-    let mut products = [[[W::ZERO; N]; 2]; T];
-    for (team, f) in teams.iter_mut().zip(&mut products) {
-        for i in 0..N {
-            let ([high, other_high], [low, other_low]) =
-                (load::<W>(&team.high[0][i]).halves(), load::<W>(&team.low[0][i]).halves());
-            let (s, c) = sincos::sin_cos::<W::Half>(high, low);
-            let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
-            let (s, c) = (W::join([s, other_s]), W::join([c, other_c]));
-            let power = &mut team.powers[0];
-            (power.c[i], power.s[i], power.v[i]) = (store(c), store(s), team.high[1][i]);
-            let v = load::<W>(&team.high[1][i]);
-            (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
-        }
-        invert::<W, N>(team);
+pub(super) fn expand<W: EightLanes, const N: usize>(team: &mut Team<N>, order: usize) {
+    let mut f = [[W::ZERO; N]; 2];
+    for i in 0..N {
+        let ([high, other_high], [low, other_low]) =
+            (load::<W>(&team.high[0][i]).halves(), load::<W>(&team.low[0][i]).halves());
+        let (s, c) = sincos::sin_cos::<W::Half>(high, low);
+        let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
+        let (s, c) = (W::join([s, other_s]), W::join([c, other_c]));
+        let power = &mut team.powers[0];
+        (power.c[i], power.s[i], power.v[i]) = (store(c), store(s), team.high[1][i]);
+        let v = load::<W>(&team.high[1][i]);
+        (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
     }
+    invert::<W, N>(team);
     for k in 0..order {
-        for (team, f) in teams.iter_mut().zip(&mut products) {
-            raise::<W, N>(team, f, k);
-        }
+        raise::<W, N>(team, &mut f, k);
     }
 }
 
