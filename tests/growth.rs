@@ -14,11 +14,11 @@ use driftless::scene::{Scene, parse_scene};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-fn number(name: &str, usual: u64) -> u64 {
+pub(crate) fn number(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
-fn request(until: f64, every: f64) -> Request {
+pub(crate) fn request(until: f64, every: f64) -> Request {
     let method = Some("taylor".parse().expect("a method"));
     Request {
         method,
@@ -68,20 +68,20 @@ fn apart(ruler: &DistanceMetric, ahead: &Motion, behind: &Motion, size: f64, rat
     positions.chain(rates).map(|off| 0.5 * off / size).collect()
 }
 
-fn norm(vector: &[f64]) -> f64 {
+pub(crate) fn norm(vector: &[f64]) -> f64 {
     vector.iter().map(|entry| entry * entry).sum::<f64>().sqrt()
 }
 
 /// What a comparison came to: the ratio of the flow's size to that of neighbours, at each time, and how far
 /// they are apart as vectors.
-struct Compared {
-    ratios: Vec<[f64; 2]>,
-    lost: Option<String>,
-    steps: u64,
+pub(crate) struct Compared {
+    pub ratios: Vec<[f64; 2]>,
+    pub lost: Option<String>,
+    pub steps: u64,
 }
 
 /// The flow of a scene against neighbours on both sides, at so many times, as long as these are neighbours.
-fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
+pub(crate) fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
     let mechanism = compile(scene);
     let start = mechanism.start(scene);
     let plan = Plan::new(scene, &mechanism, &request(until, until)).map_err(|refusal| refusal.to_string())?;
@@ -129,7 +129,7 @@ fn compared(scene: &Scene, until: f64, rows: u32) -> Result<Compared, String> {
 }
 
 /// The largest deviation of the ratios from one.
-fn most_off(compared: &Compared) -> f64 {
+pub(crate) fn most_off(compared: &Compared) -> f64 {
     compared.ratios.iter().map(|ratio| ratio[0].max(1.0 / ratio[0])).fold(1.0, f64::max)
 }
 
@@ -205,7 +205,7 @@ fn events(scene: &Scene, until: f64) {
         .for_each(|hold| println!("  hold from {} s to {:?}, {}", hold.t, hold.until, hold.wall));
 }
 
-fn text(scene: &str) -> Scene {
+pub(crate) fn text(scene: &str) -> Scene {
     parse_scene(scene, "text.json", &[]).expect("a scene")
 }
 

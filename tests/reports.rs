@@ -34,6 +34,7 @@ mod digits_program;
 mod estimates;
 mod fuzz;
 mod growth;
+mod growth_events;
 mod inputs;
 mod joint_forces;
 mod resume;

@@ -127,12 +127,11 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             ));
         }
         MethodId::Taylor if plan.in_double_double => {
-            let (order, tolerance) = (order_in_double_double(tolerance.relative), tolerance.relative);
-            exact(mechanism, start, order, tolerance)
+            let order = plan.order.unwrap_or_else(|| order_in_double_double(tolerance.relative));
+            exact(mechanism, start, order, tolerance.relative)
         }
         MethodId::Taylor => {
-            let mut taylor = Taylor::new(tolerance);
-            taylor.extended = plan.extended;
+            let taylor = plan.series(tolerance);
             match plan.stabilization {
                 Stabilization::None if mechanism.constraints.is_empty() && mechanism.frictions.is_empty() => {
                     driver(sized!(n, eliminated(mechanism)), taylor, start)

@@ -169,7 +169,15 @@ impl ContactDriver {
         if let Some(jumps) = &self.jumps {
             let (mechanism, off) = (Arc::clone(&self.mechanism), self.off.clone());
             let switch = Some(Switch { at, keeps_values, off });
-            jumps.push(Jump { contact: None, is_shared: false, switch, before, after, mechanism });
+            jumps.push(Jump {
+                contact: None,
+                is_shared: false,
+                switch,
+                friction: None,
+                before,
+                after,
+                mechanism,
+            });
         }
         self.meet(outcome)
     }

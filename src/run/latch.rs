@@ -141,7 +141,7 @@ fn residuals(mechanism: &Mechanism, motion: &Motion) -> Vec<f64> {
 }
 
 /// Rates after all rows have taken hold, their impulses, and the work of motors and walls \[J\].
-fn plastic(mechanism: &Mechanism, motion: &Motion) -> Option<(Vec<f64>, Vec<f64>, f64)> {
+pub(super) fn plastic(mechanism: &Mechanism, motion: &Motion) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     let [phi, omega] = [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
     let metric = Metric::at(mechanism, motion.time, &phi, &omega)?;
     let before = metric.velocity(&omega);

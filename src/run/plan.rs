@@ -17,7 +17,7 @@ use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::{Mechanism, Stiffness, Time};
 use crate::scene::Scene;
-use crate::stepping::Tolerance;
+use crate::stepping::{Taylor, Tolerance};
 
 /// What the user asked for; `None` leaves it to the plan.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -63,6 +63,9 @@ pub struct Plan {
     pub extended: bool,
     /// All of the series in double-double, as references are.
     pub in_double_double: bool,
+    /// The order of the series, where it is not that of its tolerance.
+    #[serde(default)]
+    pub order: Option<usize>,
     /// Evaluations allowed, expansions of a series counted alike: a run that needs more stops.
     pub max_evaluations: u64,
     /// Horizon \[s\].
@@ -119,7 +122,7 @@ impl Plan {
     #[must_use]
     pub fn integrated_by(mut self, integrator: Custom) -> Self {
         (self.method, self.step, self.why) = (MethodId::Custom, None, None);
-        (self.extended, self.in_double_double) = (false, false);
+        (self.extended, self.in_double_double, self.order) = (false, false, None);
         self.integrator = Some(integrator);
         self
     }
@@ -193,6 +196,7 @@ impl Plan {
             time_constant: request.time_constant,
             extended,
             in_double_double: false,
+            order: None,
             max_evaluations,
             until,
             every,
@@ -219,6 +223,7 @@ impl Plan {
             time_constant: None,
             extended: false,
             in_double_double: false,
+            order: None,
             max_evaluations: usual_max_evaluations(MethodId::Taylor, until),
             until,
             every: until,
@@ -229,6 +234,16 @@ impl Plan {
             notes: Vec::new(),
             integrator: None,
         }
+    }
+
+    /// The series of this plan in doubles.
+    pub(super) fn series(&self, tolerance: Tolerance) -> Taylor<f64> {
+        let mut series = match self.order {
+            Some(order) => Taylor::with_order(tolerance.relative.min(tolerance.absolute), order),
+            None => Taylor::new(tolerance),
+        };
+        series.extended = self.extended;
+        series
     }
 
     /// The same to a later horizon \[s\], with the same output times up to the former one; false, and nothing
@@ -260,6 +275,7 @@ impl Plan {
         numbers.into_iter().all(positive)
             && tolerances
             && given
+            && self.order.is_none_or(|order| (8..=64).contains(&order))
             && is_known
             && rows(self.until, self.every) == self.rows as f64
     }

@@ -159,7 +159,7 @@ impl ContactDriver {
     pub(super) fn tell_impact(&self, contact: Option<usize>, is_shared: bool, before: Motion, after: Motion) {
         if let Some(jumps) = &self.jumps {
             let mechanism = Arc::clone(&self.mechanism);
-            jumps.push(Jump { contact, is_shared, switch: None, before, after, mechanism });
+            jumps.push(Jump { contact, is_shared, switch: None, friction: None, before, after, mechanism });
         }
     }
 
@@ -209,7 +209,15 @@ impl ContactDriver {
             .collect();
         let (staying, modes) = self.friction_modes(staying, &still, transition, outcome)?;
         let is_same = staying == self.mechanism.held && modes == self.mechanism.modes;
-        if is_same { Ok(()) } else { self.switch(staying, modes, outcome) }
+        if is_same {
+            return Ok(());
+        }
+        self.switch(staying, modes, outcome)?;
+        let place = transition.arrived.or(transition.breaks.map(|(place, _)| place));
+        if let (Some(jumps), Some(place)) = (&self.jumps, place) {
+            jumps.at_friction(place);
+        }
+        Ok(())
     }
 
     /// Goes on with these contacts held, and the places with friction in these modes.
@@ -248,6 +256,7 @@ impl ContactDriver {
                 contact: None,
                 is_shared: false,
                 switch: None,
+                friction: None,
                 before,
                 after: motion.clone(),
                 mechanism: Arc::clone(&self.mechanism),

@@ -13,6 +13,8 @@ pub(in crate::run) struct Jump {
     pub is_shared: bool,
     /// The change by an event.
     pub switch: Option<Switch>,
+    /// The place with friction that begins to stick or to slide, at the zero of its event function.
+    pub friction: Option<usize>,
     /// The motion on both sides.
     pub before: Motion,
     pub after: Motion,
@@ -48,6 +50,13 @@ impl JumpLog {
     pub fn push(&self, jump: Jump) {
         if jump.switch.is_none() || self.has_switches {
             self.list.lock().unwrap_or_else(PoisonError::into_inner).push(jump);
+        }
+    }
+
+    /// Tells that the last one is a transition of a place with friction.
+    pub fn at_friction(&self, place: usize) {
+        if let Some(last) = self.list.lock().unwrap_or_else(PoisonError::into_inner).last_mut() {
+            last.friction = Some(place);
         }
     }
 

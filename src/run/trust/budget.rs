@@ -20,7 +20,7 @@ pub const GRACE: [f64; 2] = [20e6, 50e6];
 /// rounding.
 pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];
 /// The same of the tangent flow from Jacobians, and from series on dual numbers.
-pub const FLOW: [[f64; 2]; 2] = [[0.5, 200e3], [0.15, 120e3]];
+pub const FLOW: [[f64; 2]; 2] = [[0.5, 200e3], [0.15, 60e3]];
 
 /// The same where the estimate is to be had at all costs: thirty times the run's work, and five seconds that
 /// nobody asks after.
@@ -69,8 +69,8 @@ impl Prices {
             }
             let tolerance = plan.tolerance.unwrap_or_default();
             let order = match plan.in_double_double {
-                true => order_in_double_double(tolerance.relative),
-                false => Taylor::new(tolerance).order,
+                true => plan.order.unwrap_or_else(|| order_in_double_double(tolerance.relative)),
+                false => plan.series(tolerance).order,
             } as f64;
             let wide = match plan.extended {
                 _ if plan.in_double_double => WIDE,

@@ -2,6 +2,7 @@
 
 use super::Level;
 use crate::dynamics::Mechanism;
+use crate::run::build::order_in_double_double;
 use crate::run::methods::MethodId;
 use crate::run::plan::Plan;
 use crate::stepping::composition::Composition;
@@ -9,6 +10,9 @@ use crate::stepping::{Taylor, Tolerance};
 
 /// The reference solution's tolerance over the run's.
 const FINER: f64 = 100.0;
+/// The least order of reference solutions in double-double: where a run has few steps those beside it end
+/// where its own do, and of the same order they would have the same error.
+const ORDER: usize = 24;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
 /// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of
@@ -124,6 +128,7 @@ fn series(
     let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
     let mut plan = Plan::of_series(mechanism, tolerance, run.until);
     (plan.extended, plan.in_double_double) = (extended, in_double_double);
+    plan.order = in_double_double.then(|| order_in_double_double(tolerance.relative).max(ORDER));
     let digits = match (in_double_double, extended) {
         (true, _) => " in double-double",
         (_, true) => ", first orders in double-double",

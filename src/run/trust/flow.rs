@@ -44,7 +44,7 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
     contact_driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     let begin = contact_driver.motion();
     let mut tangent = Tangent::new(contact_driver.holding(), &begin, plan.until)?;
-    let jumps = JumpLog::default();
+    let jumps = JumpLog::with_switches();
     contact_driver.jumps = Some(jumps.clone());
     let moment = |motion: Motion, tangent: &Tangent| Moment {
         motion,

@@ -49,7 +49,9 @@ impl Nature {
         let moves =
             mechanism.constraints.iter().filter_map(|row| row.law.as_ref()).any(|law| !law.is_constant());
         let pushes = mechanism.actions.iter().any(|action| action.law.is_some());
-        Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes, rate: tangent.rate() }
+        // Branches that laws stay on are states as well.
+        let remembers = mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.switches());
+        Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes && !remembers, rate: tangent.rate() }
     }
 
     /// The growth that a history of times \[s\] and logarithms shows.

@@ -82,17 +82,12 @@ impl ReferenceRun {
     /// Why there can be none.
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
         let (mut contact_driver, outcome) = contact_driver(mechanism, series, start)?;
-        let begun = match series.method {
-            MethodId::Taylor => {
-                Tangent::new(&Arc::clone(contact_driver.holding()), &contact_driver.motion(), series.until)
-            }
-            _ => Err("the reference solution is no series".into()),
-        };
-        let (tangent, no_growth) = match begun {
+        let motion = contact_driver.motion();
+        let (tangent, no_growth) = match Tangent::new(contact_driver.holding(), &motion, series.until) {
             Ok(tangent) => (Some(tangent), None),
             Err(why) => (None, Some(why)),
         };
-        contact_driver.jumps = tangent.is_some().then(JumpLog::default);
+        contact_driver.jumps = tangent.is_some().then(JumpLog::with_switches);
         let (is_rounded, begun) = (is_rounded(series), start.time.hi);
         Ok(Self {
             contact_driver,
@@ -114,7 +109,7 @@ impl ReferenceRun {
         let motion = self.motion.clone();
         let mechanism = &self.contact_driver.acting(mechanism);
         (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
-        self.contact_driver.jumps = self.tangent.is_some().then(JumpLog::default);
+        self.contact_driver.jumps = self.tangent.is_some().then(JumpLog::with_switches);
         (self.is_rounded, self.begun, self.last) =
             (is_rounded(&series), motion.time.hi, Statistics::default());
         Ok(())
@@ -146,12 +141,12 @@ impl ReferenceRun {
         };
         let tangent = match path {
             None => None,
-            Some(path) => match Tangent::resume(mechanism, path) {
+            Some(path) => match Tangent::resume(contact_driver.holding(), path) {
                 None => return Ok(None),
                 tangent => tangent,
             },
         };
-        contact_driver.jumps = tangent.is_some().then(JumpLog::default);
+        contact_driver.jumps = tangent.is_some().then(JumpLog::with_switches);
         let is_rounded = is_rounded(&outcome.plan);
         let motion = contact_driver.motion();
         Ok(Some(Self { contact_driver, outcome, motion, tangent, no_growth: None, is_rounded, begun, last }))
@@ -226,10 +221,6 @@ impl ReferenceRun {
             return Err(None);
         }
         self.contact_driver.look(&mut self.motion);
-        if self.tangent.is_some() && self.contact_driver.changes > 0 {
-            self.no_growth = Some("an event switched a law or a part, which is not followed".into());
-            self.end_flow();
-        }
         if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &self.contact_driver.jumps) {
             tangent.jump(&jumps.take());
         }

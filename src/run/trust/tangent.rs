@@ -75,6 +75,8 @@ pub(super) struct Path {
     state: State,
     step: f64,
     held: Vec<usize>,
+    /// Motors and locks that engaged on the way, by row.
+    engaged: Vec<usize>,
     /// Degrees of freedom at the start.
     freedom: usize,
     /// About the fastest rate \[rad/s\]: what rates are divided by to be compared with angles.

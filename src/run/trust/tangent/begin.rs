@@ -28,24 +28,29 @@ impl Tangent {
     }
 
     fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, is_exact: bool) -> Result<Self, String> {
-        if !mechanism.frictions.is_empty() {
-            return Err("small differences are not followed through the transitions of dry friction".into());
+        if mechanism.vibration.is_some() || mechanism.has_aims() {
+            return Err("the mean force of a vibration, and forces that depend on accelerations, have no tangent flow".into());
         }
         let mut tangent = Self::bare(mechanism)?;
         let f = tangent.weights.len();
         let state = tangent.problem.state(motion);
         let rows = tangent.ground.as_mut().map_or(0, |ground| ground.stand(mechanism, &state));
-        let freedom = f.saturating_sub(rows);
+        // Neighbours stick at other places.
+        let sticking = mechanism.sticking();
+        let freedom = (f + sticking).saturating_sub(rows);
         if freedom == 0 {
             return Err("the motors leave no freedom: neighbouring motions are the same".into());
         }
-        let is_whole = (is_exact || f <= WHOLE) && tangent.ground.is_none() && mechanism.contacts.is_empty();
+        // What switches may tie coordinates later.
+        let is_free = tangent.ground.is_none() && mechanism.contacts.is_empty() && !mechanism.is_switched();
+        let is_whole = (is_exact || f <= WHOLE) && is_free;
         let is_plain = is_whole
             && !is_exact
             && mechanism.constraints.is_empty()
             && !mechanism.is_forced()
             && gauss::is_slow(mechanism);
-        let count = if is_whole || freedom <= WHOLE { 2 * freedom } else { VECTORS };
+        let all = (2 * freedom).saturating_sub(sticking);
+        let count = if is_whole || freedom <= WHOLE { all } else { VECTORS };
         tangent.path = Path {
             freedom,
             is_whole,
@@ -117,18 +122,13 @@ impl Tangent {
         })
     }
 
-    /// Goes on from a path; `None` where it cannot be one of this mechanism, which is given without holds.
+    /// Goes on from a path; `None` where it cannot be one of this mechanism, in which all acts and is held as
+    /// at the end of the path.
     pub(in crate::run::trust) fn resume(mechanism: &Arc<Mechanism>, path: Path) -> Option<Self> {
-        let is_known = |&contact: &usize| contact < mechanism.contacts.len();
-        if !path.held.iter().all(is_known) {
+        if path.held != mechanism.held {
             return None;
         }
-        let holding = if path.held.is_empty() {
-            Arc::clone(mechanism)
-        } else {
-            Arc::new(mechanism.holding(&path.held))
-        };
-        let mut tangent = Self::bare(&holding).ok()?;
+        let mut tangent = Self::bare(mechanism).ok()?;
         let (f, dimension) = (tangent.weights.len(), tangent.problem.dimension());
         let count = path.columns.len();
         let fits = path.state.y.len() == dimension
@@ -147,6 +147,7 @@ impl Tangent {
             return None;
         }
         tangent.path = path;
+        tangent.hold_engaged();
         tangent.make_room();
         tangent.evaluate();
         if tangent.path.lost.is_none() {

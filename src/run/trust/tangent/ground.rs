@@ -22,6 +22,8 @@ pub struct Ground {
     omega: Vec<Number>,
     z: Vec<Complex<Number>>,
     gradient: Vec<Number>,
+    /// Rows that took hold where the motion was, as neighbours do where they are: motors and locks that engaged.
+    pub engaged: Vec<usize>,
 }
 
 impl Ground {
@@ -35,6 +37,7 @@ impl Ground {
             omega: room(),
             z: vec![Complex::ZERO; n],
             gradient: room(),
+            engaged: Vec::new(),
         }
     }
 
@@ -67,10 +70,12 @@ impl Ground {
         [positions, rates]: [&[f64]; 2],
     ) {
         let n = mechanism.coordinates();
+        // What sticks does so where neighbours are, too.
+        let sticking = mechanism.constraints.len() - mechanism.sticking();
         for r in 0..mechanism.constraints.len() {
             let moved = positions.get(r).copied().unwrap_or(0.0);
-            self.kernel.multiplier[r] =
-                self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]) + moved;
+            let left = self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]) + moved;
+            self.kernel.multiplier[r] = if r >= sticking || self.engaged.contains(&r) { 0.0 } else { left };
         }
         self.shift(&mut column[..n]);
         self.rates(mechanism, state, column);

@@ -1,18 +1,28 @@
-//! Small differences through an impact: neighbours meet the wall earlier or later, by the saltation matrix.
+//! Small differences through an impact, an event that switches parts and branches, and the transitions of dry
+//! friction: neighbours come there earlier or later, by the saltation matrix.
 //!
 //! ```text
-//! dt = -dg / g'⁻,     dq = dq⁻ + q'⁻ dt,   dw = dw⁻ + a⁻ dt       at the wall;      w⁺ = I(t, q, w⁻)
-//! dq⁺ = dq - q'⁺ dt,      dw⁺ = dI(dt, dq, dw) - a⁺ dt                     a⁺ with what is held from then on
+//! dt = -dg / g'⁻,     dq = dq⁻ + q'⁻ dt,   dw = dw⁻ + a⁻ dt       at the zero of g;      w⁺ = I(t, q, w⁻)
+//! dq⁺ = dq - q'⁺ dt,      dw⁺ = dI(dt, dq, dw) - a⁺ dt                     a⁺ with what acts, sticks and is held from then on
 //! ```
+//!
+//! g is the gap of a wall, the event function of a switch, or that of a place with friction: the relative
+//! velocity of what slides, `(mu0 N)² - tau²` of what sticks.  I is the law of impact, or what a joint that
+//! closes does to the rates.
 //!
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
 //! Solitons & Fractals 5 (1995).
 
-use super::Tangent;
+use super::{Path, Tangent};
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::Posture;
+use crate::dynamics::friction::Mode;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Coordinates, Mechanism, Motion};
-use crate::run::contact::{Jump, check_alone};
+use crate::run::contact::{Jump, Switch, check_alone, in_modes};
+use crate::run::event::SwitchFunction;
+use crate::run::friction::FrictionWatch;
+use crate::run::latch::plastic;
 use std::sync::Arc;
 
 /// Normal velocity over that of the point's parts below which a wall is grazed, and neighbours may miss it.
@@ -28,16 +38,76 @@ struct Side {
 }
 
 impl Side {
+    /// The motion itself as a column.
+    fn ahead(&self) -> Vec<f64> {
+        [&self.omega[..], &self.acceleration[..]].concat()
+    }
+
+    /// The derivative of a function of the motion along a column, and `late` \[s\]; `None` where there is no
+    /// such function.
+    fn slope(
+        &self,
+        motion: &Motion,
+        column: &[f64],
+        late: f64,
+        value: &dyn Fn(&Motion) -> Option<Vec<f64>>,
+    ) -> Option<Vec<f64>> {
+        let n = self.phi.len();
+        let most = size(&column[..n], &self.phi).max(size(&column[n..], &self.omega)).max(late.abs());
+        let small = if most > 0.0 { DIFFERENCE / most } else { 1.0 };
+        let beside = |sign: f64| {
+            let moved = |from: &[f64], by: &[f64]| -> Vec<DoubleDouble> {
+                from.iter().zip(by).map(|(x, y)| DoubleDouble::from(x + sign * small * y)).collect()
+            };
+            let mut moved = Motion {
+                phi: moved(&self.phi, &column[..n]),
+                omega: moved(&self.omega, &column[n..]),
+                ..motion.clone()
+            };
+            moved.time = motion.time + sign * small * late;
+            value(&moved)
+        };
+        let (ahead, behind) = (beside(1.0)?, beside(-1.0)?);
+        Some(ahead.iter().zip(behind).map(|(ahead, behind)| (ahead - behind) / (2.0 * small)).collect())
+    }
+
     fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
-        let [phi, omega] =
-            [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
+        let [phi, omega] = plain(motion);
         let mut kernel = Kernel::<f64>::new(mechanism);
         kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
         Self { acceleration: kernel.load, phi, omega }
     }
 }
 
+/// The largest entry over the size of what it changes.
+fn size(of: &[f64], from: &[f64]) -> f64 {
+    of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())))
+}
+
+impl Path {
+    /// Takes the motors and locks that have engaged between two mechanisms.
+    fn engage(&mut self, [before, after]: [&Mechanism; 2]) {
+        let acts = |mechanism: &Mechanism, r: usize| {
+            mechanism.constraints.get(r).is_some_and(|row| !row.coordinates().is_empty())
+        };
+        self.engaged.retain(|&r| acts(after, r));
+        for r in 0..after.standing_rows() {
+            let may = after.switches.clutches.contains(&after.constraints[r].name);
+            if may && acts(after, r) && !acts(before, r) && !self.engaged.contains(&r) {
+                self.engaged.push(r);
+            }
+        }
+    }
+}
+
 impl Tangent {
+    /// Tells the constraints which of them have engaged on the way.
+    pub(super) fn hold_engaged(&mut self) {
+        if let Some(ground) = &mut self.ground {
+            ground.engaged.clone_from(&self.path.engaged);
+        }
+    }
+
     /// Takes impacts, holds and releases on the way to [`Tangent::next`], in their order.
     pub(in crate::run) fn jump(&mut self, jumps: &[Jump]) {
         for jumps in jumps.chunk_by(|one, other| one.before.time == other.before.time) {
@@ -59,10 +129,16 @@ impl Tangent {
             return self.lose(&why);
         }
         if !Arc::ptr_eq(&last.mechanism, &self.mechanism) {
+            let mut path = std::mem::take(&mut self.path);
+            path.engage([&self.mechanism, &last.mechanism]);
             match Self::bare(&last.mechanism) {
-                Ok(other) => *self = Self { path: std::mem::take(&mut self.path), ..other },
-                Err(why) => return self.lose(&why),
+                Ok(other) => *self = Self { path, ..other },
+                Err(why) => {
+                    self.path = path;
+                    return self.lose(&why);
+                }
             }
+            self.hold_engaged();
             self.path.held.clone_from(&self.mechanism.held);
         }
         if self.coordinates == Coordinates::Independent {
@@ -83,23 +159,65 @@ impl Tangent {
     }
 }
 
-/// Takes columns of all coordinates and rates through what happens at one moment to a mechanism with the
-/// contacts held before it.
+/// Takes columns of all coordinates and rates through what happens at one moment to a mechanism with what acts
+/// and is held before it.
 ///
-/// What is held or let go with an impact comes earlier or later with it; what is held is put on its wall
-/// afterwards.
+/// What is held or let go with it comes earlier or later as well; what is held is put on its wall afterwards.
 ///
 /// # Errors
 /// Why neighbours do not go the same way.
-fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Result<(), String> {
-    let Some((contact, struck)) = jumps.iter().find_map(|jump| Some((jump.contact?, jump))) else {
-        return Ok(());
-    };
+fn cross(mechanism: &Arc<Mechanism>, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Result<(), String> {
     check_alone(jumps)?;
+    let is_cause = |jump: &&Jump| jump.contact.is_some() || jump.switch.is_some() || jump.friction.is_some();
+    let (Some(cause), Some(last)) = (jumps.iter().find(is_cause), jumps.last()) else { return Ok(()) };
+    if jumps.iter().filter(|jump| jump.switch.is_some()).count() > 1 {
+        return Err(
+            "several events happen at once, which neighbouring motions meet one after the other".into()
+        );
+    }
+    let here = Side::new(mechanism, &cause.before);
+    let there = Side::new(&last.mechanism, &last.after);
+    let late = match cause {
+        Jump { contact: Some(contact), .. } => late_at_wall(mechanism, *contact, cause, &here, columns)?,
+        Jump { switch: Some(switch), .. } => late_at_switch(mechanism, switch, cause, &here, columns)?,
+        Jump { friction, .. } => late_at_friction(mechanism, *friction, cause, &here, columns)?,
+    };
+    for (column, late) in columns.iter_mut().zip(late) {
+        shift(column, late, &here);
+        for jump in jumps {
+            if let Some(contact) = jump.contact {
+                impact_at(jump, contact, late, column)?;
+            }
+            if jump.switch.is_some() && jump.before.omega != jump.after.omega {
+                close_at(jump, late, column)?;
+            }
+        }
+        shift(column, -late, &there);
+    }
+    Ok(())
+}
+
+/// Takes a column to a moment so much later \[s\].
+fn shift(column: &mut [f64], late: f64, side: &Side) {
+    let n = side.phi.len();
+    for k in 0..n {
+        column[k] += late * side.omega[k];
+        column[n + k] += late * side.acceleration[k];
+    }
+}
+
+/// How much later \[s\] a point meets its wall, column by column.
+fn late_at_wall(
+    mechanism: &Mechanism,
+    contact: usize,
+    struck: &Jump,
+    here: &Side,
+    columns: &[Vec<f64>],
+) -> Result<Vec<f64>, String> {
     let n = mechanism.coordinates();
-    let here = Side::new(mechanism, &struck.before);
-    let there = jumps.last().map(|last| Side::new(&last.mechanism, &last.after));
-    let Some(there) = there else { return Ok(()) };
+    if !mechanism.frictions.is_empty() && !mechanism.held.is_empty() {
+        return Err("an impact beside a contact with dry friction is not followed".into());
+    }
     let touched = &mechanism.contacts[contact];
     let mut gradient = vec![0.0; n];
     let z = mechanism.elements(&here.phi);
@@ -112,50 +230,109 @@ fn cross(mechanism: &Mechanism, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Res
     if approach >= -GRAZED * touched.step_size(&here.omega) {
         return Err("a point grazes a wall, which neighbouring motions may miss".into());
     }
-    for column in columns {
-        let late = -dot(&gradient, &column[..n]) / approach;
-        for k in 0..n {
-            column[k] += late * here.omega[k];
-            column[n + k] += late * here.acceleration[k];
-        }
-        for jump in jumps {
-            if let Some(contact) = jump.contact {
-                impact_at(jump, contact, late, column)?;
-            }
-        }
-        for k in 0..n {
-            column[k] -= late * there.omega[k];
-            column[n + k] -= late * there.acceleration[k];
-        }
-    }
-    Ok(())
+    Ok(columns.iter().map(|column| -dot(&gradient, &column[..n]) / approach).collect())
 }
 
-/// The derivative of an impact, along a column and `late` \[s\], by differences.
+/// How much later \[s\] an event happens that switches parts or branches, column by column.
+fn late_at_switch(
+    mechanism: &Mechanism,
+    switch: &Switch,
+    cause: &Jump,
+    here: &Side,
+    columns: &[Vec<f64>],
+) -> Result<Vec<f64>, String> {
+    if !switch.keeps_values {
+        return Err("an event sets parameters or the motion, which is not followed".into());
+    }
+    let value = |motion: &Motion| {
+        let laws = mechanism.laws.as_ref()?;
+        mechanism.seen(motion, |at| match switch.at {
+            SwitchFunction::Event(number) => {
+                Some(vec![laws.formulas.event_value(number, at, &laws.parameters)])
+            }
+            SwitchFunction::Condition(number) => {
+                let values = laws.formulas.condition_values(at, &laws.parameters, &laws.modes);
+                values.get(number).map(|&value| vec![value])
+            }
+            SwitchFunction::Other => None,
+        })
+    };
+    late_at_zero(cause, here, columns, &value)
+}
+
+/// How much later \[s\] a place with friction begins to stick or to slide, column by column.
+fn late_at_friction(
+    mechanism: &Arc<Mechanism>,
+    place: Option<usize>,
+    cause: &Jump,
+    here: &Side,
+    columns: &[Vec<f64>],
+) -> Result<Vec<f64>, String> {
+    let watch = FrictionWatch::new(mechanism);
+    let value = |motion: &Motion| {
+        let values = watch.as_ref()?.values(motion);
+        Some(vec![*values.get(place?)?])
+    };
+    late_at_zero(cause, here, columns, &value)
+}
+
+/// How much later \[s\] a function of the motion is zero, column by column.
+fn late_at_zero(
+    cause: &Jump,
+    here: &Side,
+    columns: &[Vec<f64>],
+    value: &dyn Fn(&Motion) -> Option<Vec<f64>>,
+) -> Result<Vec<f64>, String> {
+    let slope = |column: &[f64], late: f64| {
+        here.slope(&cause.before, column, late, value)
+            .map(|slope| slope[0])
+            .ok_or("what happens here is not known to the scene")
+    };
+    let rate = slope(&here.ahead(), 1.0)?;
+    if rate == 0.0 || !rate.is_finite() {
+        return Err("an event function only touches zero, which neighbouring motions may miss".into());
+    }
+    columns.iter().map(|column| Ok(-slope(column, 0.0)? / rate)).collect()
+}
+
+/// The derivative of an impact, along a column and `late` \[s\].
 fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Result<(), String> {
-    let n = column.len() / 2;
-    let [phi, omega] =
-        [&jump.before.phi, &jump.before.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<_>>());
-    let size = |of: &[f64], from: &[f64]| {
-        of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())))
+    // Friction in hinges and sliders takes no part in impacts.
+    let open = vec![Mode::Open; jump.mechanism.frictions.len()];
+    let striking = in_modes(&jump.mechanism, &jump.mechanism.held, &open);
+    let rates = |motion: &Motion| {
+        let [phi, omega] = plain(motion);
+        striking.impact_at(contact, motion.time, &phi, &omega).map(|impact| impact.omega)
     };
-    let most = size(&column[..n], &phi).max(size(&column[n..], &omega));
-    if most == 0.0 {
-        return Ok(());
-    }
-    let small = DIFFERENCE / most;
-    let beside = |sign: f64| {
-        let moved = |from: &[f64], by: &[f64]| {
-            from.iter().zip(by).map(|(x, y)| x + sign * small * y).collect::<Vec<_>>()
-        };
-        let t = jump.before.time + sign * small * late;
-        jump.mechanism.impact_at(contact, t, &moved(&phi, &column[..n]), &moved(&omega, &column[n..]))
-    };
-    let (Some(ahead), Some(behind)) = (beside(1.0), beside(-1.0)) else {
-        return Err("neighbouring motions have no way back from a wall".into());
-    };
-    for (k, entry) in column[n..].iter_mut().enumerate() {
-        *entry = (ahead.omega[k] - behind.omega[k]) / (2.0 * small);
-    }
-    Ok(())
+    change(jump, late, column, &rates)
+        .ok_or_else(|| "neighbouring motions have no way back from a wall".into())
+}
+
+/// The same of what closes or engages.
+fn close_at(jump: &Jump, late: f64, column: &mut [f64]) -> Result<(), String> {
+    let open = vec![Mode::Open; jump.mechanism.frictions.len()];
+    let closing = in_modes(&jump.mechanism, &jump.mechanism.held, &open);
+    let rates = |motion: &Motion| plastic(&closing, motion).map(|(rates, ..)| rates);
+    change(jump, late, column, &rates)
+        .ok_or_else(|| "what closes leaves neighbouring motions no rates".into())
+}
+
+/// The rates of a column after they have become others.
+fn change(
+    jump: &Jump,
+    late: f64,
+    column: &mut [f64],
+    rates: &dyn Fn(&Motion) -> Option<Vec<f64>>,
+) -> Option<()> {
+    let [phi, omega] = plain(&jump.before);
+    let n = phi.len();
+    let side = Side { acceleration: Vec::new(), phi, omega };
+    let after = side.slope(&jump.before, column, late, rates)?;
+    column[n..].copy_from_slice(&after);
+    Some(())
+}
+
+/// Coordinates and rates in plain doubles.
+fn plain(motion: &Motion) -> [Vec<f64>; 2] {
+    [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect())
 }
