@@ -138,9 +138,9 @@ fn an_aim_of_time_and_place_does_work() {
     }
 }
 
-#[test]
-fn corners_of_a_cam_are_switches() {
-    // Free-wheeling cam with a rise that begins smoothly at phi = 1: theta = max(phi - 1, 0)².
+/// Angle and rate at `until` \[s\] of a cam that wheels freely from angle 0 at 5 rad/s and rises smoothly from
+/// 1 rad on, theta = max(phi - 1, 0)².
+pub fn beyond_a_corner(until: f64) -> [f64; 2] {
     let f = |_: f64, phi: f64, omega: f64| {
         let rise = (phi - 1.0).max(0.0);
         let bend = if phi > 1.0 { 2.0 } else { 0.0 };
@@ -148,14 +148,19 @@ fn corners_of_a_cam_are_switches() {
             / (0.7 + 0.03 * 4.0 * rise * rise)
     };
     // To the corner and on from it.
-    let until = 0.6;
     let (mut low, mut high) = (0.0, until);
     for _ in 0..50 {
         let middle = 0.5 * (low + high);
         if integrated(f, [0.0, 5.0], middle, 4000)[0] < 1.0 { low = middle } else { high = middle }
     }
     let there = integrated(f, [0.0, 5.0], high, 4000);
-    let [phi, omega] = integrated(f, [1.0, there[1]], until - high, 4000);
+    integrated(f, [1.0, there[1]], until - high, 4000)
+}
+
+#[test]
+fn corners_of_a_cam_are_switches() {
+    let until = 0.6;
+    let [phi, omega] = beyond_a_corner(until);
     for request in methods() {
         let outcome =
             finished(&geared("max(bar.phi - 1, 0)^2", r#"{"phi": 0, "omega": 5}"#, until), &request);

@@ -1,7 +1,7 @@
 //! Gears and cams by RATTLE: against equations of one coordinate integrated in the test, and against the form in
 //! angles.
 
-use super::couplings::{geared, integrated};
+use super::couplings::{beyond_a_corner, geared, integrated};
 use super::formulas::{run, scene};
 use crate::common::compile;
 use driftless::arithmetic::Complex;
@@ -135,21 +135,8 @@ fn an_aim_of_time_and_place_does_work() {
 
 #[test]
 fn corners_of_a_cam_are_switches() {
-    // A rise that begins smoothly at phi = 1: theta = max(phi - 1, 0)².
-    let f = |_: f64, phi: f64, omega: f64| {
-        let rise = (phi - 1.0).max(0.0);
-        let bend = if phi > 1.0 { 2.0 } else { 0.0 };
-        (-2.0 * G * 0.5 * phi.cos() - 0.03 * 2.0 * rise * bend * omega * omega)
-            / (0.7 + 0.03 * 4.0 * rise * rise)
-    };
     let until = 0.6;
-    let (mut low, mut high) = (0.0, until);
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if integrated(f, [0.0, 5.0], middle, 4000)[0] < 1.0 { low = middle } else { high = middle }
-    }
-    let there = integrated(f, [0.0, 5.0], high, 4000);
-    let [phi, omega] = integrated(f, [1.0, there[1]], until - high, 4000);
+    let [phi, omega] = beyond_a_corner(until);
     let last =
         stepped(&geared("max(bar.phi - 1, 0)^2", r#"{"phi": 0, "omega": 5}"#, until), "rattle8", 128).last;
     near(last.phi[0], phi, 3e-9, "angle");
