@@ -2,8 +2,9 @@
 //!
 //! Plain arrays left to the compiler are not good enough for short dependent chains (1.5 to 3 times slower),
 //! so there is an explicit vector type for AVX with FMA, and a portable one for everything else.  Each
-//! operation is exactly rounded and [`Lanes::mul_add`] is *always* fused: where the processor has no such
-//! instruction it is computed in software, slowly but to the same bits.
+//! operation is exactly rounded and [`Arithmetic::mul_add`] is *always* fused: where the processor has no
+//! such instruction it is computed in software, slowly but to the same bits.  Eight doubles at once, in
+//! vectors of AVX-512 where there are, are in module [`wide`].
 //!
 //! A kernel is written once over [`Lanes`] and compiled twice: it is a piece of [`Code`], which [`run`]
 //! enters as compiled for the processor, where that has AVX and FMA, or as portable code.  `unsafe` is

@@ -32,7 +32,7 @@ pub struct Found {
 /// How a measurement ended.
 pub(super) enum Ended {
     /// At the horizon, with the plan as it was carried out.
-    Whole(Found, Plan),
+    Whole(Found, Box<Plan>),
     /// The method stopped on the way.
     Stopped(Found, StepError),
     /// Its time was over, at so many seconds of the motion.
@@ -92,7 +92,7 @@ pub(super) fn measure(
     found.energy = outcome.drift.energy.max;
     found.statistics = outcome.statistics;
     Ok(match outcome.stop {
-        None => Ended::Whole(found, plan),
+        None => Ended::Whole(found, Box::new(plan)),
         Some(stop) => Ended::Stopped(found, stop),
     })
 }

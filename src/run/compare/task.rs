@@ -287,7 +287,7 @@ impl Task<'_> {
                     measure::time(self.mechanism, self.start, &plan, Some(line.last), room, self.is_over);
                 entry.blocks.extend(block);
                 entry.found = Some(found);
-                entry.plan = Some(plan);
+                entry.plan = Some(*plan);
             }
         }
         (Some(entry), false)
