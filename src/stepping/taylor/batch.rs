@@ -234,7 +234,7 @@ impl<const N: usize> Team<N> {
         }
     }
 
-    /// Seats trajectories that wait in the lanes that are free.
+    /// Puts trajectories that wait into the free lanes.
     fn fill(&mut self, batch: &Batch, members: &mut [BatchMember], waiting: &mut usize, until: Time) {
         for lane in 0..LANES {
             if self.slots[lane].member.is_none() {
@@ -273,7 +273,7 @@ impl<const N: usize> Team<N> {
         taken
     }
 
-    /// Takes note of the steps just taken, and lets go whoever has arrived.
+    /// Records the steps just taken, and frees the lanes of trajectories that have ended.
     fn arrive(
         &mut self,
         order: usize,
@@ -310,7 +310,7 @@ impl<const N: usize> Team<N> {
         }
     }
 
-    /// Sits a trajectory down.
+    /// Puts a trajectory into a lane.
     fn slot(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
         let (tree, unit) = (&member.mechanism.tree, member.mechanism.units.time);
         let longest = batch.order as f64 / 3.0 / tree.fastest_rate(&[]);
