@@ -183,6 +183,20 @@ fn a_parameter_moves_every_formula_it_is_in() {
 }
 
 /// 0.64 kg·m² on a spring of 0.8 N·m: x = x0 cos(w t), w² = k/I.
+/// There are no coordinates left to integrate.
+#[test]
+fn what_is_driven_is_derived_by_its_law() {
+    let text = r#"{"name": "driven", "gravity": [9.81, 0],
+        "bars": [{"name": "bar", "length": 0.6, "width": 0.05, "thickness": 0.003, "density": 670}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "motors": [{"name": "motor", "body": "bar", "law": {"start": 0.5, "rate": 2.0}}],
+        "until": 3, "every": 0.5}"#;
+    let found =
+        derived(&template(text), &["bar.phi"], &["motors.motor.law.rate", "motors.motor.law.start"], 1.5);
+    assert_near(found.measures[0].slopes[0], 1.5, 1e-13, "rate");
+    assert_near(found.measures[0].slopes[1], 1.0, 1e-13, "start");
+}
+
 #[test]
 fn numbers_with_units_are_numbers() {
     let scene = template(

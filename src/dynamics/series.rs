@@ -192,7 +192,7 @@ impl<T: SeriesNumber> Series<T> {
 
     /// Expands up to another power of the rates from here on, at most the one there is room for.
     pub fn expand_up_to(&mut self, order: usize) {
-        self.order = order.min(self.rate.len() / self.partition.count().max(1) - 1);
+        self.order = order.min(self.omega.len() / self.elements - 1);
     }
 
     /// Number of coordinates f.
