@@ -143,50 +143,73 @@ fn trust(scene: &Scene, until: f64) -> Trust {
     integrate(run, &mut |_| Ok(())).expect("no observer fails").trust.expect("asked for")
 }
 
+/// What the ratios of random scenes come to.
+#[derive(Default)]
+pub(crate) struct Tally {
+    all: usize,
+    within: usize,
+    /// Scenes compared, those without a flow, and the seeds of those a hundred off.
+    scenes: usize,
+    without: usize,
+    far: Vec<u64>,
+}
+
+impl Tally {
+    /// Takes a scene, and prints it.
+    pub(crate) fn take(&mut self, seed: u64, kind: &str, found: Result<Compared, String>) {
+        let found = match found {
+            Ok(found) => found,
+            Err(why) => {
+                self.without += 1;
+                return println!("{seed}: {kind}: none: {}", why.lines().next().unwrap_or_default());
+            }
+        };
+        let most = most_off(&found);
+        let Compared { ratios, lost, steps } = found;
+        let vector = ratios.iter().fold(0.0, |most: f64, ratio| most.max(ratio[1]));
+        println!(
+            "{seed}: {kind}: {} points, ratio {most:.4}, apart {vector:.1e}, {steps} steps {}",
+            ratios.len(),
+            lost.unwrap_or_default()
+        );
+        self.scenes += usize::from(!ratios.is_empty());
+        self.all += ratios.len();
+        self.within += ratios.iter().filter(|ratio| ratio[0].max(1.0 / ratio[0]) < 3.0).count();
+        if most > 100.0 || most.is_nan() {
+            self.far.push(seed);
+        }
+    }
+
+    /// Asks for a factor of three in 95 %, never a hundred, and a comparison of one in `part` of `count` scenes.
+    pub(crate) fn judge(&self, count: u64, part: u64) {
+        let Self { all, within, scenes, without, far } = self;
+        println!(
+            "{within} of {all} within 3, {scenes} scenes compared, {without} without a flow, far off: {far:?}"
+        );
+        assert!(
+            *within as f64 >= 0.95 * *all as f64 && far.is_empty(),
+            "{within} of {all}, far off: {far:?}"
+        );
+        assert!(*scenes as u64 * part > count, "{scenes} of {count}");
+    }
+}
+
 /// Scenes of all kinds: within a factor of three in 95 %, and never a hundred off.
 #[test]
 fn growth_is_that_of_runs_from_neighbouring_starts() {
-    let (count, seed) = (number("COUNT", 25), number("SEED", 0));
-    let (mut all, mut within, mut without, mut compared_scenes) = (0, 0, 0, 0);
-    let mut worst = Vec::new();
-    for seed in seed..seed + count {
+    let (count, first) = (number("COUNT", 25), number("SEED", 0));
+    let mut tally = Tally::default();
+    for seed in first..first + count {
         let made = mechanisms::scene(seed);
         let scene = parse_scene(&made.text, "random.json", &[]).expect("a scene");
-        match compared(&scene, 10.0 * made.scales.time, 4) {
-            Err(why) => {
-                without += 1;
-                println!("{seed}: none: {}", why.lines().next().unwrap_or_default());
-            }
-            Ok(Compared { ratios, lost, steps }) => {
-                compared_scenes += usize::from(!ratios.is_empty());
-                if let Some(lost) = lost {
-                    println!("{seed}: lost: {lost}");
-                }
-                let off = |ratio: &[f64; 2]| ratio[0].max(1.0 / ratio[0]);
-                let most = ratios.iter().map(off).fold(1.0, f64::max);
-                if std::env::var("SHOW").is_ok() {
-                    println!("{}", made.text);
-                    events(&scene, 10.0 * made.scales.time);
-                }
-                let vector = ratios.iter().fold(0.0, |most: f64, ratio| most.max(ratio[1]));
-                all += ratios.len();
-                within += ratios.iter().filter(|ratio| off(ratio) < 3.0).count();
-                println!(
-                    "{seed}: {} points, ratio {most:.4}, apart {vector:.1e}, {steps} steps, {:?}",
-                    ratios.len(),
-                    made.kinds
-                );
-                if most > 100.0 || most.is_nan() {
-                    worst.push(seed);
-                }
-            }
+        let found = compared(&scene, 10.0 * made.scales.time, 4);
+        if found.is_ok() && std::env::var("SHOW").is_ok() {
+            println!("{}", made.text);
+            events(&scene, 10.0 * made.scales.time);
         }
+        tally.take(seed, &format!("{:?}", made.kinds), found);
     }
-    println!(
-        "{within} of {all} within 3, {compared_scenes} scenes compared, {without} without a flow, far off: {worst:?}"
-    );
-    assert!(within as f64 >= 0.95 * all as f64 && worst.is_empty(), "{within} of {all}, far off: {worst:?}");
-    assert!(compared_scenes as u64 * 3 > count, "{compared_scenes} of {count}");
+    tally.judge(count, 3);
 }
 
 /// Prints the impacts and holds of a scene.

@@ -5,7 +5,7 @@
 //! the first.
 
 use crate::common::{compile, shipped};
-use crate::growth::{Compared, compared, number, request, text};
+use crate::growth::{Tally, compared, most_off, number, request, text};
 use crate::mechanisms::Dice;
 use driftless::run::Plan;
 use driftless::run::trust::flow;
@@ -135,38 +135,12 @@ fn scene(seed: u64) -> (String, &'static str) {
 #[test]
 fn growth_through_events_is_that_of_runs_from_neighbouring_starts() {
     let (count, first) = (number("COUNT", 25), number("SEED", 0));
-    let (mut all, mut within, mut without, mut scenes) = (0, 0, 0, 0);
-    let mut far = Vec::new();
+    let mut tally = Tally::default();
     for seed in first..first + count {
         let (made, kind) = scene(seed);
-        match compared(&text(&made), 4.0, 6) {
-            Err(why) => {
-                without += 1;
-                println!("{seed}: {kind}: none: {}", why.lines().next().unwrap_or_default());
-            }
-            Ok(Compared { ratios, lost, steps }) => {
-                scenes += usize::from(!ratios.is_empty());
-                let off = |ratio: &[f64; 2]| ratio[0].max(1.0 / ratio[0]);
-                let most = ratios.iter().map(off).fold(1.0, f64::max);
-                let vector = ratios.iter().fold(0.0, |most: f64, ratio| most.max(ratio[1]));
-                println!(
-                    "{seed}: {kind}: {} points, ratio {most:.4}, apart {vector:.1e}, {steps} steps {}",
-                    ratios.len(),
-                    lost.unwrap_or_default()
-                );
-                all += ratios.len();
-                within += ratios.iter().filter(|ratio| off(ratio) < 3.0).count();
-                if most > 100.0 || most.is_nan() {
-                    far.push(seed);
-                }
-            }
-        }
+        tally.take(seed, kind, compared(&text(&made), 4.0, 6));
     }
-    println!(
-        "{within} of {all} within 3, {scenes} scenes compared, {without} without a flow, far off: {far:?}"
-    );
-    assert!(within as f64 >= 0.95 * all as f64 && far.is_empty(), "{within} of {all}, far off: {far:?}");
-    assert!(scenes as u64 * 2 > count, "{scenes} of {count}");
+    tally.judge(count, 2);
 }
 
 /// The shipped scenes with friction, corners and switches.
@@ -180,7 +154,7 @@ fn growth_is_right_on_shipped_scenes_with_events() {
         ("trebuchet", 2.0),
     ] {
         let found = compared(&shipped(name, &[]), until, 5).expect("a flow");
-        let most = found.ratios.iter().map(|ratio| ratio[0].max(1.0 / ratio[0])).fold(1.0, f64::max);
+        let most = most_off(&found);
         println!("{name}: {} points, {most:.4}, {} steps, {:?}", found.ratios.len(), found.steps, found.lost);
         assert!(most < 1.2 && !found.ratios.is_empty(), "{name}: {most}");
     }

@@ -29,7 +29,8 @@ impl Tangent {
 
     fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, is_exact: bool) -> Result<Self, String> {
         if mechanism.vibration.is_some() || mechanism.has_aims() {
-            return Err("the mean force of a vibration, and forces that depend on accelerations, have no tangent flow".into());
+            let why = "the mean force of a vibration, and motors whose aim depends on the mechanism";
+            return Err(format!("{why}, have no tangent flow"));
         }
         let mut tangent = Self::bare(mechanism)?;
         let f = tangent.weights.len();
