@@ -76,6 +76,7 @@ fn against(angle: f64, start: f64, restitution: f64) -> Scene {
         through: [0.0, 0.0],
         on: None,
         law: None,
+        aim: None,
         normal,
         restitution,
     });
@@ -93,6 +94,7 @@ fn on_a_floor(depth: f64, phi: [f64; 2], omega: [f64; 2]) -> Scene {
         through: [depth, 0.0],
         on: None,
         law: None,
+        aim: None,
         normal,
         restitution: 0.0,
     });

@@ -102,6 +102,7 @@ fn swinging(depth: f64) -> Scene {
         through: [0.0, 0.0],
         on: None,
         law: None,
+        aim: None,
         normal,
         restitution: 0.5,
     });

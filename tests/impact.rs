@@ -32,6 +32,7 @@ fn wall(name: &str, angle: f64, restitution: f64) -> Wall {
         through: [0.0, 0.0],
         normal,
         law: None,
+        aim: None,
         restitution,
     }
 }

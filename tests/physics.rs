@@ -33,6 +33,7 @@ mod doors;
 mod drift;
 mod events;
 mod extremes;
+mod falling_rod;
 #[cfg(feature = "fit")]
 mod fit;
 mod forces;
@@ -78,6 +79,7 @@ mod sensitivity;
 mod singular;
 mod spring_laws;
 mod stabilization;
+mod state_walls;
 mod stiff;
 mod switched_orders;
 mod tables;

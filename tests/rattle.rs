@@ -326,6 +326,7 @@ fn scenes_without_a_natural_form_are_refused_by_name() {
         through: [0.0, 0.0],
         on: None,
         law: None,
+        aim: None,
         normal: [1.0, 0.0],
         restitution: 0.5,
     };

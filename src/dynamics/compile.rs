@@ -15,7 +15,7 @@ use super::constraint::{self, ConstraintEquation, Site};
 use super::force::formula::{Driven, Formulas};
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
 use super::forest::Forest;
-use super::friction::{Friction, Mode, frictions};
+use super::friction::{Friction, Mode, check_lines, frictions};
 use super::impact::Contact;
 use super::output::Outputs;
 use super::partition::CoordinatePartition;
@@ -240,7 +240,7 @@ impl Mechanism {
         rows.extend(parts::rods(scene, &forest));
         let springs = parts::springs(scene, &forest);
         let torsions = parts::torsions(scene);
-        let contacts: Vec<Contact> = (scene.walls.iter())
+        let mut contacts: Vec<Contact> = (scene.walls.iter())
             .map(|wall| {
                 let normal = Complex::new(wall.normal[0], wall.normal[1]);
                 let (row, point) = along_wall(&forest, wall, normal, wall.law.clone());
@@ -251,7 +251,8 @@ impl Mechanism {
         let ground_energy =
             bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
         if let Some(Laws { formulas, parameters, modes }) = &laws {
-            give_aims(&mut rows, formulas.aims(parameters, modes)?);
+            give_aims(&mut rows, &mut contacts, formulas.aims(parameters, modes)?);
+            check_lines(&frictions, &contacts)?;
         }
         Ok(Self {
             ground_energy,
@@ -263,7 +264,7 @@ impl Mechanism {
             outputs: Outputs::of(scene, &forest)?.map(Arc::new),
             keeps_work: keeps_work
                 || !frictions.is_empty()
-                || contacts.iter().any(|contact| contact.row.law.is_some()),
+                || contacts.iter().any(|contact| contact.row.moves_by_time()),
             whole: None,
             integrals: scene.bars.len() - scene.own_bars(),
             bodies,
@@ -310,7 +311,9 @@ impl Mechanism {
                     law.profile = Some(profile);
                 }
             }
-            give_aims(&mut mechanism.constraints, laws.formulas.aims(&parameters, &modes)?);
+            let aims = laws.formulas.aims(&parameters, &modes)?;
+            give_aims(&mut mechanism.constraints, &mut mechanism.contacts, aims);
+            check_lines(&mechanism.frictions, &mechanism.contacts)?;
             (laws.parameters, laws.modes) = (parameters, modes);
             if laws.formulas.drives() {
                 mechanism.partition = mechanism.partition.renewed(&mechanism.constraints)?;

@@ -200,8 +200,11 @@ impl<const N: usize> OdeSystem for Elimination<N> {
             *z = dependent_angle.place(t, &y[..partition.count()]).unit;
         }
         partition.translations(y, &mut kernel.z);
+        for (phi, coordinate) in self.phi.iter_mut().zip(&partition.bodies) {
+            *phi = coordinate.base.map_or(0.0, |base| y[base]);
+        }
         for (gap, contact) in gaps.iter_mut().zip(&self.mechanism.contacts) {
-            *gap = contact.gap(t, &kernel.z);
+            *gap = contact.gap(t, &self.phi, &kernel.z);
         }
     }
 

@@ -23,9 +23,10 @@ pub mod simultaneous;
 
 pub use modes::{Moment, Paradox, Transition};
 
-use super::compile::Joint;
+use super::compile::{CompileError, Joint};
 use super::constraint::{self, ConstraintEquation, Measure, Posture};
 use super::forest::Forest;
+use super::impact::Contact;
 use super::kernel::{Kernel, dot};
 use super::law::Law;
 use super::{Mechanism, Time, tree};
@@ -130,6 +131,25 @@ pub(super) fn frictions(scene: &Scene, forest: &Forest, joints: &[Joint]) -> Vec
         Some(Friction { name: tangent.name.clone(), tangent, normal, kinetic, stiction, is_newton })
     };
     scene.frictions.iter().filter(|friction| friction.stiction > 0.0).filter_map(of).collect()
+}
+
+/// Refuses friction at walls whose lines move with the points that meet them: curves, along which it does not
+/// act.
+pub(super) fn check_lines(frictions: &[Friction], contacts: &[Contact]) -> Result<(), CompileError> {
+    let is_curve = |contact: &&Contact| {
+        let terms = contact.point.terms.iter().map(|term| term.0);
+        let own: Vec<usize> =
+            terms.chain(contact.point.shifts.iter().flat_map(|shift| [shift.0, shift.0 + 1])).collect();
+        contact.row.aim.as_ref().is_some_and(|aim| aim.coordinates().any(|k| own.contains(&k)))
+    };
+    let contact = |friction: &Friction| match friction.normal {
+        Normal::Contact(number) => contacts.get(number),
+        _ => None,
+    };
+    match frictions.iter().filter_map(contact).find(is_curve) {
+        Some(contact) => Err(CompileError::FrictionOnCurve(contact.row.name.clone())),
+        None => Ok(()),
+    }
 }
 
 impl Friction {

@@ -6,7 +6,8 @@
 //! |g''| <= Σ |g_k| (|phi_k''| + phi_k'²) + Σ |g_f| |zeta_f''| + |s''|
 //! ```
 //!
-//! Walls of bodies have products of elements beside, of which value and slope are known, and no bound.
+//! Walls of bodies have products of elements beside, of which value and slope are known, and no bound; of walls
+//! that move by a formula of places the value alone is known here.
 //!
 //! Derivatives may be by time or by anything that grows in proportion with it.
 
@@ -31,6 +32,9 @@ impl Contact {
         let Measure::Place(place) = &self.row.measure else { return None };
         if self.is_off {
             return Some([AWAY, 0.0, AWAY]);
+        }
+        if self.row.aim.is_some() {
+            return None;
         }
         let mut found = place.linear.iter().fold(
             [place.constant, 0.0, place.constant.abs()],
@@ -65,7 +69,7 @@ impl Contact {
         if self.is_off {
             return 0.0;
         }
-        if !place.bilinear.is_empty() {
+        if !place.bilinear.is_empty() || self.row.aim.is_some() {
             return f64::INFINITY;
         }
         let bend = place.linear.iter().fold(0.0, |sum, &(k, g)| {

@@ -33,7 +33,7 @@ pub const TOUCH: f64 = 2e-12;
 /// A wall as the mechanism meets it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
-    /// The gap and its Jacobian; its law is how far the wall has moved along its normal.
+    /// The gap and its Jacobian; its law or its aim is how far the wall has moved along its normal.
     pub row: ConstraintEquation,
     /// The point, seen from a point of the wall where that is on a body.
     pub point: Point,
@@ -61,29 +61,35 @@ impl Contact {
         Self { row, point, on: None, normal, restitution, length: 1.0, force: 1.0, is_off: false }
     }
 
-    /// The gap \[m\].
-    pub fn distance(&self, t: Time, z: &[Complex<f64>]) -> f64 {
-        match &self.row.law {
-            None => self.row.gap(z),
-            Some(law) => self.row.gap(z) - law.value::<f64>(t),
+    /// How far the wall has moved along its normal \[m\], at angles and translational coordinates `phi` and
+    /// elements `z`; `None` where it stays.
+    pub fn travel(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> Option<f64> {
+        match &self.row.aim {
+            None => self.row.law.as_ref().map(|law| law.value::<f64>(t)),
+            Some(aim) => Some(aim.value(t, phi, z)),
         }
     }
 
+    /// The gap \[m\].
+    pub fn distance(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> f64 {
+        let gap = self.row.gap(z);
+        self.travel(t, phi, z).map_or(gap, |travel| gap - travel)
+    }
+
     /// The gap over the length of the contact: the event function of a point that may meet its wall.
-    pub fn gap(&self, t: Time, z: &[Complex<f64>]) -> f64 {
-        if self.is_off { AWAY } else { self.distance(t, z) / self.length }
+    pub fn gap(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> f64 {
+        if self.is_off { AWAY } else { self.distance(t, phi, z) / self.length }
     }
 
     /// True where the point is on its wall, or behind it: by [`TOUCH`] of its length, or by the rounding of
     /// the gap at these elements.
-    pub fn touches(&self, t: Time, z: &[Complex<f64>]) -> bool {
-        let moved = self.row.law.as_ref().map_or(0.0, |law| law.value::<f64>(t).abs());
-        let size = magnitudes(&self.row, z) + moved;
-        self.gap(t, z) <= TOUCH.max(4.0 * f64::EPSILON * size / self.length)
+    pub fn touches(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> bool {
+        let size = magnitudes(&self.row, z) + self.travel(t, phi, z).map_or(0.0, f64::abs);
+        self.gap(t, phi, z) <= TOUCH.max(4.0 * f64::EPSILON * size / self.length)
     }
 
     /// The rate of the gap \[m/s\].
-    pub fn gap_rate(&self, t: Time, z: &[Complex<f64>], omega: &[f64]) -> f64 {
+    pub fn gap_rate(&self, t: Time, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> f64 {
         let rate = match (&self.row.measure, self.on) {
             (Measure::Place(place), Some(_)) => {
                 let mut rate = 0.0;
@@ -92,7 +98,11 @@ impl Contact {
             }
             _ => self.normal.dot(self.point.velocity(z, omega)),
         };
-        self.row.law.as_ref().map_or(rate, |law| rate - law.rates::<f64>(t).0)
+        match (&self.row.law, &self.row.aim) {
+            (_, Some(aim)) => rate - aim.rate(t, phi, z, omega),
+            (Some(law), None) => rate - law.rates::<f64>(t).0,
+            (None, None) => rate,
+        }
     }
 
     /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal

@@ -132,7 +132,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
         let n = size::<N>(mechanism.coordinates());
         self.kernel.unit_vectors::<N>(mechanism, &y[..n]);
         for (gap, contact) in gaps.iter_mut().zip(&mechanism.contacts) {
-            *gap = contact.gap(t, &self.kernel.z);
+            *gap = contact.gap(t, &y[..n], &self.kernel.z);
         }
         if !mechanism.held.is_empty() {
             self.kernel.accelerate::<N>(mechanism, t, &y[..n], &y[n..2 * n], Bias::default());

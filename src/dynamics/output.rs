@@ -200,7 +200,7 @@ impl Component {
 
 impl Quantity<Site> {
     fn value(&self, at: &Moment, seen: &Configuration<f64>, shared: &Shared) -> f64 {
-        let Moment { mechanism, time, omega, kernel, .. } = *at;
+        let Moment { mechanism, time, phi, omega, kernel, .. } = *at;
         let (z, alpha, forces) = (&kernel.z, &kernel.load, shared.forces);
         let row = |is_it: &dyn Fn(&ConstraintEquation) -> bool| {
             let number = mechanism.constraints[..mechanism.standing_rows()].iter().position(is_it)?;
@@ -256,7 +256,7 @@ impl Quantity<Site> {
             }
             Self::MovingGap(name) => {
                 let wall = mechanism.contacts.iter().find(|contact| contact.row.name == *name);
-                wall.map_or(f64::NAN, |contact| contact.distance(time, &kernel.z))
+                wall.map_or(f64::NAN, |contact| contact.distance(time, phi, &kernel.z))
             }
             Self::Wall(name) => {
                 let wall = mechanism.contacts.iter().position(|contact| contact.row.name == *name);

@@ -70,8 +70,8 @@ impl Drawing<'_> {
                 .scene
                 .walls
                 .iter()
-                // Drawn once for all poses: where it is at the start.
-                .filter(|wall| wall.on.is_none())
+                // Drawn once for all poses: where it is at the start; none that a body or a formula of places moves.
+                .filter(|wall| wall.on.is_none() && wall.aim.is_none())
                 .map(|wall| {
                     let moved = wall.law.as_ref().map_or(0.0, |law| law.at_start().phi);
                     let [x, y] = wall.through;

@@ -230,7 +230,7 @@ fn contacts(
 ) -> Vec<Contact> {
     let mut contacts = Vec::new();
     for (number, contact) in mechanism.contacts.iter().enumerate() {
-        let gap = contact.distance(start.time, &kernel.z);
+        let gap = contact.distance(start.time, phi, &kernel.z);
         let mut jacobian = vec![0.0; phi.len()];
         let at = Posture { phi, z: &kernel.z, omega: &omega };
         let drive = contact.row.differentiate(start.time, at, &mut jacobian).drive;

@@ -134,7 +134,7 @@ impl ContactDriver {
             }
         };
         let mut held = self.mechanism.held.clone();
-        held.retain(|&contact| !free.contacts[contact].is_off);
+        held.retain(|&contact| !free.contacts[contact].is_off && stays(&free, contact, &after));
         if let Err((what, hint)) = latch::close([&self.free, &free], &mut held, &mut after) {
             return Err(refused(self, what, hint));
         }
@@ -181,6 +181,20 @@ impl ContactDriver {
         }
         self.meet(outcome)
     }
+}
+
+/// Whether a point that is held is on its wall and moves with it; no longer where a corner or a parameter of
+/// the wall's law has moved it.
+fn stays(free: &Mechanism, contact: usize, motion: &Motion) -> bool {
+    let [phi, omega] =
+        [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+    let (contact, z) = (&free.contacts[contact], free.elements(&phi));
+    if !contact.row.moves() {
+        return true;
+    }
+    let speed = contact.step_size(&omega).max(contact.length / free.units.time);
+    contact.gap(motion.time, &phi, &z).abs() <= SATISFIED
+        && contact.gap_rate(motion.time, &phi, &z, &omega).abs() <= SATISFIED * speed
 }
 
 /// The constraint that a motion does not satisfy.

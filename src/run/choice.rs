@@ -191,7 +191,7 @@ fn chosen(
         return (classic, format!("the vibration of rigid spring {} acts by its mean force", vibration.name));
     }
     if mechanism.has_aims() && request.step.is_none() {
-        return (classic, "motors have aims that depend on the mechanism, kept by projection".into());
+        return (classic, "laws of motors or walls depend on where the mechanism is".into());
     }
     if request.step.is_some() {
         let why = if mechanism.has_closed_loops() {

@@ -56,7 +56,7 @@ pub(super) fn gap(contact: &Contact, angles: usize, t: f64, phi: &[f64]) -> (f64
         return (AWAY, 0.0);
     }
     let z = elements(angles, phi);
-    let moved = contact.row.law.as_ref().map_or(0.0, |law| law.value::<f64>(Time::of(t)));
+    let moved = contact.travel(Time::of(t), phi, &z).unwrap_or(0.0);
     let rounding = 16.0 * f64::EPSILON * (magnitudes(&contact.row, &z) + moved.abs()) / contact.length;
     let reach = contact.facing(contact.normal, &z).dot(contact.point.position(&z));
     let offset = if contact.on.is_some() { 0.0 } else { offset(contact) };
@@ -68,7 +68,8 @@ pub(super) fn gap_rate(contact: &Contact, angles: usize, t: f64, phi: &[f64], om
     if contact.is_off {
         return 0.0;
     }
-    (contact.velocity(contact.normal, &elements(angles, phi), omega) - contact.law_rate(t)) / contact.length
+    let z = elements(angles, phi);
+    (contact.velocity(contact.normal, &z, omega) - contact.own_rate(t, phi, &z, omega)) / contact.length
 }
 
 /// Whether an impact is what Newton's law of impact makes of the motion before it; else what is wrong.
@@ -87,10 +88,10 @@ pub(super) fn check(
         return Err(format!("the point is {:.2e} m from the wall at the impact", gap * contact.length));
     }
     let (here, slips) = (Sides::new(mechanism, before, after), slips(mechanism, before, after));
-    let [approach, departure] =
-        [&before.omega, &after.omega].map(|omega| contact.normal_velocity(before.time.hi, &here.z, omega));
-    let step_size = contact.law_rate(before.time.hi).abs()
-        + contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
+    let [(approach, own), (departure, _)] =
+        [before, after].map(|motion| contact.normal_velocity(before.time.hi, &here.z, motion));
+    let step_size =
+        own.abs() + contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
     let friction = mechanism.friction_at(claim.contact);
     let is_poisson = friction.is_some_and(|friction| !friction.is_newton);
     let speed_error = departure + contact.restitution * approach;
@@ -209,9 +210,12 @@ fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
 }
 
 impl Contact {
-    /// Velocity of the point along the normal, seen from the wall \[m/s\].
-    fn normal_velocity(&self, t: f64, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> f64 {
-        self.velocity(self.normal, z, omega).hi - self.law_rate(t)
+    /// Velocity of the point along the normal, seen from the wall, and that of the wall \[m/s\].
+    fn normal_velocity(&self, t: f64, z: &[Complex<DoubleDouble>], motion: &Motion) -> (f64, f64) {
+        let [phi, omega] =
+            [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+        let own = self.own_rate(t, &phi, &elements(self.angles(), &phi), &omega);
+        (self.velocity(self.normal, z, &motion.omega).hi - own, own)
     }
 
     /// The same along the wall, the normal turned clockwise.
@@ -231,9 +235,19 @@ impl Contact {
         self.on.map_or(own, |body| own + facing.left().dot(self.point.position(z)) * omega[body])
     }
 
-    /// Velocity of the wall along its normal by its law \[m/s\].
-    fn law_rate(&self, t: f64) -> f64 {
-        self.row.law.as_ref().map_or(0.0, |law| law.rates::<f64>(Time::of(t)).0)
+    /// Velocity of the wall along its normal by its law or its formula \[m/s\].
+    fn own_rate(&self, t: f64, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> f64 {
+        match (&self.row.law, &self.row.aim) {
+            (_, Some(aim)) => aim.rate(Time::of(t), phi, z, omega),
+            (Some(law), None) => law.rates::<f64>(Time::of(t)).0,
+            (None, None) => 0.0,
+        }
+    }
+
+    /// Angles of the mechanism; translational coordinates come after them.
+    fn angles(&self) -> usize {
+        let Measure::Place(place) = &self.row.measure else { return 0 };
+        place.angles
     }
 }
 

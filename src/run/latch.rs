@@ -113,16 +113,19 @@ pub(super) fn modes(mechanism: &Mechanism, modes: &[Mode], held: &[usize]) -> Ve
     mechanism.frictions.iter().zip(modes).map(mode).collect()
 }
 
-/// Refuses walls that are switched on in front of their points.
+/// Refuses walls that are switched on, or moved at once, in front of their points.
 fn behind([before, after]: [&Mechanism; 2], motion: &Motion) -> Result<(), (String, &'static str)> {
     let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-    let switched_on =
-        before.contacts.iter().zip(&after.contacts).filter(|(before, after)| before.is_off && !after.is_off);
-    for (_, contact) in switched_on {
-        let gap = contact.gap(motion.time, &after.elements(&phi));
+    let changed = before.contacts.iter().zip(&after.contacts).filter(|(before, after)| {
+        !after.is_off
+            && (before.is_off || (&before.row.law, &before.row.aim) != (&after.row.law, &after.row.aim))
+    });
+    for (before, contact) in changed {
+        let gap = contact.gap(motion.time, &phi, &after.elements(&phi));
         if gap.is_nan() || gap < -BEHIND {
             let what = format!(
-                "switches on wall {}, behind which its point is by {:.3e} m",
+                "{} wall {}, behind which its point is by {:.3e} m",
+                if before.is_off { "switches on" } else { "moves" },
                 contact.row.name,
                 -gap * contact.length
             );

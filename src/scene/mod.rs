@@ -405,6 +405,9 @@ pub struct Wall<C = f64> {
     pub normal: [C; 2],
     /// How far the line has moved along its normal, as a function of time \[m\]; `None`: it stays.
     pub law: Option<Law<C>>,
+    /// The same as a formula of time, angles and positions \[m\]; `None`: it depends on time alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub aim: Option<String>,
     /// Restitution e: the normal velocity after an impact is -e times the one before; 0 to 1.
     pub restitution: C,
 }

@@ -108,6 +108,7 @@ impl Scene {
                     "restitution": wall.restitution,
                 });
                 let said = with(said, "law", &wall.law);
+                let said = with(said, "law", &wall.aim);
                 with(said, "friction", &self.friction((Part::Wall, i)))
             })
             .collect();

@@ -53,7 +53,7 @@ use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::impact::Contact;
-use crate::dynamics::series::{Coefficient, powers};
+use crate::dynamics::series::{Coefficient, Series, powers};
 use crate::dynamics::{Coordinates, Form, Mechanism, OdeSystem, State, Time};
 
 /// Powers the step is taken from.
@@ -300,7 +300,7 @@ impl<T: Coefficient> Taylor<T> {
         expansion.expand(problem.mechanism(), state);
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
-        wanted = wanted.min(walls_known(problem.mechanism(), state.time, expansion.series().order()));
+        wanted = wanted.min(walls_known(problem.mechanism(), state.time, expansion.series()));
         wanted = expansion.until_reversal(wanted);
         if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
             let singular_passage = self.singular_passage.get_or_insert_with(|| {
@@ -371,10 +371,15 @@ impl<T: Coefficient> Taylor<T> {
 }
 
 /// How far ahead the series of the laws of walls are known to rounding \[s\].
-fn walls_known(mechanism: &Mechanism, t: Time, order: usize) -> f64 {
+fn walls_known<T: Coefficient>(mechanism: &Mechanism, t: Time, series: &Series<T>) -> f64 {
+    let order = series.order();
     let known = |contact: &Contact| {
-        let law = contact.row.law.as_ref().filter(|_| !contact.is_off)?;
-        let powers = powers(law, t, order + 1);
+        let powers = match (&contact.row.law, &contact.row.aim) {
+            _ if contact.is_off => return None,
+            (_, Some(aim)) => series.aim(aim),
+            (Some(law), None) => powers(law, t, order + 1),
+            (None, None) => return None,
+        };
         let last = powers.iter().enumerate().skip(order.saturating_sub(3).max(3));
         last.map(|(m, power)| (f64::EPSILON * contact.length / power.abs()).powf(1.0 / m as f64))
             .reduce(f64::min)

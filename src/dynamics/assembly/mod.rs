@@ -190,8 +190,11 @@ impl Mechanism {
                 return Err(CompileError::SpringWithoutLength(spring.name.clone()));
             }
         }
+        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
         for contact in self.contacts.iter().filter(|contact| !scene.is_inactive(&contact.row.name)) {
-            let moved = contact.row.law.as_ref().map_or(DoubleDouble::ZERO, |law| law.angle(start.time));
+            let law = contact.row.law.as_ref().map(|law| law.angle(start.time));
+            let aim = contact.row.aim.as_ref().map(|aim| aim.value(start.time, &phi, &self.elements(&phi)));
+            let moved = law.or(aim.map(DoubleDouble::from)).unwrap_or(DoubleDouble::ZERO);
             let gap = (contact.row.gap(&z) - moved).hi;
             if gap < -SAME * size {
                 return Err(CompileError::BehindWall { wall: contact.row.name.clone(), gap: -gap });

@@ -81,6 +81,11 @@ pub enum CompileError {
         /// Its energy \[J\].
         energy: f64,
     },
+    /// The line of a wall moves with the point that meets it, which has dry friction there.
+    #[error(
+        "wall `{0}` has friction and a law that depends on where its own point is: it is a curve, and friction acts along the line\nhint: leave the friction out, or let the law depend on other parts"
+    )]
+    FrictionOnCurve(String),
     /// The scene was put together by hand and makes no sense.
     #[error("the scene makes no sense: {0}")]
     Unsound(String),

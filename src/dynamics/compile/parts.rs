@@ -4,8 +4,10 @@ use super::{Body, Joint};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::constraint::{self, Aim, ConstraintEquation, Measure};
 use crate::dynamics::force::action::Kind;
+use crate::dynamics::force::formula::Driven;
 use crate::dynamics::force::{Action, Spring, Torsion};
 use crate::dynamics::forest::Forest;
+use crate::dynamics::impact::Contact;
 use crate::dynamics::law::Law;
 use crate::dynamics::point::Point;
 use crate::dynamics::quadratic::Quadratic;
@@ -129,10 +131,18 @@ pub(super) fn follows(
     }
 }
 
-/// Gives rows their aims, by name; rows that were released have none.
-pub(super) fn give_aims(rows: &mut [ConstraintEquation], aims: Vec<(&str, Arc<Aim>)>) {
-    for (name, aim) in aims {
-        if let Some(row) = rows.iter_mut().find(|row| row.name == name && !row.is_angle()) {
+/// Gives rows and walls their aims, by name; rows that were released have none.
+pub(super) fn give_aims(
+    rows: &mut [ConstraintEquation],
+    contacts: &mut [Contact],
+    aims: Vec<(&Driven, Arc<Aim>)>,
+) {
+    for (Driven { name, is_wall }, aim) in aims {
+        let row = match is_wall {
+            true => contacts.iter_mut().map(|wall| &mut wall.row).find(|row| row.name == *name),
+            false => rows.iter_mut().find(|row| row.name == *name && !row.is_angle()),
+        };
+        if let Some(row) = row {
             row.aim = Some(aim);
         }
     }

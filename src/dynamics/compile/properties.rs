@@ -1,7 +1,7 @@
 //! What a mechanism has and has not, for those that choose forms and methods.
 
 use super::{Body, Joint, Mechanism};
-use crate::dynamics::constraint::{ConstraintEquation, Site};
+use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::force::UserForce;
 use crate::dynamics::forest::{BodyOrigin, Hang};
 use crate::dynamics::point::Point;
@@ -79,9 +79,15 @@ impl Mechanism {
             .collect()
     }
 
-    /// True where motors have aims that depend on the mechanism.
+    /// True where motors or walls have aims that depend on the mechanism.
     pub fn has_aims(&self) -> bool {
-        self.constraints.iter().any(|row| row.aim.is_some())
+        self.aims().next().is_some()
+    }
+
+    /// Those aims.
+    fn aims(&self) -> impl Iterator<Item = &Aim> {
+        let walls = self.contacts.iter().map(|contact| &contact.row);
+        self.constraints.iter().chain(walls).filter_map(|row| row.aim.as_deref())
     }
 
     /// Names of the scene's integrals, and the coordinates whose rates they are.
@@ -98,9 +104,7 @@ impl Mechanism {
 
     /// True where a law may be flat to the last digit at one place and not at another.
     pub fn may_be_flat(&self) -> bool {
-        let is_flat_aim =
-            |row: &ConstraintEquation| row.aim.as_ref().is_some_and(|aim| aim.tape.may_be_flat());
-        self.forces.iter().any(|force| force.may_be_flat) || self.constraints.iter().any(is_flat_aim)
+        self.forces.iter().any(|force| force.may_be_flat) || self.aims().any(|aim| aim.tape.may_be_flat())
     }
 
     /// True where laws have corners, places stick and slide or events change what acts, so that steps end
@@ -152,10 +156,9 @@ impl Mechanism {
 
     /// True where whole turns matter, so that angles are not wrapped.
     pub fn is_winding(&self) -> bool {
-        let turns = |row: &ConstraintEquation| row.aim.as_ref().is_some_and(|aim| aim.counts_turns);
         !self.torsions.is_empty()
             || self.forces.iter().any(UserForce::counts_turns)
-            || self.constraints.iter().any(turns)
+            || self.aims().any(|aim| aim.counts_turns)
     }
 
     /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an

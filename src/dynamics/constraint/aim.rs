@@ -1,4 +1,4 @@
-//! The aim of a motor that depends on where the mechanism is: gears, cams, followers.
+//! The aim of a motor, or the travel of a wall, that depends on where the mechanism is: gears, cams, followers.
 //!
 //! ```text
 //! C = Q - f(t, q),   dC/dq = dQ/dq - f_q,   C_t = -f_t
@@ -35,7 +35,7 @@ pub struct Aim {
     pub(in crate::dynamics) tape: Tape,
     pub(in crate::dynamics) inputs: Vec<Input>,
     /// f, f_t and f'' at zero acceleration.
-    value: Slot,
+    pub(in crate::dynamics) value: Slot,
     pub(in crate::dynamics) drive: Slot,
     pub(in crate::dynamics) convective: Slot,
     /// f_q by coordinate.
@@ -96,9 +96,23 @@ impl Aim {
             Input::Angle(k) | Input::Origin(k) => at.phi[k],
             Input::Cosine(k) => at.z[k].re,
             Input::Sine(k) => at.z[k].im,
-            Input::Rate(k) => at.omega[k],
+            // Values and slopes are asked for without rates.
+            Input::Rate(k) => at.omega.get(k).copied().unwrap_or(T::ZERO),
         };
         self.tape.results(input, then)
+    }
+
+    /// f, at angles and translational coordinates `phi` and elements `z`.
+    pub fn value(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> f64 {
+        self.results(t, Posture { phi, z, omega: &[] }, |slots| slots[self.value as usize])
+    }
+
+    /// f' along the motion.
+    pub fn rate(&self, t: Time, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> f64 {
+        self.results(t, Posture { phi, z, omega }, |slots| {
+            let drive = slots[self.drive as usize];
+            self.slopes.iter().fold(drive, |sum, &(k, slope)| sum + slots[slope as usize] * omega[k])
+        })
     }
 
     /// Its explicit rate f_t.

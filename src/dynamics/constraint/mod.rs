@@ -175,6 +175,16 @@ impl<C: Real> ConstraintEquation<C> {
 }
 
 impl ConstraintEquation {
+    /// True where it has a law or an aim.
+    pub fn moves(&self) -> bool {
+        self.law.is_some() || self.aim.is_some()
+    }
+
+    /// True where it has a law of time, or an aim that depends on time.
+    pub fn moves_by_time(&self) -> bool {
+        self.law.is_some() || self.aim.as_ref().is_some_and(|aim| aim.is_timed)
+    }
+
     /// True for rows that do work: motors, not locks, nor gears.
     pub fn is_motor(&self) -> bool {
         self.law.as_ref().is_some_and(|law| !law.is_constant())

@@ -30,11 +30,12 @@ impl Mechanism {
         let mut z = vec![Complex::ZERO; self.coordinates()];
         self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
         let z: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
+        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
         let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
         let own: Vec<f64> = self
             .contacts
             .iter()
-            .map(|contact| levers(&contact.point) + contact.distance(start.time, &z).abs())
+            .map(|contact| levers(&contact.point) + contact.distance(start.time, &phi, &z).abs())
             .collect();
         let others = own.iter().copied().fold(0.0, f64::max);
         let gravity = self.gravity.norm_squared().sqrt();
@@ -42,7 +43,7 @@ impl Mechanism {
         let pushed = self.forces_at_start(start, size(&self.bodies));
         let mass: f64 = self.bodies.iter().map(|body| body.mass).sum();
         for (contact, own) in self.contacts.iter_mut().zip(own) {
-            let speed = contact.gap_rate(start.time, &z, &omega);
+            let speed = contact.gap_rate(start.time, &phi, &z, &omega);
             let thrown = speed * speed / gravity;
             let length = [own, others, size(&self.bodies), thrown, 1.0]
                 .into_iter()

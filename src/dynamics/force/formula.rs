@@ -13,7 +13,7 @@ use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::Formula;
 use crate::scene::{
-    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope,
+    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope, Wall,
 };
 use std::sync::Arc;
 
@@ -136,8 +136,8 @@ pub(crate) struct Formulas<C = f64> {
     laws: Vec<Law<C>>,
     /// Laws of motors and walls that are formulas.
     profiles: Vec<(Driven, Expression<C>)>,
-    /// Aims of motors that depend on the mechanism, with the angles they are of.
-    aims: Vec<(String, Vec<usize>, Expression<C>)>,
+    /// Aims of motors and walls that depend on the mechanism, with the angles they are of.
+    aims: Vec<(Driven, Vec<usize>, Expression<C>)>,
     /// Events.
     pub events: Vec<FormulaEvent<C>>,
     /// What each condition is part of, for messages.
@@ -188,7 +188,9 @@ impl<C: Decimal> Formulas<C> {
                 Some((Driven { name: name.clone(), is_wall }, law?.profile.as_ref()?))
             })
             .collect();
-        let is_plain = scene.laws.is_empty() && scene.couplings.is_empty();
+        let is_plain = scene.laws.is_empty()
+            && scene.couplings.is_empty()
+            && scene.walls.iter().all(|wall| wall.aim.is_none());
         if is_plain && scene.events.is_empty() && driven.is_empty() {
             return Ok(None);
         }
@@ -247,7 +249,13 @@ impl<C: Decimal> Formulas<C> {
                 Coupled::Angle { bar, relative_to } => std::iter::once(bar).chain(relative_to).collect(),
                 Coupled::Travel(_) => Vec::new(),
             };
-            aims.push((name.clone(), angles, binder.expression(&names.alone(), aim, name)?));
+            let part = Driven { name: name.clone(), is_wall: false };
+            aims.push((part, angles, binder.expression(&names.alone(), aim, name)?));
+        }
+        for Wall { name, aim, .. } in &scene.walls {
+            let Some(aim) = aim else { continue };
+            let part = Driven { name: name.clone(), is_wall: true };
+            aims.push((part, Vec::new(), binder.expression(&names.alone(), aim, name)?));
         }
         let conditions = std::mem::take(&mut binder.conditions);
         let parameter = |name: &String| scene.parameters.iter().position(|known| known.name == *name);
@@ -327,21 +335,21 @@ impl Formulas {
         })
     }
 
-    /// The aims of motors that depend on the mechanism, by name, on the branches that `modes` say.
+    /// The aims of motors and walls that depend on the mechanism, on the branches that `modes` say.
     ///
     /// # Errors
     /// One that depends on rates.
-    pub fn aims(&self, parameters: &[f64], modes: &[bool]) -> Result<Vec<(&str, Arc<Aim>)>, CompileError> {
-        let aim = |(name, angles, expression): &'_ (String, Vec<usize>, Expression)| {
+    pub fn aims(&self, parameters: &[f64], modes: &[bool]) -> Result<Vec<(&Driven, Arc<Aim>)>, CompileError> {
+        let aim = |(part, angles, expression): &'_ (Driven, Vec<usize>, Expression)| {
             let formula = |at: &Configuration<Symbol>| {
                 let signals = self.signals(at, parameters, modes);
                 expression.evaluated(at, parameters, &signals, modes)
             };
             Aim::record(angles, formula)
                 .map(Arc::new)
-                .ok_or_else(|| CompileError::Unsound(format!("motor {name}: its aim depends on rates")))
+                .ok_or_else(|| CompileError::Unsound(format!("law of {}: it depends on rates", part.name)))
         };
-        self.aims.iter().map(|of| Ok((of.0.as_str(), aim(of)?))).collect()
+        self.aims.iter().map(|of| Ok((&of.0, aim(of)?))).collect()
     }
 
     /// The values of all conditions, on the branches that `modes` say.

@@ -116,8 +116,8 @@ impl Mechanism {
         let z = self.elements(&phi);
         let is_still = |contact: &usize| {
             let contact = &self.contacts[*contact];
-            let speed = contact.gap_rate(start.time, &z, &omega);
-            contact.touches(start.time, &z) && speed.abs() <= NO_SPEED * contact.step_size(&omega)
+            let speed = contact.gap_rate(start.time, &phi, &z, &omega);
+            contact.touches(start.time, &phi, &z) && speed.abs() <= NO_SPEED * contact.step_size(&omega)
         };
         let touching: Vec<usize> = (0..self.contacts.len()).filter(is_still).collect();
         let staying = self.staying(&touching, start.time, &phi, &omega)?;

@@ -1,4 +1,4 @@
-//! The series of a motor's aim that depends on where the mechanism is.
+//! The series of a motor's aim, or a wall's travel, that depends on where the mechanism is.
 //!
 //! The tape of an [`Aim`] f has its derivatives; with their series a row `C = Q - f` is bordered like any
 //! other:
@@ -36,6 +36,26 @@ impl<T: SeriesNumber> AimSeries<T> {
     /// Finds power m of the aim and its derivatives, from the powers up to m of the motion's elements and
     /// rates.
     pub fn advance(&mut self, m: usize, at: At<T>) {
+        self.advance_tape(m, at);
+        let n = at.n;
+        let slopes = self.aim.slopes.iter();
+        let accelerations = slopes.fold(T::ZERO, |sum, &(k, slope)| {
+            let slope = self.tape.of(slope);
+            (1..=m)
+                .fold(sum, |sum, l| sum + slope[l] * at.omega[(m - l + 1) * n + k].scale((m - l + 1) as f64))
+        });
+        self.known = accelerations + self.tape.of(self.aim.convective)[m];
+    }
+
+    /// All powers of the aim of a motion that is expanded, as many as there is room for.
+    pub fn values(&mut self, order: usize, at: At<T>) -> &[T] {
+        for m in 0..=order {
+            self.advance_tape(m, at);
+        }
+        self.tape.of(self.aim.value)
+    }
+
+    fn advance_tape(&mut self, m: usize, at: At<T>) {
         let n = at.n;
         let input = |number: u32| match (self.aim.inputs[number as usize], m) {
             (Input::Time, 0) => at.time,
@@ -47,16 +67,10 @@ impl<T: SeriesNumber> AimSeries<T> {
             // A coordinate of an origin is part of the element at the place of its x.
             (Input::Origin(k), m) if (k - self.angles).is_multiple_of(2) => at.z[m * n + k].re,
             (Input::Origin(k), m) => at.z[m * n + k - 1].im,
-            (Input::Rate(k), m) => at.omega[m * n + k],
+            // Elements are known to one power more, and the aim with them.
+            (Input::Rate(k), m) => at.omega.get(m * n + k).copied().unwrap_or(T::ZERO),
         };
         self.tape.advance(&self.aim.tape, m, input);
-        let slopes = self.aim.slopes.iter();
-        let accelerations = slopes.fold(T::ZERO, |sum, &(k, slope)| {
-            let slope = self.tape.of(slope);
-            (1..=m)
-                .fold(sum, |sum, l| sum + slope[l] * at.omega[(m - l + 1) * n + k].scale((m - l + 1) as f64))
-        });
-        self.known = accelerations + self.tape.of(self.aim.convective)[m];
     }
 
     /// df/dq at the start, coordinate by coordinate.

@@ -44,8 +44,8 @@ impl ContactDriver {
             for number in 0..self.free.contacts.len() {
                 let posture = self.present_state();
                 let contact = &self.free.contacts[number];
-                let approach = -contact.gap_rate(posture.t, &posture.z, &posture.omega);
-                let is_met = contact.touches(posture.t, &posture.z)
+                let approach = -contact.gap_rate(posture.t, &posture.phi, &posture.z, &posture.omega);
+                let is_met = contact.touches(posture.t, &posture.phi, &posture.z)
                     && approach > NO_SPEED * contact.step_size(&posture.omega).max(hardest);
                 if is_met && !self.mechanism.held.contains(&number) {
                     hardest = hardest.max(self.impact_at(number, outcome)?);
@@ -187,7 +187,7 @@ impl ContactDriver {
         let touches = |contact: &usize| {
             Some(*contact) == struck
                 || self.mechanism.held.contains(contact)
-                || self.free.contacts[*contact].touches(motion.time, &z)
+                || self.free.contacts[*contact].touches(motion.time, &phi, &z)
         };
         let touching: Vec<usize> = (0..self.free.contacts.len())
             .filter(|contact| Some(*contact) != released && touches(contact))
@@ -203,7 +203,7 @@ impl ContactDriver {
         let still: Vec<usize> = (touching.iter().copied())
             .filter(|&contact| {
                 let touching = &self.free.contacts[contact];
-                let speed = touching.gap_rate(motion.time, &z, &omega);
+                let speed = touching.gap_rate(motion.time, &phi, &z, &omega);
                 staying.contains(&contact) || speed.abs() <= NO_SPEED * touching.step_size(&omega)
             })
             .collect();

@@ -31,7 +31,7 @@ impl ContactDriver {
         let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
         let z = self.free.elements(&phi);
         let wall = &self.free.contacts[contact];
-        let speed = wall.gap_rate(motion.time, &z, &omega);
+        let speed = wall.gap_rate(motion.time, &phi, &z, &omega);
         if speed <= NO_SPEED * wall.step_size(&omega) || wall.restitution >= 1.0 {
             return 0.0;
         }

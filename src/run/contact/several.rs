@@ -12,11 +12,11 @@ use crate::stepping::{Cause, StepError};
 impl ContactDriver {
     /// The walls whose points touch at the impact of one of them.
     pub(super) fn touching_with(&mut self, contact: usize) -> Vec<usize> {
-        let PresentState { t, z, .. } = self.present_state();
+        let PresentState { t, z, phi, .. } = self.present_state();
         let touches = |&other: &usize| {
             other == contact
                 || self.mechanism.held.contains(&other)
-                || self.free.contacts[other].touches(t, &z)
+                || self.free.contacts[other].touches(t, &phi, &z)
         };
         (0..self.free.contacts.len()).filter(touches).collect()
     }
@@ -27,8 +27,8 @@ impl ContactDriver {
             return None;
         }
         let touching = self.touching_with(contact);
-        let PresentState { t, z, omega, .. } = self.present_state();
-        let approach = |number: usize| -self.free.contacts[number].gap_rate(t, &z, &omega);
+        let PresentState { t, z, phi, omega } = self.present_state();
+        let approach = |number: usize| -self.free.contacts[number].gap_rate(t, &phi, &z, &omega);
         let hardest = approach(contact);
         let is_met = |&&number: &&usize| {
             let size = self.free.contacts[number].step_size(&omega).max(hardest);

@@ -37,8 +37,8 @@ pub(in crate::run) fn check_several(
         if beyond(gap.abs(), closed(tolerance) + rounding) {
             return Err(format!("the point is {:.2e} m from wall {name}", gap * contact.length));
         }
-        let [approach, departure] =
-            [before, after].map(|motion| contact.normal_velocity(before.time.hi, &here.z, &motion.omega));
+        let [(approach, _), (departure, _)] =
+            [before, after].map(|motion| contact.normal_velocity(before.time.hi, &here.z, motion));
         let [slid, slides] =
             [before, after].map(|motion| contact.tangential_velocity(&here.z, &motion.omega));
         let step_size = contact.step_size(&after.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());

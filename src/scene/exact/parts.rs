@@ -144,6 +144,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
                 point: self.pair(at, "point", plain.point)?,
                 on: None,
                 law: None,
+                aim: None,
                 through: self.pair(&line, "through", plain.through)?,
                 normal: self.direction(&line, "normal", plain.normal)?,
                 restitution: self.number(at, "restitution", plain.restitution)?,

@@ -59,8 +59,9 @@ pub(super) fn springs(posture: &Posture, springs: &[Spring], places: &[At]) -> R
 /// Refuses a wall whose point starts behind it.
 pub(super) fn walls(posture: &Posture, scene: &Scene, places: &[At]) -> Result<(), SceneError> {
     for (wall, at) in scene.walls.iter().zip(places) {
-        let Wall { name, bar, point, on, through, normal, law, .. } = wall;
-        if scene.is_inactive(name) {
+        let Wall { name, bar, point, on, through, normal, law, aim, .. } = wall;
+        // What a formula of places comes to is known when the scene is compiled.
+        if scene.is_inactive(name) || aim.is_some() {
             continue;
         }
         let (position, way) = posture.at(Place { bar: Some(*bar), point: *point });

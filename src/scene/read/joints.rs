@@ -1,7 +1,7 @@
 //! What joins bodies: hinges, sliders, welds and locks; and the walls that stop them.
 
 use super::at::Fields;
-use super::loads::law_if_any;
+use super::loads::law_of_wall;
 use super::names::Bars;
 use super::resolve::Constants;
 use crate::scene::error::SceneError;
@@ -56,6 +56,6 @@ pub(super) fn wall(
     let through = line.pair("through")?;
     let normal =
         line.direction("normal", "[1, 0] for a wall the point must stay right of, [0, 1] for a floor")?;
-    let (restitution, law) = (fields.number("restitution")?, law_if_any(fields, constants)?);
-    Ok(Wall { name, bar, point, on, through, normal, law, restitution })
+    let (restitution, (law, aim)) = (fields.number("restitution")?, law_of_wall(fields, constants)?);
+    Ok(Wall { name, bar, point, on, through, normal, law, aim, restitution })
 }

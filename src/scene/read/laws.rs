@@ -251,6 +251,7 @@ pub(super) fn integrals(
 /// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events name.
 pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
     let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
+    let is_plain = is_plain && scene.walls.iter().all(|wall| wall.aim.is_none());
     if is_plain && scene.events.is_empty() && scene.inactive.is_empty() && scene.couplings.is_empty() {
         return Ok(());
     }
@@ -296,14 +297,24 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> R
         let at = found(root.child("integrals").and_then(|at| at.child(&integral.name)));
         judge(&at, &integral.formula, &scope, None)?;
     }
-    for Coupling { name, aim, .. } in &scene.couplings {
-        let part = found(root.child("motors").and_then(|at| at.named(name)));
+    let of_walls = scene.walls.iter().filter_map(|wall| Some(("walls", &wall.name, wall.aim.as_ref()?)));
+    let of_motors = scene.couplings.iter().map(|Coupling { name, aim, .. }| ("motors", name, aim));
+    for (list, name, aim) in of_motors.chain(of_walls) {
+        let part = found(root.child(list).and_then(|at| at.named(name)));
         let at = found(part.child("law"));
-        let (bound, _) = judge(&at, aim, &scope, quantity_of("motors", "law", &part).as_ref())?;
+        let (bound, _) = judge(&at, aim, &scope, quantity_of(list, "law", &part).as_ref())?;
         if let Some(name) = names.rate_in(&bound) {
             let problem = format!("depends on {name}");
-            let allowed = "the aim of a motor is a formula of time, angles and positions; one of rates would be a non-holonomic constraint";
-            let hint = "what acts on rates is a torque, as \"kp*(aim - arm.phi) - kd*arm.omega\" in torques";
+            let (allowed, hint) = match list {
+                "motors" => (
+                    "the aim of a motor is a formula of time, angles and positions; one of rates would be a non-holonomic constraint",
+                    "what acts on rates is a torque, as \"kp*(aim - arm.phi) - kd*arm.omega\" in torques",
+                ),
+                _ => (
+                    "a wall moves by a formula of time, angles and positions; rates jump where it is met, and the wall would jump with them",
+                    "carry the wall by a bar that a torque or a force drives by rates",
+                ),
+            };
             return Err(at.refuse(&problem, allowed, hint));
         }
     }

@@ -150,9 +150,16 @@ fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
     })
 }
 
-/// The law of a wall, if it has one.
-pub(super) fn law_if_any(fields: &Fields, constants: &Constants) -> Result<Option<Law>, SceneError> {
-    fields.optional("law").map(|_| motor_law(fields, constants)).transpose()
+/// The law of a wall, if it has one: of time, or of where the mechanism is.
+pub(super) fn law_of_wall(
+    fields: &Fields,
+    constants: &Constants,
+) -> Result<(Option<Law>, Option<String>), SceneError> {
+    let Some(at) = fields.optional("law") else { return Ok((None, None)) };
+    match &at.node.value {
+        Value::Text(text) if constants.is_of_place(text) => Ok((None, Some(text.clone()))),
+        _ => Ok((Some(motor_law(fields, constants)?), None)),
+    }
 }
 
 /// The law of a motor or wall: a sum, or a formula that is none.

@@ -6,7 +6,7 @@
 use super::at::At;
 use super::tables;
 use crate::scene::error::SceneError;
-use crate::scene::format::{FACTOR_LAW, LAW, Quantity, SCENE, Shape, TRAVEL_LAW, Table, about, kind};
+use crate::scene::format::{FACTOR_LAW, Quantity, SCENE, Shape, Table, about, kind};
 use crate::scene::formula::unit::Dimension;
 use crate::scene::formula::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant};
 use crate::scene::locate::{Member, Node, Source, Span, Value, push_index, push_key};
@@ -285,7 +285,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The law of time that a formula is; `None` for one of a motor that is no sum.
+    /// The law of time that a formula is; `None` for one of a motor or a wall that is no sum.
     fn law(
         &self,
         text: &str,
@@ -296,15 +296,14 @@ impl Resolver<'_> {
     ) -> Result<Option<Law>, SceneError> {
         let refused = |error: FormulaError| refused(self.source, span, path, &shape.allowed(), &error);
         let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
-        let may_follow = matches!(shape, Shape::Law(table, _) if [&LAW, &TRAVEL_LAW].iter().any(|known| std::ptr::eq(*table, *known)));
-        if may_follow && !is_of_time(&formula, self.parameters) {
+        let is_motor = !matches!(shape, Shape::Law(table, _) if std::ptr::eq(*table, &FACTOR_LAW));
+        if is_motor && !is_of_time(&formula, self.parameters) {
             return Ok(None);
         }
         let time = (None, Some(Dimension::of("s")));
         let (values, dimensions) = self.arguments(&formula, &[("t", time)]).map_err(refused)?;
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         fits(&formula, dimension, quantity).map_err(refused)?;
-        let is_motor = !matches!(shape, Shape::Law(table, _) if std::ptr::eq(*table, &FACTOR_LAW));
         match formula.law(&values) {
             Err(_) if is_motor => Ok(None),
             law => law.map(Some).map_err(refused),

@@ -255,6 +255,7 @@ impl Model {
             through,
             normal,
             law: None,
+            aim: None,
             restitution,
         });
         self.kinds.insert(kind);

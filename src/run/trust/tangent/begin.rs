@@ -29,7 +29,8 @@ impl Tangent {
 
     fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, is_exact: bool) -> Result<Self, String> {
         if mechanism.vibration.is_some() || mechanism.has_aims() {
-            let why = "the mean force of a vibration, and motors whose aim depends on the mechanism";
+            let why =
+                "the mean force of a vibration, and laws of motors and walls that depend on the mechanism";
             return Err(format!("{why}, have no tangent flow"));
         }
         let mut tangent = Self::bare(mechanism)?;

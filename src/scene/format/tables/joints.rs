@@ -166,7 +166,7 @@ pub(in crate::scene) static WALL: Table = Table {
             "law",
             Shape::Law(&WALL_LAW, signed("m")),
             "\"5 mm*sin(30*t)\"",
-            "How far the line has moved along its normal, as a function of time; it stays if absent.",
+            "How far the line has moved along its normal, as a function of time or a formula of angles and positions; it stays if absent.",
         ),
         optional(
             "friction",
