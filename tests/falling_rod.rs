@@ -8,42 +8,10 @@
 //! Source: E. J. Routh, *Dynamics of a System of Rigid Bodies* (1905); W. Stronge, *Impact Mechanics* (2000),
 //! for the end that stands still, slips and comes to rest.
 
-use super::formulas::{adaptive, run, scene};
-use driftless::run::{MethodId, Outcome, Request};
-use driftless::scene::Scene;
+use super::friction::{integrated, near, rod, runs, sliding_rod};
+use driftless::run::Outcome;
 
 const G: f64 = 9.81;
-const CLOSE: f64 = 1e-10;
-
-fn rod([phi, omega]: [f64; 2], slide: f64, mu: f64, until: f64) -> Scene {
-    scene(&format!(
-        r#"{{"name": "rod", "gravity": [0, -{G}], "bars": [{{"name": "rod", "mass": 1, "centre": [0.5, 0], "inertia": 0.08333333333333333, "length": 1}}],
-        "walls": [{{"name": "floor", "body": "rod", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}},
-            "restitution": 0, "friction": {{"kinetic": {mu}}}}}],
-        "start": {{"rod": {{"phi": {phi}, "omega": {omega}, "origin": [0, 0], "velocity": [{slide}, 0]}}}}, "until": {until}, "every": {until}}}"#
-    ))
-}
-
-fn runs(scene: &Scene) -> Vec<Outcome> {
-    let methods: [Request; 5] = [
-        adaptive(MethodId::Taylor, 1e-14),
-        adaptive(MethodId::Dp5, 1e-14),
-        adaptive(MethodId::Dp8, 1e-14),
-        adaptive(MethodId::Radau(3), 1e-13),
-        adaptive(MethodId::Radau(5), 1e-13),
-    ];
-    let finished = |request: Request| {
-        let outcome = run(scene, &request);
-        assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
-        assert!(outcome.drift.energy.max < CLOSE, "{:?}: {:e}", request.method, outcome.drift.energy.max);
-        outcome
-    };
-    methods.into_iter().map(finished).collect()
-}
-
-fn near(found: f64, expected: f64, what: &str) {
-    assert!((found - expected).abs() < CLOSE, "{what}: {found} and not {expected}");
-}
 
 /// F and N of a rod whose end is at rest.
 fn standing(phi: f64, omega_squared: f64) -> [f64; 2] {
@@ -53,31 +21,20 @@ fn standing(phi: f64, omega_squared: f64) -> [f64; 2] {
 
 /// (x'', phi'') of a rod whose end slides, which way `s` says.
 fn sliding(phi: f64, omega: f64, s: f64, mu: f64) -> [f64; 2] {
-    let (sin, cos) = phi.sin_cos();
-    let lever = -0.5 * cos - 0.5 * s * mu * sin;
-    let n = (G - 0.5 * sin * omega * omega) / (1.0 - 6.0 * cos * lever);
-    let alpha = 12.0 * n * lever;
+    let [x, alpha, n] = sliding_rod(phi, omega, s, mu);
     assert!(n > 0.0);
-    [-s * mu * n + 0.5 * (sin * alpha + cos * omega * omega), alpha]
+    [x, alpha]
 }
 
-/// Integrates x, phi and their rates for `time` by the classical method of order four.
-fn integrated(mut y: [f64; 4], time: f64, rate: impl Fn([f64; 4]) -> [f64; 2]) -> [f64; 4] {
-    let (steps, add) =
-        (20_000, |y: [f64; 4], k: [f64; 4], h: f64| -> [f64; 4] { std::array::from_fn(|i| y[i] + h * k[i]) });
-    let h = time / f64::from(steps);
-    let of = |y: [f64; 4]| {
-        let [x, alpha] = rate(y);
-        [y[2], y[3], x, alpha]
-    };
-    for _ in 0..steps {
-        let a = of(y);
-        let b = of(add(y, a, 0.5 * h));
-        let c = of(add(y, b, 0.5 * h));
-        let d = of(add(y, c, h));
-        y = std::array::from_fn(|i| y[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
-    }
-    y
+/// Asserts what its end does, when that changes, and where it is then: x, phi and their rates.
+fn assert_falls(outcome: &Outcome, modes: [&str; 2], changes: f64, end: [f64; 4]) {
+    let found: Vec<_> = outcome.frictions.iter().map(|change| change.mode.as_str()).collect();
+    assert_eq!(found, modes, "{:?}", outcome.frictions);
+    near(outcome.frictions[1].t, changes, "it changes");
+    near(outcome.last.phi[0], end[1], "phi");
+    near(outcome.last.phi[1], end[0], "x");
+    near(outcome.last.omega[0], end[3], "omega");
+    near(outcome.last.omega[1], end[2], "slides");
 }
 
 /// The zero of a falling or rising function between two places.
@@ -117,13 +74,8 @@ fn the_end_of_a_falling_rod_stands_still_until_friction_does_not_hold_it() {
         let after = 0.02;
         let y =
             integrated([0.0, slips, 0.0, -squared(slips).sqrt()], after, |y| sliding(y[1], y[3], way, mu));
-        for outcome in runs(&rod([start, omega], 0.0, mu, time + after)) {
-            let modes: Vec<_> = outcome.frictions.iter().map(|change| change.mode.as_str()).collect();
-            assert_eq!(modes, ["sticks", "slides"], "{mu}: {:?}", outcome.frictions);
-            near(outcome.frictions[1].t, time, "it slips");
-            near(outcome.last.phi[0], y[1], "phi");
-            near(outcome.last.phi[1], y[0], "x");
-            near(outcome.last.omega[1], y[2], "slides");
+        for outcome in runs(&rod(start, omega, 0.0, mu, time + after)) {
+            assert_falls(&outcome, ["sticks", "slides"], time, y);
         }
     }
 }
@@ -142,12 +94,7 @@ fn an_end_that_slides_to_a_stop_stands_still_and_the_rod_turns_about_it() {
     let end = integrated(end, after, |y| [0.0, -1.5 * G * y[1].cos()]);
     let kept = stood[3] * stood[3] - 3.0 * G * (end[1].sin() - stood[1].sin());
     assert!((end[3] * end[3] - kept).abs() < 1e-11);
-    for outcome in runs(&rod([start[1], start[3]], start[2], mu, stops + after)) {
-        let modes: Vec<_> = outcome.frictions.iter().map(|change| change.mode.as_str()).collect();
-        assert_eq!(modes, ["slides", "sticks"], "{:?}", outcome.frictions);
-        near(outcome.frictions[1].t, stops, "it stops");
-        near(outcome.last.phi[0], end[1], "phi");
-        near(outcome.last.phi[1], end[0], "x");
-        near(outcome.last.omega[0], end[3], "omega");
+    for outcome in runs(&rod(start[1], start[3], start[2], mu, stops + after)) {
+        assert_falls(&outcome, ["slides", "sticks"], stops, end);
     }
 }

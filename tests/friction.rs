@@ -24,7 +24,7 @@ fn methods() -> [Request; 5] {
 }
 
 /// Runs a scene by all methods; the energy balance must close, friction included.
-fn runs(text: &str) -> Vec<Outcome> {
+pub fn runs(text: &str) -> Vec<Outcome> {
     let scene = scene(text);
     methods()
         .into_iter()
@@ -37,7 +37,7 @@ fn runs(text: &str) -> Vec<Outcome> {
         .collect()
 }
 
-fn near(found: f64, expected: f64, what: &str) {
+pub fn near(found: f64, expected: f64, what: &str) {
     assert!((found - expected).abs() < CLOSE, "{what}: {found} and not {expected}");
 }
 
@@ -300,7 +300,7 @@ fn a_ball_bounces_to_rest_and_slides_to_a_stop_in_closed_form() {
 }
 
 /// A rod of 1 m and 1 kg with its lower end on the floor.
-fn rod(angle: f64, omega: f64, slide: f64, mu: f64, until: f64) -> String {
+pub fn rod(angle: f64, omega: f64, slide: f64, mu: f64, until: f64) -> String {
     format!(
         r#"{{"name": "rod", "gravity": [0, -{G}], "bars": [{{"name": "rod", "mass": 1, "centre": [0.5, 0], "inertia": 0.08333333333333333, "length": 1}}],
         "walls": [{{"name": "floor", "body": "rod", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}},
@@ -310,7 +310,7 @@ fn rod(angle: f64, omega: f64, slide: f64, mu: f64, until: f64) -> String {
 }
 
 /// N and the accelerations of a rod whose lower end slides: (x'', phi'', N).
-fn sliding_rod(phi: f64, omega: f64, slide: f64, mu: f64) -> [f64; 3] {
+pub fn sliding_rod(phi: f64, omega: f64, slide: f64, mu: f64) -> [f64; 3] {
     let (sin, cos) = phi.sin_cos();
     let inertia = 1.0 / 12.0;
     // Centre: (x + cos/2, sin/2).  Forces on the tip: (-s mu N, N); torque about the centre.
@@ -322,14 +322,11 @@ fn sliding_rod(phi: f64, omega: f64, slide: f64, mu: f64) -> [f64; 3] {
     [-s * mu * n + 0.5 * (sin * alpha + cos * omega * omega), alpha, n]
 }
 
-#[test]
-fn a_rod_slides_on_its_end_as_lagrange_says() {
-    let (mu, until) = (0.3, 0.25);
-    let mut y = [0.0, 1.1, 3.0, 0.4];
-    let h = until / 20_000.0;
+/// Integrates x, phi and their rates for `time` by the classical method of order four.
+pub fn integrated(mut y: [f64; 4], time: f64, accelerations: impl Fn([f64; 4]) -> [f64; 2]) -> [f64; 4] {
+    let h = time / 20_000.0;
     let rate = |y: [f64; 4]| {
-        let [x, alpha, n] = sliding_rod(y[1], y[3], y[2], mu);
-        assert!(n > 0.0);
+        let [x, alpha] = accelerations(y);
         [y[2], y[3], x, alpha]
     };
     let add = |y: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|i| y[i] + h * k[i]);
@@ -340,6 +337,17 @@ fn a_rod_slides_on_its_end_as_lagrange_says() {
         let d = rate(add(y, c, h));
         y = std::array::from_fn(|i| y[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
     }
+    y
+}
+
+#[test]
+fn a_rod_slides_on_its_end_as_lagrange_says() {
+    let (mu, until) = (0.3, 0.25);
+    let y = integrated([0.0, 1.1, 3.0, 0.4], until, |y| {
+        let [x, alpha, n] = sliding_rod(y[1], y[3], y[2], mu);
+        assert!(n > 0.0);
+        [x, alpha]
+    });
     for outcome in runs(&rod(1.1, 0.4, 3.0, mu, until)) {
         near(outcome.last.phi[0], y[1], "phi");
         near(outcome.last.phi[1], y[0], "x");

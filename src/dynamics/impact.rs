@@ -70,6 +70,14 @@ impl Contact {
         }
     }
 
+    /// The rate of that \[m/s\].
+    pub fn travel_rate(&self, t: Time, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> Option<f64> {
+        match &self.row.aim {
+            None => self.row.law.as_ref().map(|law| law.rates::<f64>(t).0),
+            Some(aim) => Some(aim.rate(t, phi, z, omega)),
+        }
+    }
+
     /// The gap \[m\].
     pub fn distance(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> f64 {
         let gap = self.row.gap(z);
@@ -98,11 +106,7 @@ impl Contact {
             }
             _ => self.normal.dot(self.point.velocity(z, omega)),
         };
-        match (&self.row.law, &self.row.aim) {
-            (_, Some(aim)) => rate - aim.rate(t, phi, z, omega),
-            (Some(law), None) => rate - law.rates::<f64>(t).0,
-            (None, None) => rate,
-        }
+        self.travel_rate(t, phi, z, omega).map_or(rate, |travel_rate| rate - travel_rate)
     }
 
     /// The largest velocity the parts of the point have along the normal \[m/s\]: rounding of its normal

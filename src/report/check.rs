@@ -165,7 +165,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
             .iter()
             .map(|wall| {
                 let on = wall.on.map_or(String::new(), |bar| format!(", on {}", scene.bars[bar].name));
-                let moves = if wall.law.is_some() || wall.aim.is_some() { ", moves" } else { "" };
+                let moves = if wall.moves() { ", moves" } else { "" };
                 format!("{} (restitution {}{on}{moves})", wall.name, wall.restitution)
             })
             .collect();

@@ -69,7 +69,8 @@ pub(super) fn gap_rate(contact: &Contact, angles: usize, t: f64, phi: &[f64], om
         return 0.0;
     }
     let z = elements(angles, phi);
-    (contact.velocity(contact.normal, &z, omega) - contact.own_rate(t, phi, &z, omega)) / contact.length
+    let own = contact.travel_rate(Time::of(t), phi, &z, omega).unwrap_or(0.0);
+    (contact.velocity(contact.normal, &z, omega) - own) / contact.length
 }
 
 /// Whether an impact is what Newton's law of impact makes of the motion before it; else what is wrong.
@@ -214,7 +215,8 @@ impl Contact {
     fn normal_velocity(&self, t: f64, z: &[Complex<DoubleDouble>], motion: &Motion) -> (f64, f64) {
         let [phi, omega] =
             [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
-        let own = self.own_rate(t, &phi, &elements(self.angles(), &phi), &omega);
+        let plain = elements(self.angles(), &phi);
+        let own = self.travel_rate(Time::of(t), &phi, &plain, &omega).unwrap_or(0.0);
         (self.velocity(self.normal, z, &motion.omega).hi - own, own)
     }
 
@@ -233,15 +235,6 @@ impl Contact {
         let facing = self.facing(direction, z);
         let own = facing.dot(self.point.velocity(z, omega));
         self.on.map_or(own, |body| own + facing.left().dot(self.point.position(z)) * omega[body])
-    }
-
-    /// Velocity of the wall along its normal by its law or its formula \[m/s\].
-    fn own_rate(&self, t: f64, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> f64 {
-        match (&self.row.law, &self.row.aim) {
-            (_, Some(aim)) => aim.rate(Time::of(t), phi, z, omega),
-            (Some(law), None) => law.rates::<f64>(Time::of(t)).0,
-            (None, None) => 0.0,
-        }
     }
 
     /// Angles of the mechanism; translational coordinates come after them.

@@ -15,7 +15,7 @@ use super::locate::{Node, Source, Span, Value, push_index, push_key};
 use super::number::Decimal;
 use super::read::put_together;
 use super::template::Template;
-use super::{Scene, SceneEvent, Wall};
+use super::{Scene, SceneEvent};
 use std::cell::RefCell;
 
 /// The times of a scene.
@@ -189,8 +189,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             let at = items.find_map(|at| at.child("friction")).unwrap_or_else(|| self.root.clone());
             return Err(self.refuse_part(&at, "dry friction has corners"));
         }
-        let moves = |wall: &Wall| wall.law.is_some() || wall.aim.is_some() || wall.on.is_some();
-        if let Some(wall) = scene.walls.iter().position(moves) {
+        if let Some(wall) = scene.walls.iter().position(|wall| wall.moves() || wall.on.is_some()) {
             let at = self.root.items("walls").into_iter().nth(wall).unwrap_or_else(|| self.root.clone());
             return Err(self.refuse_part(&at, "the wall moves"));
         }

@@ -412,6 +412,13 @@ pub struct Wall<C = f64> {
     pub restitution: C,
 }
 
+impl<C> Wall<C> {
+    /// True where its line moves along its normal.
+    pub fn moves(&self) -> bool {
+        self.law.is_some() || self.aim.is_some()
+    }
+}
+
 /// Angle and rate of a bar at t = 0.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Start<C = f64> {

@@ -272,7 +272,7 @@ impl OutputNames {
         }
         for wall in &scene.walls {
             let point = Place { bar: Some(wall.bar), point: wall.point };
-            let gap = match wall.on.is_some() || wall.law.is_some() || wall.aim.is_some() {
+            let gap = match wall.on.is_some() || wall.moves() {
                 true => Quantity::MovingGap(wall.name.clone()),
                 false => Quantity::Gap(point, wall.through, wall.normal),
             };

@@ -191,11 +191,10 @@ impl Mechanism {
             }
         }
         let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+        let plain: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
         for contact in self.contacts.iter().filter(|contact| !scene.is_inactive(&contact.row.name)) {
-            let law = contact.row.law.as_ref().map(|law| law.angle(start.time));
-            let aim = contact.row.aim.as_ref().map(|aim| aim.value(start.time, &phi, &self.elements(&phi)));
-            let moved = law.or(aim.map(DoubleDouble::from)).unwrap_or(DoubleDouble::ZERO);
-            let gap = (contact.row.gap(&z) - moved).hi;
+            let travel = contact.travel(start.time, &phi, &plain).unwrap_or(0.0);
+            let gap = (contact.row.gap(&z) - DoubleDouble::from(travel)).hi;
             if gap < -SAME * size {
                 return Err(CompileError::BehindWall { wall: contact.row.name.clone(), gap: -gap });
             }
