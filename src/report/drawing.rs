@@ -8,7 +8,7 @@ use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Joint;
 #[cfg(feature = "charts")]
 use crate::scene::Slider;
-use crate::scene::{Load, NamedPoint, Place, Scene};
+use crate::scene::{Load, NamedPoint, Place, Scene, Wall};
 
 /// A mechanism to draw.
 #[derive(Clone, Copy)]
@@ -66,22 +66,7 @@ impl Drawing<'_> {
             springs: (self.springs())
                 .map(|between| SpringSketch { ground: between.map(|end| end.bar.is_none()) })
                 .collect(),
-            walls: self
-                .scene
-                .walls
-                .iter()
-                // Drawn once for all poses: where it is at the start; none that a body or a formula of places moves.
-                .filter(|wall| wall.on.is_none() && wall.aim.is_none())
-                .map(|wall| {
-                    let moved = wall.law.as_ref().map_or(0.0, |law| law.at_start().phi);
-                    let [x, y] = wall.through;
-                    let through = match moved == 0.0 {
-                        true => wall.through,
-                        false => [x + moved * wall.normal[0], y + moved * wall.normal[1]],
-                    };
-                    WallSketch { through, normal: wall.normal }
-                })
-                .collect(),
+            walls: self.walls().map(|(through, normal)| WallSketch { through, normal }).collect(),
             points: self.points().map(|point| plain(&point.name)).collect(),
         }
     }
@@ -117,6 +102,21 @@ impl Drawing<'_> {
 }
 
 impl Drawing<'_> {
+    /// A point and the normal of every wall, drawn once for all poses: where it is at the start; of none that a body
+    /// or a formula of places moves \[m\].
+    pub fn walls(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
+        let stays = |wall: &&Wall| wall.on.is_none() && wall.aim.is_none();
+        self.scene.walls.iter().filter(stays).map(|wall| {
+            let moved = wall.law.as_ref().map_or(0.0, |law| law.at_start().phi);
+            let [x, y] = wall.through;
+            let through = match moved == 0.0 {
+                true => wall.through,
+                false => [x + moved * wall.normal[0], y + moved * wall.normal[1]],
+            };
+            (through, wall.normal)
+        })
+    }
+
     /// Names of the points whose paths are drawn, or of the bodies whose ends they are.
     pub fn plain_names(&self) -> Vec<&str> {
         let traced = self.traced().len();

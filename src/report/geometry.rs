@@ -43,9 +43,8 @@ pub fn geometry(scene: &Scene, mechanism: &Mechanism) -> Value {
             json!({"at": place(&slider.point), "rail": at(rail, Complex::new(slider.rail.direction[0], slider.rail.direction[1]))})
         })
         .collect();
-    let walls: Vec<Value> = (drawing.sketch().walls.iter())
-        .map(|wall| json!({"through": wall.through, "normal": wall.normal}))
-        .collect();
+    let walls: Vec<Value> =
+        drawing.walls().map(|(through, normal)| json!({"through": through, "normal": normal})).collect();
     let traced: Vec<Value> = (drawing.traced().iter().zip(drawing.plain_names()))
         .map(|(point, name)| json!({"name": name, "at": place(point)}))
         .collect();
