@@ -83,7 +83,7 @@ impl ContactDriver {
         let before = self.motion();
         let balance = self.sampler.balance(&before);
         let mut after = before.clone();
-        let mut keeps_values = motion.is_none();
+        let (keeps_motion, mut keeps_parameters) = (motion.is_none(), true);
         if let Some(motion) = motion {
             let n = before.phi.len();
             if (motion.phi.len(), motion.omega.len(), motion.turns.len()) != (n, n, before.turns.len()) {
@@ -105,7 +105,7 @@ impl ContactDriver {
             let mut modes = modes.clone();
             let moved = after.phi != before.phi || after.omega != before.omega;
             let next = parameters.unwrap_or_else(|| known.clone());
-            keeps_values &= next == *known;
+            keeps_parameters = next == *known;
             if moved || next != *known {
                 modes = self.whole.seen(&after, |at| formulas.modes(at, &next));
             } else if let Some(mode) = flips.and_then(|number| modes.get_mut(number)) {
@@ -168,10 +168,10 @@ impl ContactDriver {
         outcome.event_energy += change.hi;
         if let Some(jumps) = &self.jumps {
             let (mechanism, off) = (Arc::clone(&self.mechanism), self.off.clone());
-            let switch = Some(Switch { at, keeps_values, off });
+            let switch = Some(Switch { at, keeps_motion, keeps_parameters, off });
             jumps.push(Jump {
                 contact: None,
-                is_shared: false,
+                together: Vec::new(),
                 switch,
                 friction: None,
                 before,

@@ -1,6 +1,6 @@
 //! Parts that events let act or rest: motors, locks and joints are released and put back.
 
-use super::{Mechanism, Switches};
+use super::{CompileError, Mechanism, Switches};
 use crate::dynamics::constraint::Measure;
 use crate::dynamics::quadratic::Quadratic;
 use crate::scene::Scene;
@@ -45,6 +45,23 @@ impl Mechanism {
             }
         }
         mechanism
+    }
+
+    /// The mechanism with other values of the scene's parameters in the laws of the forces that act.
+    ///
+    /// # Errors
+    /// A law that cannot be compiled with them.
+    pub(crate) fn with_parameters(&self, parameters: Vec<f64>) -> Result<Self, CompileError> {
+        let mut mechanism = self.clone();
+        if let Some(laws) = &mut mechanism.laws {
+            for force in laws.formulas.record(&parameters, &laws.modes)? {
+                if let Some(acting) = mechanism.forces.iter_mut().find(|acting| acting.name == force.name) {
+                    *acting = force;
+                }
+            }
+            laws.parameters = parameters;
+        }
+        Ok(mechanism)
     }
 
     /// The mechanism with all its parts, whatever acts at the start.

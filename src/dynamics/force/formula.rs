@@ -118,6 +118,13 @@ pub(crate) struct FormulaEvent<C = f64> {
     set: Vec<(usize, Expression<C>)>,
 }
 
+impl<C> FormulaEvent<C> {
+    /// The parameters it sets, by number.
+    pub fn parameters(&self) -> impl Iterator<Item = usize> {
+        self.set.iter().map(|(number, _)| *number)
+    }
+}
+
 /// A part that moves by a law of time.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Driven {

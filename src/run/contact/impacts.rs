@@ -123,7 +123,7 @@ impl ContactDriver {
             });
         }
         let t = last.time.hi;
-        self.tell_impact(Some(contact), false, last, after);
+        self.tell_impact(Some(contact), &[], [last, after]);
         outcome.impact_loss += energy_lost;
         // A point that hangs at its wall without a force is carried to and fro by rounding: that is taken off
         // it, and is no impact.
@@ -155,11 +155,16 @@ impl ContactDriver {
         (last, self.motion(), -change.hi)
     }
 
-    /// Tells of an impact where somebody asks; `is_shared` where several walls take part in it.
-    pub(super) fn tell_impact(&self, contact: Option<usize>, is_shared: bool, before: Motion, after: Motion) {
+    /// Tells of an impact where somebody asks, and of the contacts that touch where several take part in it.
+    pub(super) fn tell_impact(
+        &self,
+        contact: Option<usize>,
+        together: &[usize],
+        [before, after]: [Motion; 2],
+    ) {
         if let Some(jumps) = &self.jumps {
-            let mechanism = Arc::clone(&self.mechanism);
-            jumps.push(Jump { contact, is_shared, switch: None, friction: None, before, after, mechanism });
+            let (together, mechanism) = (together.to_vec(), Arc::clone(&self.mechanism));
+            jumps.push(Jump { contact, together, switch: None, friction: None, before, after, mechanism });
         }
     }
 
@@ -254,7 +259,7 @@ impl ContactDriver {
         if let (Some(jumps), Some(before)) = (&self.jumps, before) {
             jumps.push(Jump {
                 contact: None,
-                is_shared: false,
+                together: Vec::new(),
                 switch: None,
                 friction: None,
                 before,

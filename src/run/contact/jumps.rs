@@ -9,8 +9,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(in crate::run) struct Jump {
     /// The contact of an impact, the first of several.
     pub contact: Option<usize>,
-    /// True where several walls take part in it, which neighbouring motions meet one after the other.
-    pub is_shared: bool,
+    /// The contacts that touch where several walls take part in it, which neighbouring motions meet one after
+    /// the other.
+    pub together: Vec<usize>,
     /// The change by an event.
     pub switch: Option<Switch>,
     /// The place with friction that begins to stick or to slide, at the zero of its event function.
@@ -27,8 +28,9 @@ pub(in crate::run) struct Jump {
 pub(in crate::run) struct Switch {
     /// The function whose zero it is at.
     pub at: SwitchFunction,
-    /// True where neither the motion nor parameters are others: only parts and branches are.
-    pub keeps_values: bool,
+    /// Whether the motion and the parameters are the same after it, and only parts and branches are others.
+    pub keeps_motion: bool,
+    pub keeps_parameters: bool,
     /// Parts that do not act from then on.
     pub off: Vec<String>,
 }
@@ -68,7 +70,7 @@ impl JumpLog {
 
 /// Why small differences do not go on through what happens at one moment, where they do not.
 pub(in crate::run) fn check_alone(jumps: &[Jump]) -> Result<(), String> {
-    match jumps.iter().any(|jump| jump.is_shared) {
+    match jumps.iter().any(|jump| !jump.together.is_empty()) {
         true => {
             Err("several walls are met at once, which neighbouring motions meet one after the other".into())
         }

@@ -68,7 +68,8 @@ impl ContactDriver {
             return Err(StepError { cause: Cause::ImpactCheckFailed, ..stop });
         }
         let t = last.time.hi;
-        self.tell_impact(contacts.first().copied(), impacts.blows.len() > 1, last, after);
+        let together = if impacts.blows.len() > 1 { contacts } else { &[] };
+        self.tell_impact(contacts.first().copied(), together, [last, after]);
         outcome.impact_loss += energy_lost;
         let mut hardest = 0.0_f64;
         for blow in &impacts.blows {

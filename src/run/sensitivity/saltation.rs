@@ -184,7 +184,7 @@ impl Variation {
 
     /// How much later an event happens, column by column.
     fn late_at_switch(&self, switch: &Switch, motion: &Motion, here: &Side) -> Result<Vec<f64>, String> {
-        if !switch.keeps_values {
+        if !(switch.keeps_motion && switch.keeps_parameters) {
             return Err(
                 "an event sets parameters or the motion, which small differences do not follow".into()
             );

@@ -31,6 +31,9 @@ pub const FULL_GRACE: f64 = 5e9;
 /// A step of the series in double-double over one of the series in doubles of the same order, by counted
 /// instructions.
 const WIDE: f64 = 8.0;
+/// What a place with dry friction adds to an evaluation, and to a step of the series with the search for its
+/// transitions \[ns\].
+pub(super) const FRICTION: [f64; 2] = [2e3, 12e3];
 
 /// Prices of a mechanism's parts.
 #[derive(Clone, Copy, Debug)]
@@ -53,9 +56,10 @@ impl Prices {
             + mechanism.forces.len()) as f64;
         let goes_bodywise = mechanism.recursion.is_some();
         let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
-        let evaluation = 15.0 + 20.0 * n + matrices + 60.0 * rows + 20.0 * forces;
+        let friction = FRICTION.map(|price| price * mechanism.frictions.len() as f64);
+        let evaluation = 15.0 + 20.0 * n + matrices + 60.0 * rows + 20.0 * forces + friction[0];
         let of_series = if goes_bodywise { 200.0 * n } else { 150.0 * n * n + 300.0 * rows };
-        let general = 700.0 + 400.0 * n + of_series + 400.0 * rows + 700.0 * forces;
+        let general = 700.0 + 400.0 * n + of_series + 400.0 * rows + 700.0 * forces + friction[1];
         let plain = if !Taylor::has_lanes(mechanism, false) {
             general
         } else if n <= 2.0 && forces == 0.0 {

@@ -21,15 +21,19 @@ mod beside;
 mod gauss;
 mod ground;
 mod impact;
+mod numbers;
 mod record;
 mod rounding;
 mod start;
+mod together;
 
 use self::beside::Beside;
 use self::gauss::Gauss;
 pub(in crate::run) use self::gauss::eliminate;
 pub(in crate::run) use self::ground::Ground;
+use self::numbers::{Parameter, Push};
 use self::start::{Dice, unit};
+use super::budget::FRICTION;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
 use crate::run::build::Problem;
@@ -59,6 +63,9 @@ pub struct Tangent {
     series: Vec<(usize, Box<dyn Beside>)>,
     gauss: Gauss,
     ground: Option<Ground>,
+    /// The parameters that events set, and what those do in which neighbours differ.
+    set: Vec<usize>,
+    parameters: Vec<Parameter>,
     /// The columns the series are of.
     seeds: Vec<Vec<f64>>,
     rates: Vec<f64>,
@@ -81,7 +88,8 @@ pub(super) struct Path {
     freedom: usize,
     /// About the fastest rate \[rad/s\]: what rates are divided by to be compared with angles.
     rate: f64,
-    /// Columns of Phi(t, 0) over exp(log), those of rates times `rate`; or the vectors.
+    /// Columns of Phi(t, 0) over exp(log), those of rates times `rate`; or the vectors.  Behind the rates are
+    /// the parameters that events set.
     columns: Vec<Vec<f64>>,
     log: f64,
     /// True where the columns are those of the whole matrix, and where the step's own comes from Jacobians
@@ -201,8 +209,9 @@ impl Tangent {
             + self.mechanism.torsions.len()
             + self.mechanism.actions.len()
             + self.mechanism.forces.len()) as f64;
-        let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces);
-        let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces;
+        let friction = FRICTION.map(|price| price * self.mechanism.frictions.len() as f64);
+        let series = 700.0 + 400.0 * n + 150.0 * n * n + 700.0 * (rows + forces) + friction[1];
+        let evaluation = 15.0 + 20.0 * n + 4.0 * n * n + 60.0 * rows + 20.0 * forces + friction[0];
         (0.2 * series * (1.0 + 0.75 * self.seeds.len() as f64) / evaluation) as u64
     }
 
@@ -234,20 +243,25 @@ impl Tangent {
         if self.path.is_plain {
             return;
         }
-        let Self { path, seeds, mechanism, weights, .. } = self;
+        let Self { path, seeds, mechanism, weights, parameters, .. } = self;
         let f = weights.len();
         for (j, seed) in seeds.iter_mut().enumerate() {
             match path.is_whole {
                 true => seed.copy_from_slice(&unit(j, f, path.rate)),
-                false => seed.copy_from_slice(
-                    path.columns.get(j).unwrap_or_else(|| &path.inputs[j - path.columns.len()]),
-                ),
+                false => {
+                    let column = path.columns.get(j).unwrap_or_else(|| &path.inputs[j - path.columns.len()]);
+                    seed.copy_from_slice(&column[..2 * f]);
+                }
             }
         }
+        let push = Push::at(parameters, path, 2 * f);
+        let mut first = 0;
         let (mut reach, mut is_near, mut rest) = (LONGEST / path.rate, false, &seeds[..]);
         for (count, series) in &mut self.series {
             let (now, later) = rest.split_at(*count);
             series.expand(mechanism, &path.state, now);
+            push.add(first, *count, series.as_mut());
+            first += *count;
             is_near = self.ground.is_some() && series.weakest() < NEAR;
             let here = series.reach(weights, is_near);
             reach = if here.is_nan() || reach.is_nan() { f64::NAN } else { reach.min(here) };
@@ -306,7 +320,7 @@ impl Tangent {
         } else {
             let before = self.norm(&self.path.columns);
             for (column, seed) in self.path.columns.iter_mut().chain(&mut self.path.inputs).zip(&self.seeds) {
-                column.copy_from_slice(seed);
+                column[..seed.len()].copy_from_slice(seed);
             }
             self.scatter(h, taken, before);
         }

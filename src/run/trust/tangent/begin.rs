@@ -3,6 +3,7 @@
 use super::beside;
 use super::gauss::{self, Gauss};
 use super::ground::Ground;
+use super::numbers;
 use super::start::{Dice, unit};
 use super::{INPUTS, Path, Tangent, VECTORS, WHOLE};
 use crate::dynamics::{Coordinates, Mechanism, Motion};
@@ -28,10 +29,8 @@ impl Tangent {
     }
 
     fn of(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64, is_exact: bool) -> Result<Self, String> {
-        if mechanism.vibration.is_some() || mechanism.has_aims() {
-            let why =
-                "the mean force of a vibration, and laws of motors and walls that depend on the mechanism";
-            return Err(format!("{why}, have no tangent flow"));
+        if mechanism.vibration.is_some() {
+            return Err("the mean force of a vibration has no tangent flow".into());
         }
         let mut tangent = Self::bare(mechanism)?;
         let f = tangent.weights.len();
@@ -76,6 +75,9 @@ impl Tangent {
             (false, false) => beside::ORDERS[2],
         };
         tangent.path.inputs = tangent.changes(INPUTS[usize::from(!is_whole)], &mut dice);
+        for column in tangent.path.columns.iter_mut().chain(&mut tangent.path.inputs) {
+            column.resize(2 * f + tangent.set.len(), 0.0);
+        }
         // Vectors stand for as many as there are directions.
         tangent.path.log = 0.5 * libm::log(2.0 * freedom as f64 / count as f64);
         tangent.make_room();
@@ -107,7 +109,7 @@ impl Tangent {
         let rates = vec![0.0; problem.dimension()];
         let ground = (coordinates == Coordinates::All && !mechanism.constraints.is_empty())
             .then(|| Ground::new(mechanism));
-        let mechanism = Arc::clone(mechanism);
+        let (set, mechanism) = (numbers::set_by_events(mechanism), Arc::clone(mechanism));
         Ok(Self {
             mechanism,
             problem,
@@ -116,6 +118,8 @@ impl Tangent {
             series: Vec::new(),
             gauss: Gauss::new(),
             ground,
+            set,
+            parameters: Vec::new(),
             seeds: Vec::new(),
             rates,
             jacobian: Vec::new(),
@@ -136,7 +140,11 @@ impl Tangent {
         let fits = path.state.y.len() == dimension
             && path.state.low.len() == dimension
             && count > 0
-            && path.columns.iter().chain(&path.inputs).all(|column| column.len() == 2 * f)
+            && path
+                .columns
+                .iter()
+                .chain(&path.inputs)
+                .all(|column| column.len() == 2 * f + tangent.set.len())
             && (!path.is_whole || count == 2 * f && tangent.ground.is_none())
             && path.covariance.len() == if path.is_whole { 4 * f * f } else { 1 }
             && path.nodes.len() < gauss::STAGES * 2 * f * f
@@ -151,6 +159,7 @@ impl Tangent {
         tangent.path = path;
         tangent.hold_engaged();
         tangent.make_room();
+        tangent.take_parameters().ok()?;
         tangent.evaluate();
         if tangent.path.lost.is_none() {
             tangent.prepare();

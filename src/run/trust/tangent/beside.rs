@@ -45,6 +45,12 @@ pub trait Beside: Send {
 
     /// Share of the weakest constraint at the state: see [`schur`](crate::dynamics::schur).
     fn weakest(&self) -> f64;
+
+    /// The powers of the motion's own rates, one after the other.
+    fn powers(&self) -> Vec<f64>;
+
+    /// Adds so much of these powers to each column.
+    fn add(&mut self, powers: &[f64], shares: &[f64]);
 }
 
 /// Room for this many columns with powers up to `order`, one of [`ORDERS`], six in a series at most.
@@ -212,5 +218,17 @@ impl<const D: usize> Beside for Expanded<D> {
 
     fn weakest(&self) -> f64 {
         self.series.weakest().share
+    }
+
+    fn powers(&self) -> Vec<f64> {
+        self.series.rate.iter().map(|rate| rate.value).collect()
+    }
+
+    fn add(&mut self, powers: &[f64], shares: &[f64]) {
+        for (rate, power) in self.series.rate.iter_mut().zip(powers) {
+            for (slope, share) in rate.slope.iter_mut().zip(shares) {
+                *slope += share * power;
+            }
+        }
     }
 }

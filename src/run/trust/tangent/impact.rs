@@ -13,29 +13,34 @@
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
 //! Solitons & Fractals 5 (1995).
 
-use super::{Path, Tangent};
+use super::numbers::{moved, set_at};
+use super::{Path, Tangent, together};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::friction::Mode;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Coordinates, Mechanism, Motion};
-use crate::run::contact::{Jump, Switch, check_alone, in_modes};
+use crate::run::contact::{Jump, Switch, in_modes};
 use crate::run::event::SwitchFunction;
 use crate::run::friction::FrictionWatch;
 use crate::run::latch::plastic;
 use std::sync::Arc;
 
-/// Normal velocity over that of the point's parts below which a wall is grazed, and neighbours may miss it.
+/// Normal velocity over that of the point's parts, or over a usual one where these are nearly at rest, below which
+/// a wall is grazed, and neighbours may miss it.
 const GRAZED: f64 = 1e-7;
 /// Difference the impact's derivative is taken from, over the size of what it changes.
 const DIFFERENCE: f64 = 1e-6;
 
 /// What is on both sides of an impact, in plain doubles.
-struct Side {
-    phi: Vec<f64>,
-    omega: Vec<f64>,
-    acceleration: Vec<f64>,
+pub(super) struct Side {
+    pub phi: Vec<f64>,
+    pub omega: Vec<f64>,
+    pub acceleration: Vec<f64>,
 }
+
+/// A function of the motion, and of how far the parameters that events set are from their values.
+type Function<'a> = &'a dyn Fn(&Motion, &[f64]) -> Option<Vec<f64>>;
 
 impl Side {
     /// The motion itself as a column.
@@ -43,17 +48,18 @@ impl Side {
         [&self.omega[..], &self.acceleration[..]].concat()
     }
 
-    /// The derivative of a function of the motion along a column, and `late` \[s\]; `None` where there is no
-    /// such function.
-    fn slope(
+    /// The derivative of a function along a column, and `late` \[s\]; `None` where there is no such function.
+    pub(super) fn slope(
         &self,
         motion: &Motion,
         column: &[f64],
         late: f64,
-        value: &dyn Fn(&Motion) -> Option<Vec<f64>>,
+        value: Function,
     ) -> Option<Vec<f64>> {
         let n = self.phi.len();
-        let most = size(&column[..n], &self.phi).max(size(&column[n..], &self.omega)).max(late.abs());
+        let (moving, parameters) = column.split_at(2 * n);
+        let given = parameters.iter().fold(late.abs(), |most, change| most.max(change.abs()));
+        let most = size(&moving[..n], &self.phi).max(size(&moving[n..], &self.omega)).max(given);
         let small = if most > 0.0 { DIFFERENCE / most } else { 1.0 };
         let beside = |sign: f64| {
             let moved = |from: &[f64], by: &[f64]| -> Vec<DoubleDouble> {
@@ -61,17 +67,18 @@ impl Side {
             };
             let mut moved = Motion {
                 phi: moved(&self.phi, &column[..n]),
-                omega: moved(&self.omega, &column[n..]),
+                omega: moved(&self.omega, &moving[n..]),
                 ..motion.clone()
             };
             moved.time = motion.time + sign * small * late;
-            value(&moved)
+            let given: Vec<f64> = parameters.iter().map(|change| sign * small * change).collect();
+            value(&moved, &given)
         };
         let (ahead, behind) = (beside(1.0)?, beside(-1.0)?);
         Some(ahead.iter().zip(behind).map(|(ahead, behind)| (ahead - behind) / (2.0 * small)).collect())
     }
 
-    fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
+    pub(super) fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
         let [phi, omega] = plain(motion);
         let mut kernel = Kernel::<f64>::new(mechanism);
         kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
@@ -123,9 +130,10 @@ impl Tangent {
             return;
         }
         let n = self.mechanism.coordinates();
-        let mut all: Vec<Vec<f64>> =
-            self.path.columns.iter().chain(&self.path.inputs).map(|column| self.spread(column)).collect();
-        if let Err(why) = cross(&self.mechanism, jumps, &mut all) {
+        let unknowns = 2 * self.weights.len();
+        let spread = |column: &Vec<f64>| [&self.spread(column)[..], &column[unknowns..]].concat();
+        let mut all: Vec<Vec<f64>> = self.path.columns.iter().chain(&self.path.inputs).map(spread).collect();
+        if let Err(why) = cross(&self.mechanism, &self.set, jumps, &mut all) {
             return self.lose(&why);
         }
         if !Arc::ptr_eq(&last.mechanism, &self.mechanism) {
@@ -144,13 +152,17 @@ impl Tangent {
         if self.coordinates == Coordinates::Independent {
             let own = &self.mechanism.partition.independent;
             for column in &mut all {
-                *column = own.iter().map(|&k| column[k]).chain(own.iter().map(|&k| column[n + k])).collect();
+                let moving = own.iter().copied().chain(own.iter().map(|&k| n + k));
+                *column = moving.chain(2 * n..column.len()).map(|k| column[k]).collect();
             }
         }
         let inputs = all.split_off(self.path.columns.len());
         (self.path.columns, self.path.inputs) = (all, inputs);
         self.path.state = self.problem.state(&last.after);
         self.make_room();
+        if let Err(why) = self.take_parameters() {
+            return self.lose(&why);
+        }
         self.keep();
         self.evaluate();
         if self.normalise() {
@@ -166,8 +178,15 @@ impl Tangent {
 ///
 /// # Errors
 /// Why neighbours do not go the same way.
-fn cross(mechanism: &Arc<Mechanism>, jumps: &[Jump], columns: &mut [Vec<f64>]) -> Result<(), String> {
-    check_alone(jumps)?;
+fn cross(
+    mechanism: &Arc<Mechanism>,
+    set: &[usize],
+    jumps: &[Jump],
+    columns: &mut [Vec<f64>],
+) -> Result<(), String> {
+    if together::is_at_several(jumps) {
+        return columns.iter_mut().try_for_each(|column| together::cross(mechanism, jumps, column));
+    }
     let is_cause = |jump: &&Jump| jump.contact.is_some() || jump.switch.is_some() || jump.friction.is_some();
     let (Some(cause), Some(last)) = (jumps.iter().find(is_cause), jumps.last()) else { return Ok(()) };
     if jumps.iter().filter(|jump| jump.switch.is_some()).count() > 1 {
@@ -179,7 +198,7 @@ fn cross(mechanism: &Arc<Mechanism>, jumps: &[Jump], columns: &mut [Vec<f64>]) -
     let there = Side::new(&last.mechanism, &last.after);
     let late = match cause {
         Jump { contact: Some(contact), .. } => late_at_wall(mechanism, *contact, cause, &here, columns)?,
-        Jump { switch: Some(switch), .. } => late_at_switch(mechanism, switch, cause, &here, columns)?,
+        Jump { switch: Some(switch), .. } => late_at_switch(mechanism, set, switch, cause, &here, columns)?,
         Jump { friction, .. } => late_at_friction(mechanism, *friction, cause, &here, columns)?,
     };
     for (column, late) in columns.iter_mut().zip(late) {
@@ -188,8 +207,11 @@ fn cross(mechanism: &Arc<Mechanism>, jumps: &[Jump], columns: &mut [Vec<f64>]) -
             if let Some(contact) = jump.contact {
                 impact_at(jump, contact, late, column)?;
             }
-            if jump.switch.is_some() && jump.before.omega != jump.after.omega {
-                close_at(jump, late, column)?;
+            if let Some(switch) = &jump.switch {
+                set_at(mechanism, set, (switch, &jump.before), (&here, late), column)?;
+                if jump.before.omega != jump.after.omega {
+                    close_at(jump, late, column)?;
+                }
             }
         }
         shift(column, -late, &there);
@@ -198,7 +220,7 @@ fn cross(mechanism: &Arc<Mechanism>, jumps: &[Jump], columns: &mut [Vec<f64>]) -
 }
 
 /// Takes a column to a moment so much later \[s\].
-fn shift(column: &mut [f64], late: f64, side: &Side) {
+pub(super) fn shift(column: &mut [f64], late: f64, side: &Side) {
     let n = side.phi.len();
     for k in 0..n {
         column[k] += late * side.omega[k];
@@ -227,7 +249,8 @@ fn late_at_wall(
         &mut gradient,
     );
     let approach = dot(&gradient, &here.omega) + at.drive;
-    if approach >= -GRAZED * touched.step_size(&here.omega) {
+    let usual = touched.length / mechanism.units.time;
+    if approach >= -GRAZED * touched.step_size(&here.omega).max(usual) {
         return Err("a point grazes a wall, which neighbouring motions may miss".into());
     }
     Ok(columns.iter().map(|column| -dot(&gradient, &column[..n]) / approach).collect())
@@ -236,22 +259,22 @@ fn late_at_wall(
 /// How much later \[s\] an event happens that switches parts or branches, column by column.
 fn late_at_switch(
     mechanism: &Mechanism,
+    set: &[usize],
     switch: &Switch,
     cause: &Jump,
     here: &Side,
     columns: &[Vec<f64>],
 ) -> Result<Vec<f64>, String> {
-    if !switch.keeps_values {
-        return Err("an event sets parameters or the motion, which is not followed".into());
+    if !switch.keeps_motion {
+        return Err("an event from outside sets the motion, which is not followed".into());
     }
-    let value = |motion: &Motion| {
+    let value = |motion: &Motion, given: &[f64]| {
         let laws = mechanism.laws.as_ref()?;
+        let parameters = moved(&laws.parameters, set, given);
         mechanism.seen(motion, |at| match switch.at {
-            SwitchFunction::Event(number) => {
-                Some(vec![laws.formulas.event_value(number, at, &laws.parameters)])
-            }
+            SwitchFunction::Event(number) => Some(vec![laws.formulas.event_value(number, at, &parameters)]),
             SwitchFunction::Condition(number) => {
-                let values = laws.formulas.condition_values(at, &laws.parameters, &laws.modes);
+                let values = laws.formulas.condition_values(at, &parameters, &laws.modes);
                 values.get(number).map(|&value| vec![value])
             }
             SwitchFunction::Other => None,
@@ -268,8 +291,14 @@ fn late_at_friction(
     here: &Side,
     columns: &[Vec<f64>],
 ) -> Result<Vec<f64>, String> {
+    let n = mechanism.coordinates();
+    if columns.iter().any(|column| column[2 * n..].iter().any(|change| *change != 0.0)) {
+        return Err(
+            "dry friction beside a parameter that neighbouring motions set otherwise is not followed".into(),
+        );
+    }
     let watch = FrictionWatch::new(mechanism);
-    let value = |motion: &Motion| {
+    let value = |motion: &Motion, _: &[f64]| {
         let values = watch.as_ref()?.values(motion);
         Some(vec![*values.get(place?)?])
     };
@@ -281,7 +310,7 @@ fn late_at_zero(
     cause: &Jump,
     here: &Side,
     columns: &[Vec<f64>],
-    value: &dyn Fn(&Motion) -> Option<Vec<f64>>,
+    value: Function,
 ) -> Result<Vec<f64>, String> {
     let slope = |column: &[f64], late: f64| {
         here.slope(&cause.before, column, late, value)
@@ -300,11 +329,11 @@ fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Resu
     // Friction in hinges and sliders takes no part in impacts.
     let open = vec![Mode::Open; jump.mechanism.frictions.len()];
     let striking = in_modes(&jump.mechanism, &jump.mechanism.held, &open);
-    let rates = |motion: &Motion| {
+    let rates = |motion: &Motion, _: &[f64]| {
         let [phi, omega] = plain(motion);
         striking.impact_at(contact, motion.time, &phi, &omega).map(|impact| impact.omega)
     };
-    change(jump, late, column, &rates)
+    change(&jump.before, late, column, &rates)
         .ok_or_else(|| "neighbouring motions have no way back from a wall".into())
 }
 
@@ -312,27 +341,22 @@ fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut [f64]) -> Resu
 fn close_at(jump: &Jump, late: f64, column: &mut [f64]) -> Result<(), String> {
     let open = vec![Mode::Open; jump.mechanism.frictions.len()];
     let closing = in_modes(&jump.mechanism, &jump.mechanism.held, &open);
-    let rates = |motion: &Motion| plastic(&closing, motion).map(|(rates, ..)| rates);
-    change(jump, late, column, &rates)
+    let rates = |motion: &Motion, _: &[f64]| plastic(&closing, motion).map(|(rates, ..)| rates);
+    change(&jump.before, late, column, &rates)
         .ok_or_else(|| "what closes leaves neighbouring motions no rates".into())
 }
 
 /// The rates of a column after they have become others.
-fn change(
-    jump: &Jump,
-    late: f64,
-    column: &mut [f64],
-    rates: &dyn Fn(&Motion) -> Option<Vec<f64>>,
-) -> Option<()> {
-    let [phi, omega] = plain(&jump.before);
+pub(super) fn change(before: &Motion, late: f64, column: &mut [f64], rates: Function) -> Option<()> {
+    let [phi, omega] = plain(before);
     let n = phi.len();
     let side = Side { acceleration: Vec::new(), phi, omega };
-    let after = side.slope(&jump.before, column, late, rates)?;
-    column[n..].copy_from_slice(&after);
+    let after = side.slope(before, column, late, rates)?;
+    column[n..2 * n].copy_from_slice(&after);
     Some(())
 }
 
 /// Coordinates and rates in plain doubles.
-fn plain(motion: &Motion) -> [Vec<f64>; 2] {
+pub(super) fn plain(motion: &Motion) -> [Vec<f64>; 2] {
     [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect())
 }

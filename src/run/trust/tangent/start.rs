@@ -77,7 +77,7 @@ impl Tangent {
     pub(super) fn spread(&self, column: &[f64]) -> Vec<f64> {
         let f = self.weights.len();
         if self.coordinates != Coordinates::Independent {
-            return column.to_vec();
+            return column[..2 * f].to_vec();
         }
         let partition = &self.mechanism.partition.bodies;
         let half = |from: usize| {
