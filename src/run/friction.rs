@@ -7,17 +7,20 @@
 use super::contact::ContactDriver;
 use super::running::Outcome;
 use crate::arithmetic::Complex;
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::friction::modes::Modes;
 use crate::dynamics::friction::{Friction, Mode, Moment, Paradox, Transition};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
-use crate::dynamics::{Mechanism, Motion};
+use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, StepError};
 use serde::{Deserialize, Serialize};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::sync::Arc;
 
 /// Transitions kept by name; the rest are counted.
 const KEPT: usize = 1000;
+/// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
+const REGULAR: f64 = 0.3;
 
 /// A place with friction began to stick or to slide.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -34,13 +37,20 @@ pub struct FrictionRecord {
 pub(super) struct FrictionWatch {
     mechanism: Arc<Mechanism>,
     kernel: RefCell<Kernel<f64>>,
+    /// The regularity at the first place of the search under way, where it is far from zero.
+    regularity: Cell<Option<f64>>,
 }
 
 impl FrictionWatch {
     /// Those of a mechanism; `None` where it has no friction.
     pub fn new(mechanism: &Arc<Mechanism>) -> Option<Self> {
         let kernel = || RefCell::new(Kernel::new(mechanism));
-        (!mechanism.frictions.is_empty()).then(|| Self { mechanism: Arc::clone(mechanism), kernel: kernel() })
+        let mechanism = Arc::clone(mechanism);
+        (!mechanism.frictions.is_empty()).then(|| Self {
+            kernel: kernel(),
+            mechanism,
+            regularity: Cell::new(None),
+        })
     }
 
     /// How many there are: one a place, and the regularity of their equations.
@@ -53,14 +63,45 @@ impl FrictionWatch {
         self.mechanism.frictions.get(function)
     }
 
+    /// Begins to search a part of a step.
+    pub fn search(&self) {
+        self.regularity.set(None);
+    }
+
+    /// Relative velocities of what slides, which take no forces.
+    fn sliding(&self, t: Time, phi: &[f64], omega: &[f64]) -> Vec<f64> {
+        let z = self.mechanism.elements(phi);
+        let (at, mut row) = (Posture { phi, z: &z, omega }, vec![0.0; phi.len()]);
+        let of_place = |(friction, mode): (&Friction, &Mode)| match mode {
+            Mode::Slip(sign) => {
+                row.fill(0.0);
+                friction.tangent.differentiate(t, at, &mut row);
+                sign * dot(&row, omega)
+            }
+            _ => 1.0,
+        };
+        self.mechanism.frictions.iter().zip(&self.mechanism.modes).map(of_place).collect()
+    }
+
     /// Their values at a motion: positive as long as the modes hold.
+    ///
+    /// Where nothing sticks, forces are needed for the regularity only.  It is looked at where a search
+    /// begins, and everywhere where it is near zero.
     pub fn values(&self, motion: &Motion) -> Vec<f64> {
         let mechanism = &*self.mechanism;
         let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
         let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let is_sticking = mechanism.sticking() > 0;
+        if let Some(regularity) = self.regularity.get() {
+            let mut values = self.sliding(motion.time, &phi, &omega);
+            values.push(regularity);
+            return values;
+        }
         let (kernel, n) = (&mut *self.kernel.borrow_mut(), phi.len());
         kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
-        let is_sticking = mechanism.sticking() > 0;
+        if !is_sticking && kernel.regularity > REGULAR {
+            self.regularity.set(Some(kernel.regularity));
+        }
         let forces = if is_sticking {
             kernel.friction_forces(mechanism, motion.time, &phi, &omega)
         } else {

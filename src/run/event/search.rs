@@ -4,6 +4,7 @@
 
 use super::detector::{EventDetector, Owner, SAME};
 use crate::dynamics::Time;
+use crate::run::friction::FrictionWatch;
 use crate::run::inside::Inside;
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 
@@ -55,6 +56,7 @@ impl EventDetector {
         depth: u32,
         all: &mut Vec<Passage>,
     ) {
+        self.friction.iter().for_each(FrictionWatch::search);
         let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
         let is_enough = |curve: &Chebyshev| curve.tail() <= self.resolved * curve.most();
         let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));

@@ -1,7 +1,8 @@
 //! The reference solution of a run: the same motion by a finer series, looked at together with the run.
 //!
 //! Looks are a mean step of the reference solution apart, a half of it in the beginning and near the horizon:
-//! neither output times nor rests have a say in when they are.
+//! neither output times nor rests have a say in when they are.  A run that is read off polynomials inside its
+//! steps, which are less accurate than their ends, is looked at there, too, as long as its steps are few.
 
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
@@ -32,6 +33,10 @@ const FIRST: f64 = 1e-3;
 const GAPS: [f64; 4] = [0.5, 1.0, 0.5, 4.0];
 /// Looks that belong to the beginning.
 const BEGINNING: u64 = 128;
+/// The time to the next look over the mean step of a run that is read off polynomials, and the looks of a run
+/// that are made so at most.
+const INSIDE: f64 = 0.05;
+const LOOKS_INSIDE: f64 = 200.0;
 /// What the reference solution is off by itself over what was measured, at most.
 const MOST_OWN_ERROR: f64 = 2.0;
 /// Share of the budget for double-double, after which doubles go on, of runs near rounding.
@@ -117,10 +122,12 @@ fn shared(mechanism: &Mechanism, run: &Plan, error_estimator: &Plan) -> Vec<Stri
     let has_motors = mechanism.constraints.iter().any(|row| row.law.is_some());
     let eliminated = |plan: &Plan| has_motors && plan.stabilization == Stabilization::Elimination;
     let leaps = mechanism.has_closed_loops() && run.method == MethodId::Taylor;
+    let has_friction = !mechanism.frictions.is_empty();
     let words = [
         (has_walls, "impact law"),
         (has_walls && finds_likewise, "contact detection"),
-        (!mechanism.frictions.is_empty(), "laws of friction"),
+        (has_friction, "laws of friction"),
+        (has_friction && finds_likewise, "transitions of friction"),
         (leaps, "leaps through singular positions"),
         (eliminated(run) && eliminated(error_estimator), "elimination of motors"),
         (true, "compilation"),
@@ -303,8 +310,12 @@ impl ErrorEstimator {
             None if measured.seen < BEGINNING => first,
             None => usual,
         };
-        let due =
-            if t > 0.0 { t + share * reference_run.mean_step(t) } else { FIRST * self.mechanism.units.time };
+        let mut gap = share * reference_run.mean_step(t);
+        let is_polynomial = matches!(self.run.method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_));
+        if is_polynomial && measured.lost.is_none() {
+            gap = gap.min((INSIDE * t / statistics.steps.max(1) as f64).max(until / LOOKS_INSIDE));
+        }
+        let due = if t > 0.0 { t + gap } else { FIRST * self.mechanism.units.time };
         measured.due = due.max(t.next_up());
     }
 

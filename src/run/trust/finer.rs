@@ -13,6 +13,8 @@ const FINER: f64 = 100.0;
 /// The least order of reference solutions in double-double: where a run has few steps those beside it end
 /// where its own do, and of the same order they would have the same error.
 const ORDER: usize = 24;
+/// The order of those in doubles where powers of formulas or of friction are what a step costs.
+const ORDER_OF_FORMULAS: usize = 16;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
 /// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of
@@ -46,18 +48,27 @@ fn tolerance(plan: &Plan) -> Option<f64> {
     plan.tolerance.map(|tolerance| tolerance.relative.min(tolerance.absolute))
 }
 
+/// Whether formulas or friction are what a step of a series costs: their work grows with the square of the order.
+fn is_dear(mechanism: &Mechanism) -> bool {
+    !(mechanism.forces.is_empty() && mechanism.frictions.is_empty())
+}
+
 /// The first reference solution of a run.
 pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
     let finer = tolerance(run).map(|tolerance| tolerance / FINER);
-    let has_series = mechanism.has_series();
     let finds_impacts_likewise = run.method == MethodId::Taylor && !mechanism.contacts.is_empty();
-    if !has_series || finds_impacts_likewise {
+    if !mechanism.has_series_between_switches() || finds_impacts_likewise {
         return stepwise(mechanism, run, finer.filter(|_| !finds_impacts_likewise).unwrap_or(FINE).max(FINE));
+    }
+    if !mechanism.frictions.is_empty() {
+        return series(mechanism, run, finer.unwrap_or(FINE).max(FINE), [false; 2]);
     }
     let is_near = is_near_rounding(run);
     // Impacts are located in doubles. A series whose steps are those of the run shares their errors; with
-    // loops and sliders these are in what no step is judged by.
-    let is_alike = run.method == MethodId::Taylor && mechanism.has_multipliers();
+    // loops and sliders these are in what no step is judged by.  Where motors leave no freedom they do not
+    // add up.
+    let is_free = mechanism.assembly.degrees_of_freedom > 0;
+    let is_alike = run.method == MethodId::Taylor && mechanism.has_multipliers() && is_free;
     let may_extend = mechanism.contacts.is_empty() && (is_near || is_alike || level == Level::Full);
     let has_lanes =
         may_extend && !run.extended && !mechanism.has_multipliers() && Taylor::has_lanes(mechanism, true);
@@ -122,13 +133,16 @@ fn series(
     tolerance: f64,
     [extended, in_double_double]: [bool; 2],
 ) -> Finer {
-    if !mechanism.has_series() {
+    if !mechanism.has_series_between_switches() {
         return stepwise(mechanism, run, tolerance.max(FINE));
     }
     let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
     let mut plan = Plan::of_series(mechanism, tolerance, run.until);
     (plan.extended, plan.in_double_double) = (extended, in_double_double);
-    plan.order = in_double_double.then(|| order_in_double_double(tolerance.relative).max(ORDER));
+    plan.order = match in_double_double {
+        true => Some(order_in_double_double(tolerance.relative).max(ORDER)),
+        false => is_dear(mechanism).then_some(ORDER_OF_FORMULAS),
+    };
     let digits = match (in_double_double, extended) {
         (true, _) => " in double-double",
         (_, true) => ", first orders in double-double",
