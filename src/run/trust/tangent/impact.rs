@@ -26,9 +26,10 @@ use crate::run::friction::FrictionWatch;
 use crate::run::latch::plastic;
 use std::sync::Arc;
 
-/// Normal velocity over that of the point's parts, or over a usual one where these are nearly at rest, below which
-/// a wall is grazed, and neighbours may miss it.
+/// Normal velocity over that of the point's parts below which a wall is grazed, and neighbours may miss it;
+/// and over a usual one where the parts are nearly at rest: there differences of 1e-12 may.
 const GRAZED: f64 = 1e-7;
+const HARDLY_MET: f64 = 1e-6;
 /// Difference the impact's derivative is taken from, over the size of what it changes.
 const DIFFERENCE: f64 = 1e-6;
 
@@ -250,7 +251,7 @@ fn late_at_wall(
     );
     let approach = dot(&gradient, &here.omega) + at.drive;
     let usual = touched.length / mechanism.units.time;
-    if approach >= -GRAZED * touched.step_size(&here.omega).max(usual) {
+    if approach >= -(GRAZED * touched.step_size(&here.omega)).max(HARDLY_MET * usual) {
         return Err("a point grazes a wall, which neighbouring motions may miss".into());
     }
     Ok(columns.iter().map(|column| -dot(&gradient, &column[..n]) / approach).collect())
