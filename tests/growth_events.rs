@@ -177,7 +177,7 @@ fn scene_of_numbers(seed: u64) -> (String, &'static str) {
         ),
         "caught" => format!(
             r#""parameters": {{"p": 0}}, {}
-            "events": [{{"name": "turn", "when": "b0.omega", "direction": "rising", "set": {{"p": "0.4*b0.phi + 0.1*b{last}.omega"}}}}],"#,
+            "events": [{{"name": "passes", "when": "b0.phi - {at}", "direction": "rising", "set": {{"p": "0.4*b{last}.phi + 0.1*b0.omega"}}}}],"#,
             spring(&format!("{k}*(angle - p)"))
         ),
         "timed" => format!(
