@@ -152,7 +152,7 @@ fn scene(seed: u64) -> (String, &'static str) {
 /// A scene whose events set parameters, to the same values for neighbours or to others, or whose motors aim at
 /// where the mechanism is.
 fn scene_of_numbers(seed: u64) -> (String, &'static str) {
-    let mut dice = Dice::new(seed ^ 0x5e7_0f_5e7);
+    let mut dice = Dice::new(seed ^ 0x5e70_f5e7);
     let count = 1 + dice.pick(2);
     let kind = dice.one(&["constant", "caught", "timed", "counted", "gear", "cam"]);
     let mut chain = Chain::new(&mut dice, count, false);
