@@ -154,7 +154,7 @@ fn scene(seed: u64) -> (String, &'static str) {
 fn scene_of_numbers(seed: u64) -> (String, &'static str) {
     let mut dice = Dice::new(seed ^ 0x5e70_f5e7);
     let count = 1 + dice.pick(2);
-    let kind = dice.one(&["constant", "caught", "timed", "counted", "gear", "cam"]);
+    let kind = dice.one(&["constant", "caught", "timed", "counted", "gear", "cam", "wall"]);
     let mut chain = Chain::new(&mut dice, count, false);
     let last = count - 1;
     let (k, c) = (dice.size(1.0, 40.0), dice.within(0.5, 3.0));
@@ -192,6 +192,14 @@ fn scene_of_numbers(seed: u64) -> (String, &'static str) {
             "events": [{{"name": "turn", "when": "b0.omega", "direction": "rising", "set": {{"next": "0.5*b0.phi"}}}},
                        {{"name": "passes", "when": "b0.phi - next", "direction": "rising", "set": {{"p": "0.2*b{last}.omega"}}}}],"#,
             spring(&format!("{k}*(angle - p)"))
+        ),
+        // A curved wall, which the other parts move as well.
+        "wall" => format!(
+            r#""walls": [{{"name": "w", "body": "b{last}", "point": [{}, 0], "restitution": {},
+                "line": {{"through": [{}, 0], "normal": [1, 0]}}, "law": "0.1*sin(2*b0.phi) + 0.05*b{last}.cos + 0.05*sin({c}*t)"}}],"#,
+            chain.lengths[last],
+            dice.within(0.5, 1.0),
+            -0.4 * chain.lengths.iter().sum::<f64>()
         ),
         _ => {
             chain.bars.push(
