@@ -17,6 +17,8 @@ mod relations;
 #[path = "common/scaled.rs"]
 #[allow(dead_code)]
 mod scaled;
+#[path = "common/switched.rs"]
+mod switched;
 #[path = "common/trees.rs"]
 mod trees;
 
@@ -76,6 +78,7 @@ mod rigid;
 mod scaling;
 mod scenes;
 mod sensitivity;
+mod sensitivity_crossings;
 mod singular;
 mod spring_laws;
 mod stabilization;

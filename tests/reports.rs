@@ -21,6 +21,8 @@ mod program;
 mod random;
 #[path = "common/relations.rs"]
 mod relations;
+#[path = "common/switched.rs"]
+mod switched;
 #[path = "common/targets.rs"]
 #[allow(dead_code)]
 mod targets;

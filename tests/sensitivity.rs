@@ -8,15 +8,15 @@ use driftless::{Measure, Regime, Sensitivity, SensitivityRequest, Template, lyap
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-fn template(text: &str) -> Template {
+pub fn template(text: &str) -> Template {
     Template::new(text.into(), "scene.json".into(), &[])
 }
 
-fn example(name: &str) -> Template {
+pub fn example(name: &str) -> Template {
     Template::read(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
 }
 
-fn derived(template: &Template, of: &[&str], to: &[&str], at: f64) -> Sensitivity {
+pub fn derived(template: &Template, of: &[&str], to: &[&str], at: f64) -> Sensitivity {
     let request = SensitivityRequest {
         of: of.iter().map(|text| text.parse::<Measure>().expect("a measure")).collect(),
         to: to.iter().map(|path| (*path).to_owned()).collect(),
@@ -26,7 +26,7 @@ fn derived(template: &Template, of: &[&str], to: &[&str], at: f64) -> Sensitivit
     sensitivity(template, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"))
 }
 
-fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
+pub fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
     let size = expected.abs().max(1e-3);
     assert!((found - expected).abs() <= tolerance * size, "{what}: {found:e} instead of {expected:e}");
 }
@@ -250,7 +250,7 @@ fn differences(template: &Template, path: &str, value: f64, at: f64, share: f64)
 
 /// The largest relative difference of derivatives of all angles and rates from differences of references, and
 /// how far these themselves are known; none where there are none.
-fn compared(template: &Template, paths: &[&str], at: f64) -> Result<Vec<(String, f64, f64)>, String> {
+pub fn compared(template: &Template, paths: &[&str], at: f64) -> Result<Vec<(String, f64, f64)>, String> {
     let scene = template.scene().map_err(|error| error.to_string())?;
     let names: Vec<String> = ["phi", "omega"]
         .iter()

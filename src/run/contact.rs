@@ -12,7 +12,7 @@ mod several;
 mod state;
 
 pub(super) use impacts::in_modes;
-pub(super) use jumps::{Jump, JumpLog, Switch, check_alone};
+pub(super) use jumps::{Jump, JumpLog, Switch};
 pub(super) use state::ContactDriverState;
 
 use super::driver::{Driver, Halt, Pause, Watch};

@@ -64,6 +64,7 @@ pub mod plan;
 pub mod reference;
 #[doc(hidden)]
 pub mod running;
+mod saltation;
 #[doc(hidden)]
 pub mod sample;
 #[doc(hidden)]

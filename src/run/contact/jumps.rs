@@ -67,13 +67,3 @@ impl JumpLog {
         std::mem::take(&mut *self.list.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
-
-/// Why small differences do not go on through what happens at one moment, where they do not.
-pub(in crate::run) fn check_alone(jumps: &[Jump]) -> Result<(), String> {
-    match jumps.iter().any(|jump| !jump.together.is_empty()) {
-        true => {
-            Err("several walls are met at once, which neighbouring motions meet one after the other".into())
-        }
-        false => Ok(()),
-    }
-}

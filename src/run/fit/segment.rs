@@ -69,6 +69,13 @@ pub(super) fn pass(
     if let Some(lost) = variation.lost {
         return Err(lost);
     }
+    let is_part = from.is_some() || !directions.is_empty();
+    let is_known = variation.mechanism.frictions.is_empty()
+        && variation.mechanism.held.is_empty()
+        && !variation.set.is_set.contains(&true);
+    if is_part && !is_known {
+        return Err("what sticks, rests on a wall or is set by events does not go on from a place alone".into());
+    }
     let end = sampler.end.ok_or("the motion ends before the data")?;
     let place = [
         (0..end.phi.len()).map(|k| end.unwrapped(k)).collect(),

@@ -86,6 +86,10 @@ pub fn lyapunov(
 ) -> Result<Spectrum, SensitivityError> {
     let request = SensitivityRequest { at: until, tolerance, ..SensitivityRequest::default() };
     let study = Study::new(template, &request)?;
+    if !study.mechanism.frictions.is_empty() {
+        let why = "with dry friction directions are lost, and there is no spectrum";
+        return Err(SensitivityError::Unsuited(why.into()));
+    }
     let mut outcome = Outcome::begun(&study.mechanism, study.plan.clone());
     let mut driver = study.driver(&mut outcome, None)?;
     let (mechanism, motion) = (driver.holding().clone(), driver.motion());
@@ -308,6 +312,10 @@ impl Look for Orthonormal {
         }
         if !variation.mechanism.held.is_empty() {
             return variation.lose("a point stays on its wall, and directions are lost");
+        }
+        if variation.met_several || variation.set.differ() {
+            let why = "several walls are met at once, or an event sets a number otherwise beside it, and volumes are not followed";
+            return variation.lose(why);
         }
         self.renew(variation, motion);
         self.now = time;

@@ -1,14 +1,16 @@
 //! What is derived: outputs at a time, extremes over the run, times of flips, events and impacts.
 
 use super::super::event::SwitchFunction;
-use super::saltation::{Side, event_value, moved};
-use super::variation::Variation;
+use super::neighbours::weighted;
+use super::variation::{Variation, plain};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::saltation::{Column, Side, event_value, late_at_zero};
 use crate::scene::Output;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 
 /// A quantity of a run that is derived by numbers of its scene.
 ///
@@ -110,20 +112,21 @@ pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Der
         return Derived::default();
     }
     let side = Side::new(mechanism, motion);
+    let at = (motion.time, &side.phi[..], &side.omega[..]);
     let mut kernel = Kernel::new(mechanism);
-    let values = outputs_at(mechanism, &mut kernel, motion, (side.t, &side.phi, &side.omega));
+    let values = outputs_at(mechanism, &mut kernel, motion, at);
     let mut along = |column: &[f64], late: f64| {
-        let mut at = |t: Time, phi: &[f64], omega: &[f64]| {
-            Some(outputs_at(mechanism, &mut kernel, motion, (t, phi, omega)))
+        let mut beside = |moved: &Motion| {
+            let (t, phi, omega) = plain(moved);
+            Some(outputs_at(mechanism, &mut kernel, motion, (t, &phi, &omega)))
         };
-        side.slope(column, late, f64::INFINITY, &mut at).unwrap_or_default()
+        side.slope(column, late, f64::INFINITY, &mut beside).unwrap_or_default()
     };
     let rates = along(&side.ahead(), 1.0);
     let mut slopes = vec![Vec::new(); values.len()];
     for (column, neighbours) in variation.columns.iter().zip(&mut variation.neighbours) {
         let mut sums = along(column, 0.0);
         for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
-            let at = (side.t, &side.phi[..], &side.omega[..]);
             let values = outputs_at(&neighbour.mechanism, &mut neighbour.kernel, motion, at);
             sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += neighbour.weight * value);
         }
@@ -139,22 +142,16 @@ pub(super) fn flip_slopes(variation: &Variation, motion: &Motion, bar: usize) ->
 
 /// How the time of an event of the scene moves.
 pub(super) fn event_slopes(variation: &Variation, motion: &Motion, event: usize) -> Option<Vec<f64>> {
-    let base = &*variation.mechanism;
-    let side = Side::new(base, motion);
-    let value = |mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]| {
-        event_value(mechanism, SwitchFunction::Event(event), &moved(motion, t, phi, omega))
+    let side = Side::new(&variation.mechanism, motion);
+    let mut entries = variation.columns.clone();
+    let column = |(entries, neighbours): (_, &Option<super::Neighbours>)| {
+        let neighbours = weighted(neighbours.as_ref().map_or(&[][..], |neighbours| &neighbours.list));
+        Column { entries, neighbours }
     };
-    let along = |column: &[f64], late: f64| {
-        let mut at = |t: Time, phi: &[f64], omega: &[f64]| Some(vec![value(base, t, phi, omega)?]);
-        side.slope(column, late, f64::INFINITY, &mut at).map(|slope| slope[0])
+    let entries = entries.iter_mut().map(Vec::as_mut_slice);
+    let columns: Vec<Column> = entries.zip(&variation.neighbours).map(column).collect();
+    let value = |mechanism: &Arc<Mechanism>, motion: &Motion| {
+        Some(vec![event_value(mechanism, SwitchFunction::Event(event), motion)?])
     };
-    let rate = along(&side.ahead(), 1.0).filter(|rate| *rate != 0.0)?;
-    let slope = |(column, neighbours): (&Vec<f64>, &Option<super::Neighbours>)| {
-        let mut change = along(column, 0.0)?;
-        for neighbour in neighbours.iter().flat_map(|neighbours| &neighbours.list) {
-            change += neighbour.weight * value(&neighbour.mechanism, side.t, &side.phi, &side.omega)?;
-        }
-        Some(-change / rate)
-    };
-    variation.columns.iter().zip(&variation.neighbours).map(slope).collect()
+    late_at_zero(&variation.mechanism, &side, &columns, &value).ok()
 }

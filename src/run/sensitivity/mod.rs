@@ -1,7 +1,7 @@
 //! Sensitivities: derivatives of outputs and measures of a run by any number of its scene.
 //!
 //! One run of [`taylor`](crate::stepping::taylor) carries a column for each number beside the motion (module
-//! `variation`), through impacts and events that switch something (module `saltation`).  Columns are power
+//! `variation`), through impacts, events and the transitions of dry friction (module `crossing`).  Columns are power
 //! series on numbers with derivatives (module `expanded`) where the scene has such, and else integrated by
 //! collocation (module `collocation`); what a number does there, to the start, to outputs and to impacts, is
 //! told by neighbouring mechanisms at one and the same state (module `neighbours`).  Nothing is a difference of
@@ -13,12 +13,12 @@
 //! ```
 
 mod collocation;
+mod crossing;
 mod expanded;
 mod lyapunov;
 mod measure;
 mod neighbours;
 mod result;
-mod saltation;
 mod variation;
 
 use expanded::Expanded;
@@ -125,8 +125,8 @@ impl Study {
         let template = template.clone().with_outputs(outputs);
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
-        if !mechanism.has_series() {
-            let what = "small differences are followed beside `taylor`, which does not take this scene: dry friction and rigid springs that vibrate have no series, and very many bodies are too many";
+        if mechanism.vibration.is_some() || !mechanism.tree.is_dense() {
+            let what = "small differences are followed beside `taylor`, which does not take this scene: rigid springs that vibrate have no series, and very many bodies are too many";
             return Err(SensitivityError::Unsuited(what.into()));
         }
         let until = request.at.unwrap_or(scene.until);
@@ -257,6 +257,7 @@ impl Study {
         let neighbours = &mut variation.neighbours;
         variation.expanded = expanded
             .ok()
+            .filter(|_| self.mechanism.frictions.is_empty())
             .and_then(|mut expanded| expanded.agrees(&self.start, neighbours).then_some(expanded));
         Ok(variation)
     }

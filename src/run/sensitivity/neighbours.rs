@@ -14,6 +14,7 @@ use super::super::contact::in_modes;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
+use crate::run::saltation::Weighted;
 use crate::scene::{Template, Variable};
 use std::sync::Arc;
 
@@ -24,6 +25,8 @@ const FIRST: usize = 1;
 const ENOUGH: f64 = 1e-11;
 /// The estimated relative error that is too large for a derivative.
 const TOO_MUCH: f64 = 1e-4;
+/// The change of a parameter that an event sets, over its value.
+const SET: f64 = 1e-3;
 /// What a change of the number by its own size does, over the values, below which it does nothing.
 const NOTHING: f64 = 1e-11;
 /// Rounding of an evaluation, over its value.
@@ -44,6 +47,8 @@ pub(in crate::run) struct Neighbour {
     pub weight: f64,
     /// As compiled, and with the contacts held and on the branches of the moment.
     compiled: Arc<Mechanism>,
+    /// The parameter that an event has set otherwise, and by how much.
+    set: Option<(usize, f64)>,
     pub mechanism: Arc<Mechanism>,
     pub kernel: Kernel<f64>,
 }
@@ -62,9 +67,10 @@ impl Neighbour {
 }
 
 /// The mechanisms for one number.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(in crate::run) struct Neighbours {
-    /// Empty where the number does nothing but move the start.
+    /// Empty where the number does nothing but move the start; those of parameters that events set are the
+    /// last.
     pub list: Vec<Neighbour>,
     /// Derivative of the start: all coordinates, then all rates.
     pub start: Vec<f64>,
@@ -140,6 +146,7 @@ impl Neighbours {
         let is_alike = attempt.list.iter().all(|(_, candidate)| is_alike(&candidate.mechanism, base));
         let neighbour = |(weight, candidate): (f64, Candidate)| Neighbour {
             weight,
+            set: None,
             kernel: Kernel::new(&candidate.mechanism),
             compiled: Arc::clone(&candidate.mechanism),
             mechanism: candidate.mechanism,
@@ -148,18 +155,42 @@ impl Neighbours {
         Self { list, start, error, floor: NOTHING / scale }
     }
 
-    /// Goes on with the parts that act, the contacts held and the branches of a mechanism.
+    /// Takes neighbours for parameters, by number, that events have set in `mechanism` with these derivatives
+    /// instead of those there are, beside the mechanism as compiled.
+    pub fn set(&mut self, compiled: &Arc<Mechanism>, mechanism: &Mechanism, given: &[(usize, f64)]) {
+        self.list.retain(|neighbour| neighbour.set.is_none());
+        let parameters = mechanism.laws.as_ref().map_or(&[][..], |laws| &laws.parameters);
+        for &(number, slope) in given {
+            let value = parameters[number].abs();
+            let change = SET * if value == 0.0 { 1.0 } else { value };
+            self.list.extend(BOTH.iter().map(|[offset, weight]| Neighbour {
+                weight: weight * slope / change,
+                set: Some((number, offset * change)),
+                kernel: Kernel::new(compiled),
+                compiled: Arc::clone(compiled),
+                mechanism: Arc::clone(compiled),
+            }));
+        }
+    }
+
+    /// Goes on with the parts that act, the contacts held and the branches of a mechanism, and with the values
+    /// of the parameters, by number, that events have set.
     ///
     /// # Errors
     /// A neighbour cannot go on so.
-    pub fn follow(&mut self, mechanism: &Mechanism, off: &[String]) -> Result<(), String> {
+    pub fn follow(&mut self, mechanism: &Mechanism, off: &[String], known: &[usize]) -> Result<(), String> {
         for neighbour in &mut self.list {
-            let whole = neighbour.compiled.whole.as_ref().map_or(&neighbour.compiled, |(whole, _)| whole);
+            let whole = neighbour.compiled.with_all_parts();
             let mut acting = Mechanism::clone(whole);
             if let (Some(own), Some(laws)) = (&whole.laws, &mechanism.laws) {
-                acting = whole
-                    .on_branch(own.parameters.clone(), laws.modes.clone())
-                    .map_err(|error| error.to_string())?;
+                let mut parameters = own.parameters.clone();
+                known.iter().for_each(|&number| parameters[number] = laws.parameters[number]);
+                if let Some((number, by)) = neighbour.set {
+                    parameters.clone_from(&laws.parameters);
+                    parameters[number] += by;
+                }
+                acting =
+                    whole.on_branch(parameters, laws.modes.clone()).map_err(|error| error.to_string())?;
             }
             let acting = if off.is_empty() { acting } else { acting.without(off)? };
             neighbour.mechanism = in_modes(&Arc::new(acting), &mechanism.held, &mechanism.modes);
@@ -167,6 +198,11 @@ impl Neighbours {
         }
         Ok(())
     }
+}
+
+/// The mechanisms with their weights.
+pub(super) fn weighted(list: &[Neighbour]) -> Vec<Weighted> {
+    list.iter().map(|neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism))).collect()
 }
 
 /// Keeps the better one, by its error and its number.

@@ -7,8 +7,8 @@
 //!
 //! The columns (dq, dw) are integrated on the steps of the motion itself, inside which its dense output is known
 //! (module `collocation`); A_q and A_w are evaluated on dual numbers, what a number p does at a state is told
-//! by its neighbours (module `neighbours`), what an impact or an event does by the saltation matrix (module
-//! `saltation`).  Driven angles are coordinates like all others here: their rows give them what the law's own
+//! by its neighbours (module `neighbours`), what an impact or an event does by the saltation matrix
+//! ([`saltation`](crate::run::saltation)).  Driven angles are coordinates like all others here: their rows give them what the law's own
 //! numbers do.
 //!
 //! Source: M. Géradin, A. Cardona, *Flexible Multibody Dynamics* (2001), chapter 12; E. Hairer, S. P. Nørsett,
@@ -18,6 +18,7 @@ use super::super::contact::{ContactDriver, JumpLog};
 use super::super::inside::{Observer, ObserverAdapter, Step};
 use super::super::trust::Ground;
 use super::collocation::{Collocation, STAGES};
+use super::crossing::SetNumbers;
 use super::expanded::{self, Expanded};
 use super::lyapunov::Dissipation;
 use super::neighbours::{Neighbours, residuals};
@@ -26,6 +27,7 @@ use crate::dynamics::kernel::Bias;
 use crate::dynamics::{Mechanism, Motion, State, Time};
 use crate::run::driver::Pause;
 use crate::run::running::Outcome;
+use crate::run::saltation::set_by_events;
 use crate::stepping::StepError;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -45,6 +47,14 @@ pub(in crate::run) struct Variation {
     pub columns: Vec<Vec<f64>>,
     /// What moves each column beside the motion.
     pub neighbours: Vec<Option<Neighbours>>,
+    /// Parameters that events set.
+    pub set: SetNumbers,
+    /// The mechanism as compiled.
+    pub(super) compiled: Arc<Mechanism>,
+    /// Motors and locks that engaged on the way, by row.
+    pub(super) engaged: Vec<usize>,
+    /// Whether several walls were met at once.
+    pub met_several: bool,
     /// The series of the columns, where they have such.
     pub(super) expanded: Option<Expanded>,
     /// Impacts so far.
@@ -98,9 +108,6 @@ impl Variation {
         columns: Vec<Vec<f64>>,
         mut neighbours: Vec<Option<Neighbours>>,
     ) -> Result<Self, String> {
-        if !mechanism.frictions.is_empty() {
-            return Err("small differences are not followed through the transitions of dry friction".into());
-        }
         if mechanism.vibration.is_some() {
             return Err("the mean force of a rigid spring's vibration is not followed".into());
         }
@@ -111,9 +118,15 @@ impl Variation {
         let forcing = vec![Vec::new(); columns.len()];
         let off = mechanism.whole.as_ref().map(|(_, off)| off.clone()).unwrap_or_default();
         for neighbours in neighbours.iter_mut().flatten() {
-            neighbours.follow(mechanism, &off)?;
+            neighbours.follow(mechanism, &off, &[])?;
         }
+        let numbers = set_by_events(mechanism);
+        let is_set = vec![false; numbers.len()];
         let mut variation = Self {
+            set: SetNumbers { numbers, is_set, slopes: Vec::new() },
+            compiled: Arc::clone(mechanism),
+            engaged: Vec::new(),
+            met_several: false,
             jacobian: Jacobian::new(mechanism),
             ground: None,
             mechanism: Arc::clone(mechanism),
@@ -174,6 +187,9 @@ impl Variation {
     pub fn hold(&mut self, mechanism: &Arc<Mechanism>) {
         self.jacobian = Jacobian::new(mechanism);
         self.ground = (!mechanism.constraints.is_empty()).then(|| Ground::new(mechanism));
+        if let Some(ground) = &mut self.ground {
+            ground.engaged.clone_from(&self.engaged);
+        }
         self.mechanism = Arc::clone(mechanism);
     }
 

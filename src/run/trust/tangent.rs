@@ -25,7 +25,6 @@ mod numbers;
 mod record;
 mod rounding;
 mod start;
-mod together;
 
 use self::beside::Beside;
 use self::gauss::Gauss;

@@ -3,11 +3,11 @@
 use super::beside;
 use super::gauss::{self, Gauss};
 use super::ground::Ground;
-use super::numbers;
 use super::start::{Dice, unit};
 use super::{INPUTS, Path, Tangent, VECTORS, WHOLE};
 use crate::dynamics::{Coordinates, Mechanism, Motion};
 use crate::run::build::tangent_form;
+use crate::run::saltation::set_by_events;
 use crate::run::trust::DistanceMetric;
 use std::sync::Arc;
 
@@ -109,7 +109,7 @@ impl Tangent {
         let rates = vec![0.0; problem.dimension()];
         let ground = (coordinates == Coordinates::All && !mechanism.constraints.is_empty())
             .then(|| Ground::new(mechanism));
-        let (set, mechanism) = (numbers::set_by_events(mechanism), Arc::clone(mechanism));
+        let (set, mechanism) = (set_by_events(mechanism), Arc::clone(mechanism));
         Ok(Self {
             mechanism,
             problem,

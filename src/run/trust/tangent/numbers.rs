@@ -2,72 +2,39 @@
 //! values there, and go on with these.
 //!
 //! ```text
-//! dp⁺ = dP(dt, dq, dw, dp)                    P  what an event sets, dt later
 //! w_m' = (w_m)_q dq + (w_m)_w dw + (w_m)_p dp      powers m of the rates; the last part from series at p ± e
 //! ```
 //!
 //! A column has the differences of all parameters that events set behind its rates.
 
 use super::beside::{self, Beside};
-use super::impact::Side;
 use super::{Path, Tangent};
-use crate::dynamics::{Coordinates, Mechanism, Motion, State};
-use crate::run::contact::Switch;
-use crate::run::event::SwitchFunction;
+use crate::dynamics::{Coordinates, Mechanism, State};
+use crate::run::saltation::Weighted;
+use std::sync::Arc;
 
 /// Difference of a parameter over its size.
 const DIFFERENCE: f64 = 1e-4;
+/// Why there is no flow.
+const NO_LAWS: &str = "laws cannot go on with neighbouring values";
 
-/// The parameters that events of a mechanism set, by number.
-pub(super) fn set_by_events(mechanism: &Mechanism) -> Vec<usize> {
-    let events = mechanism.laws.iter().flat_map(|laws| &laws.formulas.events);
-    let mut set: Vec<usize> = events.flat_map(|event| event.parameters()).collect();
-    set.sort_unstable();
-    set.dedup();
-    set
+/// A mechanism with a parameter above and below its value, and half the difference.
+fn on_both_sides(mechanism: &Mechanism, number: usize) -> Option<(f64, [Arc<Mechanism>; 2])> {
+    let known = &mechanism.laws.as_ref()?.parameters;
+    let value = known[number];
+    let half = DIFFERENCE * if value == 0.0 { 1.0 } else { value.abs() };
+    let side = |sign: f64| {
+        let mut parameters = known.clone();
+        parameters[number] = value + sign * half;
+        mechanism.with_parameters(parameters).ok().map(Arc::new)
+    };
+    Some((half, [side(1.0)?, side(-1.0)?]))
 }
 
-/// Parameters that are so far from their values, those that events set.
-pub(super) fn moved(parameters: &[f64], set: &[usize], given: &[f64]) -> Vec<f64> {
-    let mut moved = parameters.to_vec();
-    set.iter().zip(given).for_each(|(&number, change)| moved[number] += change);
-    moved
-}
-
-/// What an event, at a motion and so much later \[s\], sets otherwise along a column.
-pub(super) fn set_at(
-    mechanism: &Mechanism,
-    set: &[usize],
-    (switch, motion): (&Switch, &Motion),
-    (here, late): (&Side, f64),
-    column: &mut [f64],
-) -> Result<(), String> {
-    let sets = |event: usize| {
-        let events = mechanism.laws.as_ref().map(|laws| &laws.formulas.events);
-        events.is_some_and(|events| events[event].parameters().next().is_some())
-    };
-    let number = match switch.at {
-        SwitchFunction::Event(number) if sets(number) => number,
-        _ if switch.keeps_parameters => return Ok(()),
-        _ => return Err("an event from outside sets parameters, which is not followed".into()),
-    };
-    let value = |motion: &Motion, given: &[f64]| {
-        let laws = mechanism.laws.as_ref()?;
-        let parameters = moved(&laws.parameters, set, given);
-        let after = mechanism.seen(motion, |at| laws.formulas.set_by(number, at, &parameters));
-        Some(set.iter().map(|&number| after[number]).collect())
-    };
-    let slopes =
-        here.slope(motion, column, late, &value).ok_or("what an event sets is not known to the scene")?;
-    let drives = mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.drives());
-    if drives && slopes.iter().any(|slope| *slope != 0.0) {
-        return Err(
-            "an event sets a parameter beside formulas of motors or walls, which neighbouring motions set otherwise"
-                .into(),
-        );
-    }
-    column[2 * here.phi.len()..].copy_from_slice(&slopes);
-    Ok(())
+/// These with their weights, where a column has a parameter so far from its value.
+fn weighted(change: f64, half: f64, sides: [&Arc<Mechanism>; 2]) -> [Weighted; 2] {
+    let weight = change / (2.0 * half);
+    [(weight, Arc::clone(sides[0])), (-weight, Arc::clone(sides[1]))]
 }
 
 /// What a parameter does to the powers of the rates.
@@ -75,7 +42,7 @@ pub(super) struct Parameter {
     /// Its place among those that events set.
     place: usize,
     /// The mechanism at neighbouring values on both sides, and half the difference between these.
-    sides: [(Mechanism, Box<dyn Beside>); 2],
+    sides: [(Arc<Mechanism>, Box<dyn Beside>); 2],
     half: f64,
     powers: Vec<f64>,
 }
@@ -87,17 +54,12 @@ impl Parameter {
         order: usize,
         [place, number]: [usize; 2],
     ) -> Option<Self> {
-        let known = &mechanism.laws.as_ref()?.parameters;
-        let value = known[number];
-        let half = DIFFERENCE * if value == 0.0 { 1.0 } else { value.abs() };
-        let side = |sign: f64| {
-            let mut parameters = known.clone();
-            parameters[number] = value + sign * half;
-            let mechanism = mechanism.with_parameters(parameters).ok()?;
+        let (half, sides) = on_both_sides(mechanism, number)?;
+        let [ahead, behind] = sides.map(|mechanism| {
             let (_, series) = beside::room(&mechanism, coordinates, order, 1).pop()?;
             Some((mechanism, series))
-        };
-        Some(Self { place, sides: [side(1.0)?, side(-1.0)?], half, powers: Vec::new() })
+        });
+        Some(Self { place, sides: [ahead?, behind?], half, powers: Vec::new() })
     }
 
     /// Expands the motion from a state.
@@ -137,6 +99,29 @@ impl<'a> Push<'a> {
 }
 
 impl Tangent {
+    /// The mechanisms with the parameters of a column whose parameters are so far from their values.
+    pub(super) fn neighbours(&self, given: &[f64]) -> Vec<Weighted> {
+        let acting = self.parameters.iter().filter(|parameter| given[parameter.place] != 0.0);
+        let of = |parameter: &Parameter| {
+            let [ahead, behind] = &parameter.sides;
+            weighted(given[parameter.place], parameter.half, [&ahead.0, &behind.0])
+        };
+        acting.flat_map(of).collect()
+    }
+
+    /// The same beside another mechanism.
+    ///
+    /// # Errors
+    /// There are no laws with such values.
+    pub(super) fn neighbours_at(&self, mechanism: &Mechanism, given: &[f64]) -> Result<Vec<Weighted>, String> {
+        let mut found = Vec::new();
+        for (&number, &change) in self.set.iter().zip(given).filter(|(_, change)| **change != 0.0) {
+            let (half, sides) = on_both_sides(mechanism, number).ok_or(NO_LAWS)?;
+            found.extend(weighted(change, half, sides.each_ref()));
+        }
+        Ok(found)
+    }
+
     /// Takes up the parameters in which neighbours differ.
     ///
     /// # Errors
@@ -151,7 +136,7 @@ impl Tangent {
             }
             let parameter =
                 Parameter::new(&self.mechanism, self.coordinates, self.path.order, [place, number]);
-            self.parameters.push(parameter.ok_or("laws cannot go on with neighbouring values")?);
+            self.parameters.push(parameter.ok_or(NO_LAWS)?);
         }
         Ok(())
     }

@@ -1,0 +1,369 @@
+//! Small differences through an impact, an event that switches parts and branches or sets numbers, and the
+//! transitions of dry friction: neighbours come there earlier or later, by the saltation matrix.
+//!
+//! ```text
+//! dt = -(g_q dq + g_w dw + g_p dp) / g',     dq = dq⁻ + q'⁻ dt,   dw = dw⁻ + a⁻ dt      at the zero of g;      w⁺ = I(t, q, w⁻; p)
+//! dq⁺ = dq - q'⁺ dt,      dw⁺ = dI(dt, dq, dw, dp) - a⁺ dt                               a⁺ with what acts, sticks and is held from then on
+//! ds⁺ = dS(dt, dq, dw, dp)                                                               numbers s that an event sets
+//! ```
+//!
+//! g is the gap of a wall, the event function of a switch, or that of a place with friction: the relative
+//! velocity of what slides, `(mu0 N)² - tau²` of what sticks.  I is the law of impact, or what a joint that
+//! closes does to the rates.  p are numbers that the mechanism depends on; neighbouring mechanisms tell what
+//! they do.  Derivatives along a column are central differences of the fourth order.
+//!
+//! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
+//! Solitons & Fractals 5 (1995).
+
+mod side;
+mod together;
+
+pub(super) use side::{Side, plain};
+
+use super::contact::{Jump, Switch};
+use super::event::SwitchFunction;
+use super::friction::FrictionWatch;
+use super::latch::plastic;
+use crate::dynamics::friction::Mode;
+use crate::dynamics::{Mechanism, Motion};
+use std::sync::Arc;
+
+/// Normal velocity over that of the point's parts, or over a usual one where these are nearly at rest, below which
+/// a wall is grazed, and neighbours may miss it.
+const GRAZED: f64 = 1e-7;
+/// Share of the approach that a difference may take off.
+const SHARE: f64 = 0.05;
+
+/// A mechanism with other numbers, and its weight in derivatives by what a column stands for; weights of a
+/// column add up to zero.
+pub(super) type Weighted = (f64, Arc<Mechanism>);
+
+/// A function of a mechanism and a motion.
+type Function<'a> = &'a dyn Fn(&Arc<Mechanism>, &Motion) -> Option<Vec<f64>>;
+
+/// Small differences of all coordinates and rates, beside which the mechanism may be another.
+pub(super) struct Column<'a> {
+    /// Coordinates, then rates.
+    pub entries: &'a mut [f64],
+    pub neighbours: Vec<Weighted>,
+}
+
+/// What happens at one moment.
+pub(super) struct Passage<'a> {
+    /// With what acts, sticks and is held before it.
+    pub mechanism: &'a Arc<Mechanism>,
+    pub jumps: &'a [Jump],
+    /// The parameters that events set, by number.
+    pub set: &'a [usize],
+    /// The neighbours of a column, by number, as they are after a jump.
+    pub follow: &'a dyn Fn(usize, &Jump) -> Result<Vec<Weighted>, String>,
+}
+
+/// What came of it beside the columns.
+#[derive(Default)]
+pub(super) struct Passed {
+    /// The walls that were met, and how much later \[s\] for each column.
+    pub walls: Vec<(usize, Vec<f64>)>,
+    /// Parameters that events set, for each column, where this one sets some.
+    pub set: Option<Vec<Vec<f64>>>,
+}
+
+/// The parameters that events of a mechanism set, by number.
+pub(super) fn set_by_events(mechanism: &Mechanism) -> Vec<usize> {
+    let events = mechanism.laws.iter().flat_map(|laws| &laws.formulas.events);
+    let mut set: Vec<usize> = events.flat_map(|event| event.parameters()).collect();
+    set.sort_unstable();
+    set.dedup();
+    set
+}
+
+/// The motors and locks that have engaged up to now, by row, after another mechanism has followed on one.
+pub(super) fn engage(engaged: &mut Vec<usize>, [before, after]: [&Mechanism; 2]) {
+    let acts = |mechanism: &Mechanism, r: usize| {
+        mechanism.constraints.get(r).is_some_and(|row| !row.coordinates().is_empty())
+    };
+    engaged.retain(|&r| acts(after, r));
+    for r in 0..after.standing_rows() {
+        let may = after.switches.clutches.contains(&after.constraints[r].name);
+        if may && acts(after, r) && !acts(before, r) && !engaged.contains(&r) {
+            engaged.push(r);
+        }
+    }
+}
+
+/// The event function of a mechanism's own event or condition at a motion.
+pub(super) fn event_value(mechanism: &Mechanism, at: SwitchFunction, motion: &Motion) -> Option<f64> {
+    let laws = mechanism.laws.as_ref()?;
+    mechanism.seen(motion, |here| match at {
+        SwitchFunction::Event(number) => Some(laws.formulas.event_value(number, here, &laws.parameters)),
+        SwitchFunction::Condition(number) => {
+            laws.formulas.condition_values(here, &laws.parameters, &laws.modes).get(number).copied()
+        }
+        SwitchFunction::Other => None,
+    })
+}
+
+/// The derivative of a function along a column that is there so much later \[s\], with differences of at most
+/// `share`.
+fn derivative(
+    mechanism: &Arc<Mechanism>,
+    side: &Side,
+    column: &Column,
+    [late, share]: [f64; 2],
+    value: Function,
+) -> Option<Vec<f64>> {
+    let mut sum = side.slope(column.entries, late, share, &mut |motion| value(mechanism, motion))?;
+    if !column.neighbours.is_empty() {
+        let here = value(mechanism, &side.motion)?;
+        for (weight, neighbour) in &column.neighbours {
+            let there = value(neighbour, &side.motion)?;
+            for (sum, (there, here)) in sum.iter_mut().zip(there.iter().zip(&here)) {
+                *sum += weight * (there - here);
+            }
+        }
+    }
+    Some(sum)
+}
+
+/// Takes a column to a moment so much later \[s\].
+fn shift(column: &mut [f64], late: f64, side: &Side) {
+    let n = side.phi.len();
+    for k in 0..n {
+        column[k] += late * side.omega[k];
+        column[n + k] += late * side.acceleration[k];
+    }
+}
+
+/// Takes columns through what happens at one moment.
+///
+/// What is held or let go with it comes earlier or later as well; what is held is put on its wall afterwards.
+///
+/// # Errors
+/// Why neighbours do not go the same way.
+pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed, String> {
+    let Passage { mechanism, jumps, .. } = *passage;
+    if together::is_at_several(jumps) {
+        return together::cross(passage, columns);
+    }
+    let mut passed = Passed::default();
+    let is_cause = |jump: &&Jump| jump.contact.is_some() || jump.switch.is_some() || jump.friction.is_some();
+    let (Some(cause), Some(last)) = (jumps.iter().find(is_cause), jumps.last()) else { return Ok(passed) };
+    if jumps.iter().filter(|jump| jump.switch.is_some()).count() > 1 {
+        return Err(
+            "several events happen at once, which neighbouring motions meet one after the other".into()
+        );
+    }
+    let here = Side::new(mechanism, &cause.before);
+    let there = Side::new(&last.mechanism, &last.after);
+    let late = match cause {
+        Jump { contact: Some(contact), .. } => late_at_wall(mechanism, *contact, &here, columns)?,
+        Jump { switch: Some(switch), .. } => late_at_switch(mechanism, switch, &here, columns)?,
+        Jump { friction, .. } => late_at_friction(mechanism, *friction, &here, columns)?,
+    };
+    for (k, (column, &late)) in columns.iter_mut().zip(&late).enumerate() {
+        shift(column.entries, late, &here);
+        for jump in jumps {
+            if let Some(contact) = jump.contact {
+                follow(passage, k, jump, column)?;
+                impact_at(jump, contact, late, column)?;
+            }
+            if let Some(switch) = &jump.switch {
+                let before = Side::resting(&jump.before);
+                if let Some(set) = set_at(passage, switch, &before, late, column)? {
+                    passed.set.get_or_insert_default().push(set);
+                }
+                if jump.before.omega != jump.after.omega {
+                    follow(passage, k, jump, column)?;
+                    close_at(jump, late, column)?;
+                }
+            }
+        }
+        shift(column.entries, -late, &there);
+    }
+    passed.walls.extend(cause.contact.map(|contact| (contact, late)));
+    Ok(passed)
+}
+
+/// Takes the neighbours of a column on to what they are after a jump.
+fn follow(passage: &Passage, k: usize, jump: &Jump, column: &mut Column) -> Result<(), String> {
+    if !column.neighbours.is_empty() && !Arc::ptr_eq(&jump.mechanism, passage.mechanism) {
+        column.neighbours = (passage.follow)(k, jump)?;
+    }
+    Ok(())
+}
+
+/// How much later \[s\] a point meets its wall, column by column.
+fn late_at_wall(
+    mechanism: &Mechanism,
+    contact: usize,
+    here: &Side,
+    columns: &[Column],
+) -> Result<Vec<f64>, String> {
+    if !mechanism.frictions.is_empty() && !mechanism.held.is_empty() {
+        return Err("an impact beside a contact with dry friction is not followed".into());
+    }
+    let touched = &mechanism.contacts[contact];
+    let mut gradient = vec![0.0; here.phi.len()];
+    let approach = here.gap_rate(mechanism, contact, &mut gradient);
+    let usual = touched.length / mechanism.units.time;
+    if approach >= -GRAZED * touched.step_size(&here.omega).max(usual) {
+        return Err("a point grazes a wall, which neighbouring motions may miss".into());
+    }
+    Ok(columns.iter().map(|column| here.late(mechanism, contact, (&gradient, approach), column)).collect())
+}
+
+/// How much later \[s\] an event happens that switches parts or branches, column by column.
+fn late_at_switch(
+    mechanism: &Arc<Mechanism>,
+    switch: &Switch,
+    here: &Side,
+    columns: &[Column],
+) -> Result<Vec<f64>, String> {
+    if !switch.keeps_motion {
+        return Err("an event from outside sets the motion, which is not followed".into());
+    }
+    late_at_zero(mechanism, here, columns, &|mechanism, motion| {
+        Some(vec![event_value(mechanism, switch.at, motion)?])
+    })
+}
+
+/// How much later \[s\] a place with friction begins to stick or to slide, column by column.
+fn late_at_friction(
+    mechanism: &Arc<Mechanism>,
+    place: Option<usize>,
+    here: &Side,
+    columns: &[Column],
+) -> Result<Vec<f64>, String> {
+    let own = FrictionWatch::new(mechanism);
+    late_at_zero(mechanism, here, columns, &|of, motion| {
+        let values = match Arc::ptr_eq(of, mechanism) {
+            true => own.as_ref()?.values(motion),
+            false => FrictionWatch::new(of)?.values(motion),
+        };
+        Some(vec![*values.get(place?)?])
+    })
+}
+
+/// How much later \[s\] a function of the motion is zero, column by column.
+///
+/// # Errors
+/// Why neighbours may not come there.
+pub(super) fn late_at_zero(
+    mechanism: &Arc<Mechanism>,
+    here: &Side,
+    columns: &[Column],
+    value: Function,
+) -> Result<Vec<f64>, String> {
+    let unknown = "what happens here is not known to the scene";
+    let rate = here.slope(&here.ahead(), 1.0, f64::INFINITY, &mut |motion| value(mechanism, motion));
+    let rate = rate.ok_or(unknown)?[0];
+    if rate == 0.0 || !rate.is_finite() {
+        return Err("an event function only touches zero, which neighbouring motions may miss".into());
+    }
+    let late = |column: &Column| {
+        let change = derivative(mechanism, here, column, [0.0, f64::INFINITY], value).ok_or(unknown)?;
+        Ok(-change[0] / rate)
+    };
+    columns.iter().map(late).collect()
+}
+
+/// What an event, so much later \[s\], sets otherwise along a column; `None` where it sets nothing.
+fn set_at(
+    passage: &Passage,
+    switch: &Switch,
+    here: &Side,
+    late: f64,
+    column: &Column,
+) -> Result<Option<Vec<f64>>, String> {
+    let Passage { mechanism, set, .. } = *passage;
+    let sets = |event: usize| {
+        let events = mechanism.laws.as_ref().map(|laws| &laws.formulas.events);
+        events.is_some_and(|events| events[event].parameters().next().is_some())
+    };
+    let number = match switch.at {
+        SwitchFunction::Event(number) if sets(number) => number,
+        _ if switch.keeps_parameters => return Ok(None),
+        _ => return Err("an event from outside sets parameters, which is not followed".into()),
+    };
+    let value = |mechanism: &Arc<Mechanism>, motion: &Motion| {
+        let laws = mechanism.laws.as_ref()?;
+        let after = mechanism.seen(motion, |at| laws.formulas.set_by(number, at, &laws.parameters));
+        Some(set.iter().map(|&number| after[number]).collect())
+    };
+    let slopes = derivative(mechanism, here, column, [late, f64::INFINITY], &value);
+    Ok(Some(slopes.ok_or("what an event sets is not known to the scene")?))
+}
+
+/// A mechanism that holds these contacts, in which nothing sticks or slides: friction in hinges and sliders
+/// takes no part in impacts.
+fn striking(mechanism: &Arc<Mechanism>, held: &[usize]) -> Arc<Mechanism> {
+    let open = vec![Mode::Open; mechanism.frictions.len()];
+    match mechanism.held == held && mechanism.modes == open {
+        true => Arc::clone(mechanism),
+        false => Arc::new(mechanism.moving(held, &open)),
+    }
+}
+
+/// The rates of a column after an impact.
+fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut Column) -> Result<(), String> {
+    let held = &jump.mechanism.held;
+    strike(&striking(&jump.mechanism, held), &jump.before, contact, late, column, &|mechanism| {
+        striking(mechanism, held)
+    })
+}
+
+/// The rates of a column after an impact at a motion of a mechanism, whose neighbours strike as `as_struck`.
+fn strike(
+    mechanism: &Arc<Mechanism>,
+    before: &Motion,
+    contact: usize,
+    late: f64,
+    column: &mut Column,
+    as_struck: &dyn Fn(&Arc<Mechanism>) -> Arc<Mechanism>,
+) -> Result<(), String> {
+    let side = Side::resting(before);
+    let rates = |of: &Arc<Mechanism>, motion: &Motion| {
+        let [phi, omega] = plain(motion);
+        let own = if Arc::ptr_eq(of, mechanism) { Arc::clone(of) } else { as_struck(of) };
+        own.impact_at(contact, motion.time, &phi, &omega).map(|impact| impact.omega)
+    };
+    // Neighbours must meet the wall as well.
+    let approach = |motion: &Motion| {
+        Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()])
+    };
+    let most = column.entries.iter().fold(late.abs(), |most, entry| most.max(entry.abs()));
+    let scale = |entry: f64| if most > 0.0 { entry / most } else { 0.0 };
+    let unit: Vec<f64> = column.entries.iter().map(|&entry| scale(entry)).collect();
+    let faster = side
+        .slope(&unit, 0.0, f64::INFINITY, &mut |motion| Some(vec![approach(motion)]))
+        .map_or(0.0, |slope| slope[0].abs());
+    let size = 1.0 + side.omega.iter().fold(0.0, |most: f64, omega| most.max(omega.abs()));
+    let share = SHARE * approach(before).abs() / (faster * size).max(f64::MIN_POSITIVE);
+    change(mechanism, &side, [late, share], column, &rates)
+        .ok_or_else(|| "neighbouring motions have no way back from a wall".into())
+}
+
+/// The rates of a column after what closes or engages.
+fn close_at(jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
+    let held = &jump.mechanism.held;
+    let closing = striking(&jump.mechanism, held);
+    let rates = |of: &Arc<Mechanism>, motion: &Motion| {
+        let own = if Arc::ptr_eq(of, &closing) { Arc::clone(of) } else { striking(of, held) };
+        plastic(&own, motion).map(|(rates, ..)| rates)
+    };
+    change(&closing, &Side::resting(&jump.before), [late, f64::INFINITY], column, &rates)
+        .ok_or_else(|| "what closes leaves neighbouring motions no rates".into())
+}
+
+/// The rates of a column after they have become others.
+fn change(
+    mechanism: &Arc<Mechanism>,
+    side: &Side,
+    size: [f64; 2],
+    column: &mut Column,
+    rates: Function,
+) -> Option<()> {
+    let after = derivative(mechanism, side, column, size, rates)?;
+    column.entries[side.phi.len()..].copy_from_slice(&after);
+    Some(())
+}

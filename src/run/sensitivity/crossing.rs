@@ -1,0 +1,135 @@
+//! Columns of a variation through impacts, events and the transitions of dry friction: see
+//! [`saltation`](crate::run::saltation).
+
+use super::neighbours::{Neighbours, weighted};
+use super::variation::{Crossing, Variation};
+use crate::dynamics::Mechanism;
+use crate::run::contact::Jump;
+use crate::run::event::SwitchFunction;
+use crate::run::saltation::{Column, Passage, Passed, Weighted, cross, engage};
+use std::sync::Arc;
+
+/// Parameters that events set, in which the columns may differ.
+#[derive(Clone, Debug, Default)]
+pub(in crate::run) struct SetNumbers {
+    /// By number.
+    pub numbers: Vec<usize>,
+    /// Which of them an event has set so far: the others have the values of the scene.
+    pub is_set: Vec<bool>,
+    /// Their derivatives, column by column.
+    pub slopes: Vec<Vec<f64>>,
+}
+
+impl SetNumbers {
+    /// Those that were set, by number.
+    fn known(&self) -> Vec<usize> {
+        let known = self.numbers.iter().zip(&self.is_set).filter(|(_, is_set)| **is_set);
+        known.map(|(&number, _)| number).collect()
+    }
+
+    /// Takes what an event of a mechanism has set.
+    fn take(&mut self, mechanism: &Mechanism, event: usize, slopes: Vec<Vec<f64>>) {
+        let events = mechanism.laws.as_ref().map(|laws| &laws.formulas.events);
+        for number in events.iter().flat_map(|events| events[event].parameters()) {
+            if let Ok(place) = self.numbers.binary_search(&number) {
+                self.is_set[place] = true;
+            }
+        }
+        let is_set = &self.is_set;
+        let known = |column: Vec<f64>| -> Vec<f64> {
+            column.into_iter().zip(is_set).map(|(slope, is_set)| if *is_set { slope } else { 0.0 }).collect()
+        };
+        self.slopes = slopes.into_iter().map(known).collect();
+    }
+
+    /// Parameters with their derivatives along a column, where there are such.
+    fn of(&self, column: usize) -> Vec<(usize, f64)> {
+        let slopes = self.slopes.get(column).map_or(&[][..], Vec::as_slice);
+        let given = self.numbers.iter().zip(slopes).filter(|(_, slope)| **slope != 0.0);
+        given.map(|(&number, &slope)| (number, slope)).collect()
+    }
+
+    /// True where columns differ in them.
+    pub fn differ(&self) -> bool {
+        self.slopes.iter().flatten().any(|slope| *slope != 0.0)
+    }
+}
+
+impl Variation {
+    /// Takes the columns through what happens at one moment.
+    pub(super) fn cross(&mut self, jumps: &[Jump]) -> Result<(), String> {
+        let [.., last] = jumps else { return Ok(()) };
+        let passed = self.passed(jumps)?;
+        let before = Arc::clone(&self.mechanism);
+        self.met_several |= passed.walls.len() > 1;
+        let t = last.before.time.hi;
+        let crossing = |(wall, slopes): (usize, Vec<f64>)| {
+            let wall = before.contacts[wall].row.name.clone();
+            Crossing { wall, t, slopes }
+        };
+        self.impacts.extend(passed.walls.into_iter().map(crossing));
+        if let (Some(event), Some(slopes)) = (set_by(jumps), passed.set) {
+            self.set.take(&before, event, slopes);
+        }
+        if jumps.iter().any(|jump| !Arc::ptr_eq(&jump.mechanism, &before)) {
+            self.expanded = None;
+            if let Some(off) = off(jumps) {
+                self.off = off;
+            }
+            self.follow(&last.mechanism)?;
+            engage(&mut self.engaged, [&before, &last.mechanism]);
+            self.hold(&last.mechanism);
+        }
+        self.keep(&last.after);
+        Ok(())
+    }
+
+    /// What comes of it, with the columns taken through.
+    fn passed(&mut self, jumps: &[Jump]) -> Result<Passed, String> {
+        let mut columns = std::mem::take(&mut self.columns);
+        let follow = |k: usize, jump: &Jump| -> Result<Vec<Weighted>, String> {
+            let mut beside = self.neighbours[k].clone().unwrap_or_default();
+            let off = off(jumps).unwrap_or_else(|| self.off.clone());
+            beside.follow(&jump.mechanism, &off, &self.set.known())?;
+            Ok(weighted(&beside.list))
+        };
+        let beside = |neighbours: &Option<Neighbours>| {
+            weighted(neighbours.as_ref().map_or(&[][..], |neighbours| &neighbours.list))
+        };
+        let column = |(entries, neighbours)| Column { entries, neighbours: beside(neighbours) };
+        let entries = columns.iter_mut().map(Vec::as_mut_slice);
+        let mut list: Vec<Column> = entries.zip(&self.neighbours).map(column).collect();
+        let (mechanism, set) = (&self.mechanism, &self.set.numbers[..]);
+        let passed = cross(&Passage { mechanism, jumps, set, follow: &follow }, &mut list);
+        self.columns = columns;
+        passed
+    }
+
+    /// Takes the neighbours on beside a mechanism, with the parameters that events have set.
+    fn follow(&mut self, mechanism: &Mechanism) -> Result<(), String> {
+        let known = self.set.known();
+        for (k, neighbours) in self.neighbours.iter_mut().enumerate() {
+            let given = self.set.of(k);
+            if neighbours.is_none() && given.is_empty() {
+                continue;
+            }
+            let neighbours = neighbours.get_or_insert_default();
+            neighbours.set(&self.compiled, mechanism, &given);
+            neighbours.follow(mechanism, &self.off, &known)?;
+        }
+        Ok(())
+    }
+}
+
+/// The event of the scene that sets something, by number.
+fn set_by(jumps: &[Jump]) -> Option<usize> {
+    jumps.iter().find_map(|jump| match jump.switch.as_ref()?.at {
+        SwitchFunction::Event(number) => Some(number),
+        _ => None,
+    })
+}
+
+/// Parts that do not act after these, where an event says so.
+fn off(jumps: &[Jump]) -> Option<Vec<String>> {
+    jumps.iter().rev().find_map(|jump| jump.switch.as_ref().map(|switch| switch.off.clone()))
+}

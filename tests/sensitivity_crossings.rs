@@ -1,0 +1,223 @@
+//! Sensitivities through dry friction, points that rest, numbers that events set, moving walls and several walls
+//! at once, against closed forms and against differences of references.
+
+use crate::mechanisms::Dice;
+use crate::sensitivity::{assert_near, compared, derived, example, template};
+use crate::switched::{scene, scene_of_numbers};
+use std::collections::BTreeMap;
+
+/// Derivatives of one output by numbers of a scene, against closed forms.
+fn assert_slopes(text: &str, of: &str, at: f64, expected: &[(&str, f64)]) {
+    let to: Vec<&str> = expected.iter().map(|(path, _)| *path).collect();
+    let found = derived(&template(text), &[of], &to, at);
+    assert_eq!(found.lost, None);
+    for (slope, (path, expected)) in found.measures[0].slopes.iter().zip(expected) {
+        assert_near(*slope, *expected, 1e-9, path);
+    }
+}
+
+const BLOCK: &str = r#""bars": [{"name": "block", "mass": 2, "centre": [0, 0], "inertia": 1, "length": 1}],
+    "sliders": [{"name": "rail", "point": {"body": "block", "point": [0, 0]}, "friction": {"kinetic": 0.2, "static": 0.35},
+                 "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "angle": "locked"}]"#;
+
+/// A block of speed v comes v²/(2 mu g) far.
+#[test]
+fn a_block_that_stops_is_derived_by_its_friction() {
+    let scene = format!(
+        r#"{{"name": "block", "gravity": [0, -10], "until": 1, "every": 0.1, {BLOCK},
+        "start": {{"block": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [1.2, 0]}}}}}}"#
+    );
+    let (v, mu, g) = (1.2, 0.2, 10.0);
+    assert_slopes(
+        &scene,
+        "block.x",
+        1.0,
+        &[
+            ("start.block.velocity[0]", v / (mu * g)),
+            ("sliders.rail.friction.kinetic", -v * v / (2.0 * mu * mu * g)),
+            ("gravity[1]", v * v / (2.0 * mu * g * g)),
+            ("bars.block.mass", 0.0),
+        ],
+    );
+}
+
+/// A force c t moves a block at rest from t1 = mu0 m g/c on: x = (mu0 - mu) g s²/2 + c s³/(6 m), s = t - t1.
+#[test]
+fn a_block_that_breaks_away_is_derived_by_both_coefficients() {
+    let scene = format!(
+        r#"{{"name": "block", "gravity": [0, -10], "until": 2, "every": 0.1, {BLOCK},
+        "parameters": {{"c": 8}},
+        "forces": [{{"name": "pull", "body": "block", "point": [0, 0], "force": ["c*t", 0]}}],
+        "start": {{"block": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}}}}}"#
+    );
+    let (m, c, g, mu, most) = (2.0, 8.0, 10.0, 0.2, 0.35);
+    let t = 1.7;
+    let s = t - most * m * g / c;
+    let speed = (most - mu) * g * s + c * s * s / (2.0 * m);
+    let x = (most - mu) * g * s * s / 2.0 + c * s.powi(3) / (6.0 * m);
+    assert!((derived(&template(&scene), &["block.x"], &["c"], t).measures[0].value - x).abs() < 1e-10);
+    assert_slopes(
+        &scene,
+        "block.x",
+        t,
+        &[
+            ("sliders.rail.friction.static", g * s * s / 2.0 - speed * m * g / c),
+            ("sliders.rail.friction.kinetic", -g * s * s / 2.0),
+            ("c", s.powi(3) / (6.0 * m) + speed * most * m * g / (c * c)),
+            ("bars.block.mass", -c * s.powi(3) / (6.0 * m * m) - speed * most * g / c),
+        ],
+    );
+}
+
+/// A ball that falls by h onto a table which comes up at u: h - g t1²/2 = u t1, and goes on at u + e (u + g t1).
+#[test]
+fn a_ball_is_derived_through_its_impact_at_a_moving_wall() {
+    let scene = r#"{"name": "ball", "gravity": [0, -10], "parameters": {"u": 0.6},
+        "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+        "walls": [{"name": "table", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]},
+                   "restitution": 0.7, "law": "u*t"}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1.3], "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#;
+    let (g, h, e, u, t) = (10.0_f64, 1.3_f64, 0.7, 0.6_f64, 0.8);
+    let root = (u * u + 2.0 * g * h).sqrt();
+    let met = (root - u) / g;
+    let after = u + e * (u + g * met);
+    let s = t - met;
+    // y = u t1 + v⁺ s - g s²/2, v⁺ = u + e (u + g t1) = u + e root, s = t - t1.
+    let by = |met_by: f64, root_by: f64, direct: f64| {
+        u * met_by + e * root_by * s - (after - g * s) * met_by + direct
+    };
+    assert_slopes(
+        scene,
+        "ball.y",
+        t,
+        &[
+            ("start.ball.origin[1]", by(1.0 / root, g / root, 0.0)),
+            ("u", by((u / root - 1.0) / g, u / root, met + s)),
+            ("table.restitution", root * s),
+        ],
+    );
+}
+
+/// A ball without restitution stays on a table that rises as c t²/2, and moves with it whatever it came with.
+#[test]
+fn a_ball_that_rests_is_derived_by_the_law_of_its_table() {
+    let scene = r#"{"name": "ball", "gravity": [0, -10], "parameters": {"c": 0.6},
+        "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+        "walls": [{"name": "table", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]},
+                   "restitution": 0, "law": "c*t^2/2"}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 0.4], "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#;
+    let t = 0.9;
+    assert_slopes(scene, "ball.y", t, &[("start.ball.origin[1]", 0.0), ("c", t * t / 2.0)]);
+    assert_slopes(scene, "ball.vy", t, &[("start.ball.origin[1]", 0.0), ("c", t), ("gravity[1]", 0.0)]);
+}
+
+/// A rotor is pushed from the angle a on, by a torque that grows from the moment it comes there: phi = a + w s +
+/// c s³/(6 I), s = t - t1, t1 = (a - phi0)/w.
+#[test]
+fn a_rotor_is_derived_through_the_moment_that_an_event_sets() {
+    let scene = r#"{"name": "timed", "gravity": [0, 0], "until": 2, "every": 0.5,
+        "bars": [{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "rotor", "point": [0, 0]}]}],
+        "parameters": {"on": 0, "from": 0, "a": 0.9, "c": 1.2},
+        "torques": [{"name": "push", "body": "rotor", "torque": "c*on*(t - from)"}],
+        "events": [{"name": "there", "when": "rotor.phi - a", "set": {"on": 1, "from": "t"}}],
+        "start": {"rotor": {"phi": 0.1, "omega": 1.6}}}"#;
+    let (a, phi, w, c, inertia, t) = (0.9, 0.1, 1.6, 1.2, 0.5, 2.0);
+    let s: f64 = t - (a - phi) / w;
+    let rate = w + 0.5 * c / inertia * s * s;
+    assert_slopes(
+        scene,
+        "rotor.phi",
+        t,
+        &[
+            ("a", 1.0 - rate / w),
+            ("rotor.phi", rate / w),
+            ("rotor.omega", s + rate * (a - phi) / (w * w)),
+            ("c", s.powi(3) / (6.0 * inertia)),
+            ("bars.rotor.inertia", -c * s.powi(3) / (6.0 * inertia * inertia)),
+            ("on", 0.0),
+        ],
+    );
+}
+
+/// A ball comes into a corner: each of its coordinates is reflected by itself, x = e (v t - x0).
+#[test]
+fn a_ball_is_derived_through_a_corner() {
+    let scene = r#"{"name": "corner", "gravity": [0, 0],
+        "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+        "walls": [{"name": "left", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [1, 0]}, "restitution": 0.8},
+                  {"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.6}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [1, 0.5], "velocity": [-2, -1]}}, "until": 1, "every": 0.1}"#;
+    let to = ["start.ball.origin[0]", "start.ball.velocity[0]", "left.restitution", "start.ball.origin[1]"];
+    let t = 0.9;
+    let found = derived(&template(scene), &["ball.x", "ball.y", "impact:floor"], &to, t);
+    assert_eq!(found.lost, None);
+    for (measured, expected) in found.measures.iter().zip([
+        [-0.8, -0.8 * t, 2.0 * t - 1.0, 0.0],
+        [0.0, 0.0, 0.0, -0.6],
+        [0.0, 0.0, 0.0, 1.0],
+    ]) {
+        for (slope, (path, expected)) in measured.slopes.iter().zip(to.iter().zip(expected)) {
+            assert_near(*slope, expected, 1e-9, path);
+        }
+    }
+}
+
+#[test]
+fn derivatives_of_shipped_scenes_with_switches_agree_with_differences_of_references() {
+    for (name, at, paths) in [
+        ("stick_slip", 4.0, &["hinges.A.friction.static", "hinges.A.friction.kinetic"][..]),
+        ("friction_pendulum", 1.5, &["gravity[0]", "bar1.phi", "hinges.A.friction.kinetic"]),
+        ("bang_bang", 2.0, &["rotor.phi"]),
+        ("trebuchet", 0.4, &["gravity[1]"]),
+        ("latch", 1.0, &["gravity[1]"]),
+    ] {
+        let template = example(name);
+        let paths: Vec<&str> = paths.iter().copied().filter(|path| template.variable(path).is_ok()).collect();
+        let found = compared(&template, &paths, at).unwrap_or_else(|why| panic!("{name}: {why}"));
+        println!("{name}: {found:?}");
+        for (path, off, doubt) in found {
+            assert!(off < (1e-6_f64).max(3.0 * doubt) && doubt < 1e-4, "{name} {path}: {off:e} {doubt:e}");
+        }
+    }
+}
+
+/// Random chains with friction, corners, events and curved walls: `CASES` of them from seed `SEED` on.
+#[test]
+fn derivatives_through_random_crossings_agree_with_differences_of_references() {
+    let number =
+        |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
+    let (cases, seed) = (number("CASES", 6), number("SEED", 1));
+    let (mut table, mut refused) = (BTreeMap::new(), BTreeMap::<String, usize>::new());
+    let (mut count, mut outside) = (0, 0);
+    for case in 0..cases {
+        let own = seed * 1000 + case / 2;
+        let (text, kind) = if case % 2 == 0 { scene(own) } else { scene_of_numbers(own) };
+        let template = template(&text);
+        let numbers = template.written_numbers(&[]).expect("a scene");
+        let mut dice = Dice::new(own ^ 0x7919);
+        let paths: Vec<&str> = (0..3).map(|_| numbers[dice.pick(numbers.len())].path.as_str()).collect();
+        let found = match compared(&template, &paths, 1.5) {
+            Ok(found) => found,
+            Err(why) => {
+                let why = why.split(", at t").next().unwrap_or_default().chars().take(110).collect();
+                *refused.entry(why).or_default() += 1;
+                continue;
+            }
+        };
+        for (path, off, doubt) in found.into_iter().filter(|(.., doubt)| *doubt < 1e-7) {
+            count += 1;
+            if off > 1e-6 {
+                outside += 1;
+                println!("seed {own} {kind} {path}: {off:.1e}, known to {doubt:.1e}");
+            }
+            let row: &mut (usize, f64) = table.entry(kind).or_default();
+            *row = (row.0 + 1, row.1.max(off));
+        }
+    }
+    for (kind, (count, worst)) in &table {
+        println!("{kind:28} {count:5} {worst:9.1e}");
+    }
+    println!("{count} derivatives, {outside} outside; refused: {refused:?}");
+    assert!(outside * 50 <= count, "{outside} of {count} outside");
+}
