@@ -340,6 +340,33 @@ pub fn integrated(mut y: [f64; 4], time: f64, accelerations: impl Fn([f64; 4]) -
     y
 }
 
+/// A table that goes down as -3 t³ leaves a ball where 18 t = g, and that falls freely from then on: on a rail,
+/// which leaves friction nothing to do, by itself, and while it slides.
+#[test]
+fn a_table_that_falls_away_lets_a_ball_with_friction_go() {
+    let rail = r#""sliders": [{"name": "rail", "point": {"body": "ball", "point": [0, 0]},
+        "rail": {"body": "ground", "point": [0, 0], "direction": [0, 1]}}],"#;
+    let left = G / 18.0;
+    let s = 1.0 - left;
+    let y = -3.0 * left.powi(3) - 9.0 * left * left * s - 0.5 * G * s * s;
+    for (rail, along) in [(rail, 0.0), ("", 0.0), ("", 4.0)] {
+        let text = format!(
+            r#"{{"name": "ball", "gravity": [0, -{G}], {rail}
+            "bars": [{{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}}],
+            "walls": [{{"name": "table", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}},
+                "restitution": 0, "friction": {{"kinetic": 0.3}}, "law": "-3*t^3"}}],
+            "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{along}, 0]}}}},
+            "until": 1, "every": 1}}"#
+        );
+        for outcome in runs(&text) {
+            near(outcome.last.phi[2], y, "falls to");
+            let gone = outcome.frictions.last().expect("it is let go");
+            assert_eq!(gone.mode, "apart");
+            assert!((gone.t - left).abs() < 1e-7, "{} {left}", gone.t);
+        }
+    }
+}
+
 #[test]
 fn a_rod_slides_on_its_end_as_lagrange_says() {
     let (mu, until) = (0.3, 0.25);

@@ -299,7 +299,11 @@ impl<'a> Problem<'a> {
             let rivals = single.filter(|other| other.distance <= (CLEARLY * best.distance).max(DISTINCT));
             self.check_alone(&best, rivals.collect())?;
         }
-        for &k in missing.iter().filter(|&&k| k < self.mechanism.bodies.len()) {
+        // Gears and cams tell whole turns apart.
+        let geared = self.mechanism.constraints.iter().filter(|row| row.aim.is_some());
+        let geared: Vec<usize> = geared.flat_map(|row| row.coordinates()).collect();
+        let turns_freely = |k: &&usize| **k < self.mechanism.bodies.len() && !geared.contains(k);
+        for &k in missing.iter().filter(turns_freely) {
             // The turn next to the guess.
             let turns = ((best.q[k] - guess[k]).hi / std::f64::consts::TAU).round();
             best.q[k] -= DoubleDouble::TAU.scale(turns);

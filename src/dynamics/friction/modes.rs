@@ -25,6 +25,9 @@ use crate::arithmetic::Complex;
 const NO_SPEED: f64 = 1e-12;
 /// Share of a force, or of an acceleration, that rounding makes.
 const ROUNDING: f64 = 1e-9;
+/// Difference of accelerations over the largest of them that the search for the moment leaves, where a wall
+/// ceases to press.
+const ALIKE: f64 = 1e-6;
 /// Combinations that are looked at.
 const MOST: usize = 20_000;
 
@@ -78,7 +81,7 @@ impl Mechanism {
         transition: Transition,
     ) -> Result<Modes, Paradox> {
         let rates = self.sliding_rates(at);
-        let mut found: Option<Modes> = None;
+        let mut found: Option<(Modes, Vec<f64>)> = None;
         let mut looked_at = 0;
         for closed in subsets(staying, touching) {
             let options = self.options(at, before, &rates, &closed, transition);
@@ -88,21 +91,25 @@ impl Mechanism {
             if looked_at > MOST {
                 return Err(Paradox::TooMany(resting));
             }
-            let fit = combinations(&options)
-                .into_iter()
-                .find(|modes| self.fits(at, &closed, modes, touching, (&rates, transition)));
-            match (fit, &found) {
-                (Some(_), Some(_)) => return Err(Paradox::Indeterminate),
-                (Some(modes), None) => found = Some((closed, modes)),
-                (None, _) => {}
-            }
+            let fit = combinations(&options).into_iter().find_map(|modes| {
+                let load = self.fits(at, &closed, &modes, touching, (&rates, transition))?;
+                Some(((closed.clone(), modes), load))
+            });
+            found = match (fit, found) {
+                (Some(fit), Some(known)) if !are_alike(&fit.1, &known.1) => {
+                    return Err(Paradox::Indeterminate);
+                }
+                // Where a wall just ceases to press, the motion is the same with it and without.
+                (Some(fit), Some(known)) if fit.0.0.len() < known.0.0.len() => Some(fit),
+                (fit, known) => known.or(fit),
+            };
             // Without friction at walls the contacts that are pressed are known.
             let at_walls = |normal| matches!(normal, Normal::Contact(_));
             if found.is_some() && !self.frictions.iter().any(|friction| at_walls(friction.normal)) {
                 break;
             }
         }
-        found.ok_or(Paradox::Inconsistent)
+        found.map(|(modes, _)| modes).ok_or(Paradox::Inconsistent)
     }
 
     /// The mechanism in the modes of its start, contacts held that stay; `None` where it has no friction, or
@@ -181,7 +188,7 @@ impl Mechanism {
         self.frictions.iter().enumerate().map(of).collect()
     }
 
-    /// Whether forces and accelerations in these modes are such as the modes claim.
+    /// The accelerations in these modes, where they and the forces are such as the modes claim.
     fn fits(
         &self,
         at: Moment,
@@ -189,24 +196,24 @@ impl Mechanism {
         modes: &[Mode],
         touching: &[usize],
         (rates, Transition { arrived, breaks }): (&[f64], Transition),
-    ) -> bool {
+    ) -> Option<Vec<f64>> {
         let mechanism = self.moving(closed, modes);
         let mut kernel = Kernel::<f64>::new(&mechanism);
         kernel.accelerate::<0>(&mechanism, at.t, at.phi, at.omega, Bias::default());
         if !kernel.load.iter().chain(&kernel.multiplier).all(|x| x.is_finite()) {
-            return false;
+            return None;
         }
         // At walls the pressure has a sign, which tells; the force of joints and rails may have either.
         let at_walls = mechanism.sliding().all(|(friction, _)| matches!(friction.normal, Normal::Contact(_)));
         if !at_walls && kernel.regularity <= 0.0 {
-            return false;
+            return None;
         }
         let forces = kernel.friction_forces(&mechanism, at.t, at.phi, at.omega);
         let pressures = closed.iter().zip(&kernel.multiplier[mechanism.standing_rows()..]);
         let pressures: Vec<f64> =
             (pressures).map(|(&contact, &multiplier)| self.contacts[contact].pressure(multiplier)).collect();
         if pressures.iter().any(|&pressure| pressure < -ROUNDING) {
-            return false;
+            return None;
         }
         let posture = Posture { phi: at.phi, z: at.z, omega: at.omega };
         let mut row = vec![0.0; at.phi.len()];
@@ -221,9 +228,9 @@ impl Mechanism {
             closed.contains(contact) || apart >= -ROUNDING * size
         };
         if !touching.iter().all(leaves) {
-            return false;
+            return None;
         }
-        (self.frictions.iter().zip(modes).zip(forces).enumerate()).all(
+        let fit = (self.frictions.iter().zip(modes).zip(forces).enumerate()).all(
             |(number, ((friction, mode), [tau, pressing]))| match mode {
                 Mode::Open => true,
                 Mode::Stick(_) => {
@@ -240,8 +247,15 @@ impl Mechanism {
                     slides || is_pushed || sign * speeding > ROUNDING * size
                 }
             },
-        )
+        );
+        fit.then_some(kernel.load)
     }
+}
+
+/// Whether two motions have the same accelerations.
+fn are_alike(one: &[f64], other: &[f64]) -> bool {
+    let size = one.iter().chain(other).fold(0.0, |size: f64, x| size.max(x.abs()));
+    one.iter().zip(other).all(|(a, b)| (a - b).abs() <= ALIKE * size)
 }
 
 /// The sets of contacts that may be closed: first those that stay without friction.

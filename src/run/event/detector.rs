@@ -250,7 +250,8 @@ impl EventDetector {
                     self.mechanism.seen(motion, |at| laws.formulas.set_by(number, at, &laws.parameters));
                 let off = said.off.iter().map(|part| (part.clone(), false));
                 let switches: Vec<_> = off.chain(said.on.iter().map(|part| (part.clone(), true))).collect();
-                let parameters = (after != laws.parameters).then_some(after);
+                // Neighbouring motions are given the same values, even where the motion itself keeps its own.
+                let parameters = said.parameters().next().is_some().then_some(after);
                 if switches.is_empty() && parameters.is_none() {
                     return Action::Record;
                 }

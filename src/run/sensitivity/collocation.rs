@@ -46,8 +46,9 @@ impl Collocation {
     /// Takes columns (dq, dw) of n coordinates through a step; `pull` has B and C at the nodes, n × 2n row by
     /// row, one node after the other, `forcing` F of every column, node by node, empty for columns without.
     ///
-    /// `floors` are sizes of columns that are rounding.  Returns the last coefficient over the size of what is
-    /// integrated, and leaves the columns alone where it is above `limit`; NaN where there is no solution.
+    /// `floors` are sizes of columns below which they need not be resolved.  Returns the last coefficient over
+    /// the size of what is integrated, and leaves the columns alone where it is above `limit`; NaN where there
+    /// is no solution.
     pub fn step(
         &mut self,
         h: f64,

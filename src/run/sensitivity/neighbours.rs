@@ -29,6 +29,8 @@ const TOO_MUCH: f64 = 1e-4;
 const SET: f64 = 1e-3;
 /// What a change of the number by its own size does, over the values, below which it does nothing.
 const NOTHING: f64 = 1e-11;
+/// Size of a column, in changes of the number by its own size, below which its digits do not count.
+const SMALL: f64 = 1e-5;
 /// Rounding of an evaluation, over its value.
 const ROUNDING: f64 = 4e-16;
 /// Numbers below are tried in changes of their unit, too, where changes over themselves say little.
@@ -76,7 +78,8 @@ pub(in crate::run) struct Neighbours {
     pub start: Vec<f64>,
     /// Estimated relative error of derivatives.
     pub error: f64,
-    /// Size of a column that is rounding.
+    /// Size of a column \[rad/s, m/s\] below which steps need not resolve it to its own accuracy: what moves it
+    /// is known to a share of 1e-11 of what changes of the number by its own size do.
     pub floor: f64,
 }
 
@@ -152,7 +155,8 @@ impl Neighbours {
             mechanism: candidate.mechanism,
         };
         let list = if is_alike { Vec::new() } else { attempt.list.into_iter().map(neighbour).collect() };
-        Self { list, start, error, floor: NOTHING / scale }
+        let unit = base.units.length.min(1.0) / base.units.time;
+        Self { list, start, error, floor: SMALL * unit / scale }
     }
 
     /// Takes neighbours for parameters, by number, that events have set in `mechanism` with these derivatives
