@@ -112,6 +112,104 @@ fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
     }
 }
 
+/// Several driven mechanisms with their starts, some of them with the motor on the outer bar, every other one at
+/// a constant rate.
+fn driven(count: usize) -> Vec<(Arc<Mechanism>, State)> {
+    (0..count)
+        .map(|i| {
+            let mut text: serde_json::Value =
+                serde_json::from_str(include_str!("../examples/scenes/motor.json")).expect("JSON");
+            let motor = &mut text["motors"][0];
+            motor["law"] = serde_json::json!({"start": 0.1 * i as f64, "rate": 2.0 - 0.9 * i as f64});
+            if i % 2 == 1 {
+                motor["law"]["acceleration"] = (0.2 * i as f64).into();
+                let sines: Vec<_> = (0..i % 3)
+                    .map(|k| serde_json::json!({"amplitude": 0.4 + 0.1 * k as f64, "frequency": 3 + 5 * k, "phase": i}))
+                    .collect();
+                motor["law"]["sines"] = sines.into();
+            }
+            let (own, other) = if i % 4 == 3 { ("bar2", "bar1") } else { ("bar1", "bar2") };
+            motor["body"] = own.into();
+            let omega = 0.3 * i as f64;
+            text["start"] = serde_json::json!({other: {"phi": 1.0 - 0.2 * i as f64, "omega": omega}});
+            let scene = parse_scene(&text.to_string(), "driven", &[]).expect("a scene");
+            let mechanism = compile(&scene);
+            let state = start(&mechanism, &scene);
+            (mechanism, state)
+        })
+        .collect()
+}
+
+#[test]
+fn driven_bodies_agree_with_double_double_whoever_is_beside_them() {
+    let all = driven(11);
+    let until = Time::from(3.0);
+    let members = |reversed: bool| -> Vec<BatchMember> {
+        let mut members: Vec<_> = all.iter().map(|(m, state)| BatchMember::new(m, state.clone())).collect();
+        if reversed {
+            members.reverse();
+        }
+        members
+    };
+    for order in [16, 20, 24] {
+        let batch = Batch::new(tight()).with_order(order);
+        let ends = |batch: &Batch, mut members: Vec<BatchMember>| -> Vec<State> {
+            batch.integrate(&mut members, until, &mut |_, _| Going::On);
+            assert!(members.iter().all(|member| member.stopped.is_none() && member.statistics.steps > 3));
+            members.into_iter().map(|member| member.state).collect()
+        };
+        let found = ends(&batch, members(false));
+        let mut backwards = ends(&batch, members(true));
+        backwards.reverse();
+        assert_eq!(backwards, found);
+        assert_eq!(ends(&batch.clone().with_kernel(Kernel::Portable), members(false)), found);
+        for (i, ((mechanism, state), found)) in all.iter().zip(&found).enumerate() {
+            let mut exact = state.clone();
+            let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
+            let mut statistics = Default::default();
+            Taylor::reference()
+                .advance(&mut problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
+                .expect("an end");
+            assert_eq!((found.time, &found.turns), (exact.time, &exact.turns));
+            let scale = [1.0, 1.0, mechanism.energy_scale];
+            for (k, scale) in scale.into_iter().enumerate() {
+                let error = (found.unknown(k) - exact.unknown(k)).hi.abs() / scale;
+                assert!(error < 1e-12, "{i}, order {order}, unknown {k}: {error:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn driven_bodies_are_seen_inside_their_steps() {
+    let all = driven(4);
+    for (i, (mechanism, state)) in all.iter().enumerate() {
+        let mut members = [BatchMember::new(mechanism, state.clone())];
+        let body = if i % 4 == 3 { 1 } else { 0 };
+        let law = mechanism.constraints[0].law.clone().expect("a law");
+        let mut last = [law.angle(Time::from(0.0)).hi, state.y[0]];
+        Batch::new(tight()).integrate(&mut members, Time::from(3.0), &mut |_, passage| {
+            // Angles go on from step to step but for whole turns, at their rates.
+            for (bar, last) in [body, 1 - body].into_iter().zip(&mut last) {
+                let [(begin, _), (middle, omega), (end, _)] =
+                    [0.0, 0.5, 1.0].map(|share| passage.at(bar, share * passage.step));
+                let turns = (begin - *last) / std::f64::consts::TAU;
+                assert!((turns - turns.round()).abs() < 1e-13, "{bar}: {begin} {last}");
+                assert!(begin.abs() <= std::f64::consts::PI * (1.0 + 1e-15));
+                if bar == body {
+                    let there = passage.from + 0.5 * passage.step;
+                    let [_, rate, _] = law.angles::<f64>(there);
+                    let turned = (law.angle(there) - law.angle(passage.from)).hi;
+                    assert!((omega - rate).abs() < 1e-12 && (middle - begin - turned).abs() < 1e-12);
+                }
+                *last = end;
+            }
+            Going::On
+        });
+        assert!(members[0].stopped.is_none());
+    }
+}
+
 #[test]
 fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     let scene = shipped("free", &["start.bar1.phi=3", "start.bar2.phi=2.9"]);
@@ -119,8 +217,10 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     let mut members = [BatchMember::new(&mechanism, start(&mechanism, &scene))];
     let mut found = None;
     Batch::new(tight()).integrate(&mut members, Time::from(20.0), &mut |_, passage| {
-        let Some(body) = (0..2).find(|&body| passage.turned[body] != 0) else { return Going::On };
-        let target = std::f64::consts::PI * passage.turned[body].signum() as f64;
+        let end = |body: usize| passage.at(body, passage.step).0;
+        let passes = |&body: &usize| end(body).abs() > std::f64::consts::PI;
+        let Some(body) = (0..2).find(passes) else { return Going::On };
+        let target = std::f64::consts::PI * end(body).signum();
         let beyond = |after: f64| (passage.at(body, after).0 - target) * target > 0.0;
         let (mut before, mut after) = (0.0, passage.step);
         assert!(!beyond(before) && beyond(after));
@@ -147,15 +247,15 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
 
 #[test]
 fn one_bad_trajectory_leaves_the_others_alone() {
-    let (scene, driven) = (shipped("free", &[]), shipped("motor", &[]));
-    let (mechanism, motor) = (compile(&scene), compile(&driven));
+    let (scene, other) = (shipped("free", &[]), shipped("wall", &[]));
+    let (mechanism, wall) = (compile(&scene), compile(&other));
     let good = start(&mechanism, &scene);
     let (mut lost, mut past) = (good.clone(), good.clone());
     lost.y[2] = f64::NAN;
     past.time = Time::from(3.0);
     let mut members = [
         BatchMember::new(&mechanism, lost),
-        BatchMember::new(&motor, start(&motor, &driven)),
+        BatchMember::new(&wall, start(&wall, &other)),
         BatchMember::new(&mechanism, past.clone()),
         BatchMember::new(&mechanism, good),
     ];
@@ -165,7 +265,7 @@ fn one_bad_trajectory_leaves_the_others_alone() {
     assert_eq!(causes, [Some(Cause::NotFinite), Some(Cause::Unsuited), None, None]);
     assert_eq!(members[2].state, past);
     assert_eq!(members[3].state.time, Time::from(2.0));
-    assert!(!Batch::takes(&motor) && Batch::takes(&mechanism));
+    assert!(!Batch::takes(&wall) && Batch::takes(&mechanism));
 }
 
 /// Released from rest both bars horizontal only every fourth power is there; hanging, none; both upright,

@@ -76,28 +76,43 @@ fn every_point_is_the_run_it_stands_for() {
 #[test]
 fn points_in_lanes_agree_with_single_runs() {
     let request = Request { rtol: Some(1e-12), ..request("taylor", 1.0) };
-    let plan = prepared("free", &["bar1.phi=-3..3:5", "bar2.density=300..900:3"], &request);
-    for point in points(&plan, 1) {
-        let alone = template("free").filled(plan.variables(), &point.values).expect("a scene");
-        let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
-        assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
-        for (found, exact) in
-            point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
-        {
-            assert!((found - exact).abs() < 1e-9, "{point:?}");
+    for (scene, vary) in [
+        ("free", ["bar1.phi=-3..3:5", "bar2.density=300..900:3"]),
+        ("motor", ["motor.rate=-9..9:5", "bar2.phi=-3..3:3"]),
+        ("motor_sine", ["motors.motor.law.sines[0].amplitude=-1..1:5", "motors.motor.law.rate=-4..9:3"]),
+    ] {
+        let plan = prepared(scene, &vary, &request);
+        for point in points(&plan, 1) {
+            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+            assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
+            for (found, exact) in
+                point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
+            {
+                assert!((found - exact).abs() < 1e-9, "{scene}: {point:?} {outcome:?}");
+            }
+            assert!(point.energy < 1e-12, "{scene}: {point:?}");
+            let defects = outcome.drift.constraints.first().map(|(_, levels)| [levels[0].max, levels[1].max]);
+            for (found, alone) in point.constraint.into_iter().flatten().zip(defects.into_iter().flatten()) {
+                assert!(found < 1e-14 && alone < 1e-14, "{scene}: {found:e} {alone:e}");
+            }
+            assert_eq!(point.constraint.is_some(), scene != "free");
         }
-        assert!(point.energy < 1e-12, "{point:?}");
     }
 }
 
 /// In lanes and one by one: no point changes, and errors are those against the motion in double-double.
 #[test]
 fn estimates_of_points_are_near_the_truth() {
-    for (scene, method, tolerance, until) in
-        [("free", "taylor", 1e-8, 6.0), ("free", "dp8", 1e-7, 6.0), ("gentle", "taylor", 1e-5, 8.0)]
-    {
+    for (scene, method, tolerance, until) in [
+        ("free", "taylor", 1e-8, 6.0),
+        ("free", "dp8", 1e-7, 6.0),
+        ("gentle", "taylor", 1e-5, 8.0),
+        ("motor", "taylor", 1e-8, 6.0),
+    ] {
         let request = Request { rtol: Some(tolerance), every: Some(0.5), ..request(method, until) };
-        let vary = ["bar1.phi=-2.5..2.5:4", "bar2.phi=0.3..2.9:3"];
+        let angle = if scene == "motor" { "motor.rate=4..9:4" } else { "bar1.phi=-2.5..2.5:4" };
+        let vary = [angle, "bar2.phi=0.3..2.9:3"];
         let bare = points(&prepared(scene, &vary, &request), 1);
         let plan = prepared(scene, &vary, &request).trusted(Level::Auto);
         let judged = points(&plan, 1);

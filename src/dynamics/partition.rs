@@ -241,7 +241,7 @@ impl CoordinatePartition {
     }
 
     /// Angles and turns of all bodies, and the driven share of their rates, in double-double.
-    pub(super) fn read_angles(&self, state: &State, motion: &mut Motion) {
+    pub(crate) fn read_angles(&self, state: &State, motion: &mut Motion) {
         motion.resize(self.bodies.len());
         motion.time = state.time;
         for (k, dependent_angle) in self.bodies.iter().enumerate() {

@@ -43,7 +43,7 @@ pub use shard::Shard;
 pub use totals::Totals;
 
 use super::drift::Limits;
-use super::methods::MethodId;
+use super::methods::{MethodId, Stabilization};
 use super::plan::{MAX_ROWS, Plan, Refusal, Request};
 use super::trust::Level;
 use crate::dynamics::{CompileError, Mechanism};
@@ -160,13 +160,16 @@ impl Sweep {
         let in_lanes = request.method.is_none()
             && request.step.is_none()
             && !request.extended
+            && request.stabilize.is_none_or(|kind| kind == Stabilization::Elimination)
             && Batch::takes(&mechanism);
         if in_lanes {
             request.method = Some(MethodId::Taylor);
         }
         let mut plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
         if in_lanes {
-            plan.why = Some("taylor: free bodies are integrated several at a time".into());
+            let bodies =
+                if mechanism.constraints.is_empty() { "free bodies" } else { "bodies with one motor" };
+            plan.why = Some(format!("taylor: {bodies} are integrated several at a time"));
         }
         // What one point gets unasked, all get.
         request.method = Some(plan.method);

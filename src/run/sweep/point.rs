@@ -2,7 +2,8 @@
 
 use super::judge::{Judge, PointTrust};
 use super::{Sweep, timed};
-use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::{DoubleDouble, Scalar};
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{BodyAngles, Form, Mechanism, Motion};
@@ -10,7 +11,7 @@ use crate::run::allowance::{Allowance, EnergyLimit, Moment};
 use crate::run::drift::larger;
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip::{self, Flip};
-use crate::run::methods::MethodId;
+use crate::run::methods::{MethodId, Stabilization};
 use crate::run::plan::{Plan, Request};
 use crate::run::running::{Run, Running};
 use crate::run::trust::Level;
@@ -134,6 +135,7 @@ impl Sweep {
             && self.trust != Level::Full
             && ready.plan.method == MethodId::Taylor
             && !ready.plan.extended
+            && matches!(ready.plan.stabilization, Stabilization::None | Stabilization::Elimination)
             && ready.mechanism.outputs.is_none()
             && Batch::takes(&ready.mechanism)
     }
@@ -363,27 +365,29 @@ impl Lane {
         stated: Option<f64>,
         plan: &Plan,
     ) -> bool {
-        let n = member.mechanism.bodies.len();
-        let state = &member.state;
-        motion.resize(n);
-        motion.turns.copy_from_slice(&state.turns);
-        for k in 0..n {
-            (motion.phi[k], motion.omega[k]) = (state.unknown(k), state.unknown(n + k));
+        let (n, state, partition) =
+            (member.mechanism.bodies.len(), &member.state, &member.mechanism.partition);
+        partition.read_angles(state, motion);
+        let coordinates = partition.count();
+        for (omega, body) in motion.omega.iter_mut().zip(&partition.bodies) {
+            *omega += body.base.map_or(DoubleDouble::ZERO, |base| state.unknown(coordinates + base));
         }
+        let work = state.unknown(2 * coordinates);
         let point = &mut self.point;
-        let energy = member.mechanism.energy(kernel, &motion.phi, &motion.omega).total();
+        let energy = member.mechanism.energy(kernel, &motion.phi, &motion.omega).total() - work;
         let imbalance = ((energy - self.reference).hi / self.scale).abs();
         point.energy = larger(imbalance, point.energy);
         point.t = state.time.hi;
         point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
         point.steps = member.statistics.steps;
+        point.constraint = violation(member.mechanism, motion, point.constraint);
         if let Some(allowance) = &self.allowance {
             let moment = Moment {
                 omega: &point.omega,
                 translations: &[],
-                work: 0.0,
-                largest: self.scale,
+                work: work.hi,
+                largest: self.scale.max(work.hi.abs()),
                 steps: point.steps,
             };
             self.limit.see(allowance, &moment);
@@ -421,4 +425,17 @@ impl Lane {
         }
         true
     }
+}
+
+/// The largest violation of any constraint so far, at position and velocity level; constraints are given angles.
+fn violation(mechanism: &Mechanism, motion: &Motion, before: Option<[f64; 2]>) -> Option<[f64; 2]> {
+    let mut jacobian = vec![DoubleDouble::ZERO; motion.phi.len()];
+    mechanism.constraints.iter().fold(before, |most, row| {
+        jacobian.fill(DoubleDouble::ZERO);
+        let at = Posture { phi: &motion.phi, z: &[], omega: &motion.omega };
+        let here = row.linearise(motion.time, at, &mut jacobian);
+        let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |rate, (&g, &w)| rate + g * w);
+        let [position, velocity] = most.unwrap_or_default();
+        Some([larger(here.position.hi.abs(), position), larger(rate.hi.abs(), velocity)])
+    })
 }

@@ -1,17 +1,23 @@
-//! Many trajectories at once, one a lane: ensembles of up to four free bodies.
+//! Many trajectories at once, one a lane: ensembles of up to four free bodies, or of two of which one is driven.
 //!
-//! The equation of `bodies` with the lanes over trajectories instead of bodies.  Nothing ever crosses from
-//! lane to lane, so that a trajectory has the same bits whoever its neighbours are; every lane has its own
-//! step, its own time, its own constants of the mechanism, and takes in the next trajectory as soon as its
-//! last one has ended.
+//! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
+//! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
+//! trajectory as soon as its last one has ended.
 
+mod driven;
+mod free;
 mod series;
-use self::series::{expand, finish};
+mod swinging;
+
+use self::driven::DrivenTeam;
+use self::free::FreeTeam;
+use self::swinging::SwingingTeam;
 use super::step_size::{self, StepSize};
+use super::terms::add_to;
 use super::{JUDGES, Kernel, stop};
-use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
+use crate::arithmetic::sincos;
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 
@@ -56,9 +62,6 @@ pub struct Passage<'a> {
     pub from: Time,
     /// Its length \[s\].
     pub step: f64,
-    /// Whole turns of each body's angle at its end less those at its start: how often it passed ±π,
-    /// counter-clockwise counted positive.
-    pub turned: [i64; BODIES],
     series: &'a dyn Fn(usize, f64) -> (f64, f64),
 }
 
@@ -70,7 +73,7 @@ impl Passage<'_> {
     }
 }
 
-/// Integrates many trajectories of free mechanisms.
+/// Integrates many trajectories of free mechanisms, or of such with a motor.
 ///
 /// Source of the method: see [`Taylor`](super::Taylor), whose tolerance and orders these are.
 #[derive(Clone, Debug)]
@@ -98,81 +101,126 @@ impl Batch {
     }
 
     /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
-    /// neither springs nor motors nor walls.
+    /// neither springs nor motors nor walls; or two, one of them driven from the ground by a law that is no
+    /// formula.
     pub fn takes(mechanism: &Mechanism) -> bool {
-        let tree = &mechanism.tree;
-        (1..=BODIES).contains(&tree.coordinates)
-            && !tree.off_axis
-            && mechanism.is_plain()
-            && mechanism.constraints.is_empty()
-            && mechanism.contacts.is_empty()
+        (1..=BODIES).contains(&mechanism.tree.coordinates) && FreeTeam::<0>::fits_any(mechanism)
+            || DrivenTeam::fits(mechanism)
+            || SwingingTeam::fits(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
     /// may end that one.
     ///
-    /// All mechanisms must be such as [`Batch::takes`], of the same number of bodies; any other is stopped as
-    /// unsuited.  The result of each does not depend on the others.
+    /// Mechanisms that it does not [take](Batch::takes) are stopped as unsuited.  The result of each does not
+    /// depend on the others.
     pub fn integrate(
         &self,
         members: &mut [BatchMember],
         until: Time,
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
-        let Some(bodies) = members.first().map(|first| first.mechanism.tree.coordinates) else { return };
-        let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
-        match bodies {
-            1 => vectors.run(Integration::<1> { batch: self, members, until, watch }),
-            2 => vectors.run(Integration::<2> { batch: self, members, until, watch }),
-            3 => vectors.run(Integration::<3> { batch: self, members, until, watch }),
-            _ => vectors.run(Integration::<4> { batch: self, members, until, watch }),
+        self.integrate_those::<FreeTeam<1>>(members, until, watch);
+        self.integrate_those::<FreeTeam<2>>(members, until, watch);
+        self.integrate_those::<FreeTeam<3>>(members, until, watch);
+        self.integrate_those::<FreeTeam<4>>(members, until, watch);
+        self.integrate_those::<DrivenTeam>(members, until, watch);
+        self.integrate_those::<SwingingTeam>(members, until, watch);
+        for member in members.iter_mut().filter(|member| !Self::takes(member.mechanism)) {
+            let what = "lanes take free bodies, or two of which one is driven".into();
+            member.stopped =
+                Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
+        }
+    }
+
+    /// Integrates those of one kind.
+    fn integrate_those<T: Team>(
+        &self,
+        members: &mut [BatchMember],
+        until: Time,
+        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+    ) {
+        if members.iter().any(|member| T::fits(member.mechanism)) {
+            let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
+            vectors.run(Integration::<T>::new(self, members, until, watch));
         }
     }
 }
 
-struct Integration<'a, 'b, const N: usize> {
+/// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
+trait Team {
+    /// Empty lanes.
+    fn new() -> Self;
+
+    /// True for a mechanism of this kind.
+    fn fits(mechanism: &Mechanism) -> bool;
+
+    /// Puts a trajectory into a lane; returns the longest step of an order in which the terms left out still
+    /// fall \[s\].
+    fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64;
+
+    /// Keeps an empty lane busy with something harmless.
+    fn park(&mut self, lane: usize);
+
+    /// Begins a step, from what the lanes are doing.
+    fn begin(&mut self, slots: &[LaneSlot; LANES]);
+
+    /// Expands all lanes to an order.
+    fn expand<W: EightLanes>(&mut self, order: usize);
+
+    /// The largest coefficients of a lane, of this order and those before it; `None` where one is not finite.
+    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]>;
+
+    /// Every lane's state at the end of its step \[s\].
+    fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
+
+    /// Brings a lane's angles back into [-π, π], and counts the turns.
+    fn wrap(&mut self, lane: usize, turns: &mut [i64]);
+
+    /// Writes a lane's unknowns into a state.
+    fn leave(&self, lane: usize, state: &mut State);
+
+    /// Angle \[rad\], continued from that at the start in [-π, π], and rate \[rad/s\] of a body `after` \[s\]
+    /// from the start of the step last expanded.
+    fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64);
+}
+
+struct Integration<'a, 'b, T> {
+    crew: Crew<T>,
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
     watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
 }
 
-impl<const N: usize> WideCode for Integration<'_, '_, N> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<W: EightLanes>(self) {
-        integrate::<W, N>(self.batch, self.members, self.until, self.watch);
+impl<'a, 'b, T: Team> Integration<'a, 'b, T> {
+    fn new(
+        batch: &'a Batch,
+        members: &'a mut [BatchMember<'b>],
+        until: Time,
+        watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
+    ) -> Self {
+        Self { crew: Crew::new(batch.order, until), batch, members, until, watch }
     }
 }
 
-/// Constants, states and coefficients of the trajectories in the lanes.
-#[derive(Clone, Debug)]
-struct Team<const N: usize> {
-    slots: [LaneSlot; LANES],
-    /// A \[kg·m²\], zero on the diagonal.
-    coupling: [[Octet; N]; N],
-    diagonal: [Octet; N],
-    /// W \[N·m\].
-    weight: [[Octet; 2]; N],
-    /// M_0⁻¹.
-    inverse: [[Octet; N]; N],
-    /// Leading parts of angles and rates, and what they leave out.
-    high: [[Octet; N]; 2],
-    low: [[Octet; N]; 2],
-    /// Angles at the start of the step.
-    before: [Octet; N],
-    powers: [Power<N>; MOST + 1],
-}
+impl<T: Team> WideCode for Integration<'_, '_, T> {
+    type Output = ();
 
-/// Coefficients of one power: cos, sin, v, and the two components of P.
-#[derive(Clone, Copy, Debug)]
-struct Power<const N: usize> {
-    c: [Octet; N],
-    s: [Octet; N],
-    v: [Octet; N],
-    px: [Octet; N],
-    py: [Octet; N],
+    #[inline(always)]
+    fn run<W: EightLanes>(mut self) {
+        let (order, mut waiting) = (self.batch.order, 0);
+        loop {
+            self.crew.fill(self.batch, self.members, &mut waiting, self.until);
+            if self.crew.is_idle() {
+                return;
+            }
+            self.crew.team.expand::<W>(order);
+            let taken = self.crew.choose_steps(order);
+            self.crew.team.finish::<W>(order, &taken);
+            self.crew.arrive(order, self.members, self.until, self.watch);
+        }
+    }
 }
 
 /// What a lane is doing.
@@ -207,11 +255,15 @@ impl LaneSlot {
     }
 }
 
-impl<const N: usize> Team<N> {
+/// Lanes, and what they do.
+struct Crew<T> {
+    slots: [LaneSlot; LANES],
+    team: Box<T>,
+}
+
+impl<T: Team> Crew<T> {
     /// Empty lanes.
     fn new(order: usize, until: Time) -> Self {
-        let zero = [Octet::splat(0.0); N];
-        let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
         let empty = || LaneSlot {
             member: None,
             step_size: StepSize::new(1.0, order, 0.0),
@@ -221,34 +273,32 @@ impl<const N: usize> Team<N> {
             wanted: 0.0,
             taken: 0.0,
         };
-        Self {
-            slots: std::array::from_fn(|_| empty()),
-            coupling: [zero; N],
-            diagonal: [Octet::splat(1.0); N],
-            weight: [[Octet::splat(0.0); 2]; N],
-            inverse: [zero; N],
-            high: [zero; 2],
-            low: [zero; 2],
-            before: zero,
-            powers: [power; MOST + 1],
-        }
+        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(T::new()) }
     }
 
     /// Puts trajectories that wait into the free lanes.
-    fn fill(&mut self, batch: &Batch, members: &mut [BatchMember], waiting: &mut usize, until: Time) {
+    fn fill(&mut self, batch: &Batch, members: &[BatchMember], waiting: &mut usize, until: Time) {
         for lane in 0..LANES {
             if self.slots[lane].member.is_none() {
-                let next = next::<N>(members, waiting, until);
+                let next = next::<T>(members, waiting, until);
                 self.slots[lane].member = next;
                 match next {
-                    Some(index) => self.slot(lane, batch, &members[index]),
-                    None => self.park(lane),
+                    Some(index) => self.take_in(lane, batch, &members[index]),
+                    None => self.team.park(lane),
                 }
             }
             let slot = &mut self.slots[lane];
             slot.left = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
         }
-        self.before = self.high[0];
+        self.team.begin(&self.slots);
+    }
+
+    /// Puts a trajectory into a lane.
+    fn take_in(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
+        let (longest, unit) = (self.team.take_in(lane, member, batch.order), member.mechanism.units.time);
+        let slot = &mut self.slots[lane];
+        slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
+        (slot.time, slot.unit) = (member.state.time, unit);
     }
 
     /// True where no lane has a trajectory.
@@ -260,14 +310,9 @@ impl<const N: usize> Team<N> {
     fn choose_steps(&mut self, order: usize) -> Octet {
         let mut taken = Octet::splat(0.0);
         for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
-            let coefficient = |k: usize, i: usize| self.powers[k].v[i].0[lane];
-            let mut sizes = [0.0; JUDGES];
-            for (back, size) in sizes.iter_mut().enumerate() {
-                *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
-            }
-            let finite = (0..N).all(|i| coefficient(order, i).is_finite());
-            slot.wanted = if finite { slot.step_size.step_of(order, &sizes) } else { f64::NAN };
-            slot.taken = if finite { step_size::taken(slot.wanted, slot.left) } else { 0.0 };
+            let sizes = self.team.sizes(lane, order);
+            slot.wanted = sizes.map_or(f64::NAN, |sizes| slot.step_size.step_of(order, &sizes));
+            slot.taken = if sizes.is_some() { step_size::taken(slot.wanted, slot.left) } else { 0.0 };
             *taken = slot.taken;
         }
         taken
@@ -295,110 +340,59 @@ impl<const N: usize> Team<N> {
                 }
             }
             let time = slot.time;
-            let mut turned = [0; BODIES];
-            for i in 0..N {
-                turned[i] = angle::wrap(&mut self.high[0][i].0[lane], &mut self.low[0][i].0[lane]);
-                member.state.turns[i] += turned[i];
-            }
-            let series = |body: usize, after: f64| self.at(order, lane, body, after);
-            let passage = Passage { from, step, turned, series: &series };
+            self.team.wrap(lane, &mut member.state.turns);
+            let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
+            let passage = Passage { from, step, series: &series };
             if member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until {
-                self.leave(lane, &mut member.state);
+                self.team.leave(lane, &mut member.state);
                 member.state.time = time;
                 self.slots[lane].member = None;
             }
         }
     }
+}
 
-    /// Puts a trajectory into a lane.
-    fn slot(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
-        let (tree, unit) = (&member.mechanism.tree, member.mechanism.units.time);
-        let longest = batch.order as f64 / 3.0 / tree.fastest_rate(&[]);
-        let slot = &mut self.slots[lane];
-        slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
-        (slot.time, slot.unit) = (member.state.time, unit);
-        for i in 0..N {
-            self.diagonal[i].0[lane] = tree.diagonal[i];
-            self.weight[i][0].0[lane] = tree.weight[i].re;
-            self.weight[i][1].0[lane] = tree.weight[i].im;
-            for j in i + 1..N {
-                self.coupling[i][j].0[lane] = tree.coupling[i * N + j].re;
-                self.coupling[j][i].0[lane] = tree.coupling[i * N + j].re;
-            }
-            for part in 0..2 {
-                self.high[part][i].0[lane] = member.state.y[part * N + i];
-                self.low[part][i].0[lane] = member.state.low[part * N + i];
-            }
-        }
-    }
+// Closures and `map` are compiled apart, without the processor's vectors, and arrays that loops go over stay in
+// memory: what follows, and all that uses it, is written out.
 
-    /// Keeps an empty lane busy with something harmless: bodies hanging at rest.
-    fn park(&mut self, lane: usize) {
-        for part in [&mut self.high, &mut self.low] {
-            for numbers in part.iter_mut().flatten() {
-                numbers.0[lane] = 0.0;
-            }
-        }
-    }
-
-    /// Writes a lane's unknowns into a state.
-    fn leave(&self, lane: usize, state: &mut State) {
-        for part in 0..2 {
-            for i in 0..N {
-                state.y[part * N + i] = self.high[part][i].0[lane];
-                state.low[part * N + i] = self.low[part][i].0[lane];
-            }
-        }
-    }
-
-    /// Angle and rate of a body `after` \[s\] from the start of the step last expanded.
-    fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
-        let start = self.before[body].0[lane];
-        if after == 0.0 {
-            return (start, self.powers[0].v[body].0[lane]);
-        }
-        let (mut angle, mut rate) = (0.0, 0.0);
-        for k in (0..=order).rev() {
-            let v = self.powers[k].v[body].0[lane];
-            rate = rate * after + v;
-            angle = angle * after + v / (k + 1) as f64;
-        }
-        (start + angle * after, rate)
-    }
+#[inline(always)]
+fn load<W: EightLanes>(octet: &Octet) -> W {
+    W::of(&octet.0)
 }
 
 #[inline(always)]
-fn integrate<W: EightLanes, const N: usize>(
-    batch: &Batch,
-    members: &mut [BatchMember],
-    until: Time,
-    watch: &mut dyn FnMut(usize, &Passage) -> Going,
-) {
-    let mut team = Box::new(Team::<N>::new(batch.order, until));
-    let mut waiting = 0;
-    loop {
-        team.fill(batch, members, &mut waiting, until);
-        if team.is_idle() {
-            return;
-        }
-        expand::<W, N>(&mut team, batch.order);
-        let taken = team.choose_steps(batch.order);
-        finish::<W, N>(&mut team, batch.order, &taken);
-        team.arrive(batch.order, members, until, watch);
-    }
+fn store<W: EightLanes>(lanes: W) -> Octet {
+    Octet(lanes.array())
 }
 
-/// The next trajectory that has a way to go; those that do not fit are stopped.
-fn next<const N: usize>(members: &mut [BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
+/// What even and odd powers from the first on, each summed in squares of h, come to.
+#[inline(always)]
+fn moved<W: EightLanes>([even, odd]: [W; 2], h: W) -> W {
+    even.mul_add(h, odd).mul(h)
+}
+
+/// A number in two terms, and more.
+#[inline(always)]
+fn added<W: EightLanes>([high, low]: [&Octet; 2], increment: W, rest: W) -> (Octet, Octet) {
+    let [high, low] = add_to([load::<W>(high), load::<W>(low)], increment, rest);
+    (store(high), store(low))
+}
+
+/// Cosine and sine of angles in two terms.
+#[inline(always)]
+fn unit<W: EightLanes>(high: &Octet, low: &Octet) -> [Octet; 2] {
+    let ([high, other_high], [low, other_low]) = (load::<W>(high).halves(), load::<W>(low).halves());
+    let (s, c) = sincos::sin_cos::<W::Half>(high, low);
+    let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
+    [store(W::join([c, other_c])), store(W::join([s, other_s]))]
+}
+
+/// The next trajectory of this kind that has a way to go.
+fn next<T: Team>(members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
     while *waiting < members.len() {
-        let index = *waiting;
+        let (index, member) = (*waiting, &members[*waiting]);
         *waiting += 1;
-        let member = &mut members[index];
-        if !Batch::takes(member.mechanism) || member.mechanism.tree.coordinates != N {
-            let what = "the batch takes free mechanisms of one size".into();
-            member.stopped =
-                Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
-        } else if member.state.time < until {
+        if member.state.time < until && T::fits(member.mechanism) {
             return Some(index);
         }
     }

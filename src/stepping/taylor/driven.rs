@@ -37,18 +37,20 @@ pub const MOST: usize = 24;
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
 pub struct Driven {
-    law: Law,
+    /// The body that is driven, and its law.
+    pub(super) body: usize,
+    pub(super) law: Law,
     /// A \[kg·m²\].
-    coupling: f64,
+    pub(super) coupling: f64,
     /// W of the driven body \[N·m\].
-    weight: Complex<f64>,
+    pub(super) weight: Complex<f64>,
     /// e × W - A w² Im u over d k as a product with E, in two terms.
     load: [[[f64; 4]; 2]; MOST + 1],
     /// Fastest rate: small oscillations, and the motor \[rad/s\].
     rate: f64,
     /// What an error of the unit vectors comes to in the work, over the energy scale and the unit of time: a
     /// part \[1/s\], and a part times the free body's rate.
-    share: [f64; 2],
+    pub(super) share: [f64; 2],
 }
 
 /// Angle and rate of the free body and the motor's work, and what their leading parts leave out.
@@ -96,24 +98,27 @@ impl Default for Scratch {
 }
 
 impl Driven {
-    /// The constants, where this form fits: two bodies on their axes, one driven from the ground by a law
-    /// without acceleration and sines, no springs.
-    pub fn new(mechanism: &Mechanism) -> Option<Self> {
+    /// The driven body and its law, of two bodies on their axes, one driven from the ground, no springs.
+    pub(super) fn pattern(mechanism: &Mechanism) -> Option<(usize, &Law)> {
         let tree = &mechanism.tree;
-        let [ConstraintEquation { measure: Measure::Angle { body, base }, law: Some(law), .. }] =
+        let [ConstraintEquation { measure: Measure::Angle { body, base: None }, law: Some(law), .. }] =
             &mechanism.constraints[..]
         else {
             return None;
         };
-        if tree.coordinates != 2
-            || tree.off_axis
-            || !mechanism.is_plain()
-            || base.is_some()
-            || !law.is_steady()
-        {
-            return None;
-        }
-        let (driven, free) = (*body, 1 - *body);
+        let fits = tree.coordinates == 2 && !tree.off_axis && mechanism.is_plain();
+        fits.then_some((*body, law))
+    }
+
+    /// The same where the law has neither acceleration nor sines: this form fits.
+    pub(super) fn of(mechanism: &Mechanism) -> Option<(usize, &Law)> {
+        Self::pattern(mechanism).filter(|(_, law)| law.is_steady())
+    }
+
+    /// The constants, where this form fits.
+    pub fn new(mechanism: &Mechanism) -> Option<Self> {
+        let (tree, (driven, law)) = (&mechanism.tree, Self::of(mechanism)?);
+        let free = 1 - driven;
         let (a, d, w) = (tree.coupling[1].re, tree.diagonal[free], law.rate);
         let pull = tree.weight[free];
         let lanes = [
@@ -132,7 +137,12 @@ impl Driven {
         let (swing, weight) = ((w * a).abs() / mechanism.energy_scale, tree.weight[driven]);
         let share = [swing * w.abs() + weight.norm_squared().sqrt() / mechanism.energy_scale, swing]
             .map(|share| share / mechanism.units.time);
-        Some(Self { law: law.clone(), coupling: a, weight, load, rate, share })
+        Some(Self { body: driven, law: law.clone(), coupling: a, weight, load, rate, share })
+    }
+
+    /// What cos e, sin e and Im u are multiplied with for the acceleration \[1/s²\], in two terms.
+    pub(super) fn loads(&self) -> [[f64; 3]; 2] {
+        self.load[1].map(|[sine, cosine, _, pull]| [sine, cosine, pull])
     }
 
     /// The longest step in which the terms left out still fall \[s\].

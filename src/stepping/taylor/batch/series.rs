@@ -1,24 +1,21 @@
 //! The series of all lanes of a team, and its sum.
 
 use super::super::terms::{add_to, over};
-use super::{Octet, Team};
+use super::free::FreeTeam;
+use super::{load, store, unit};
+use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::EightLanes;
-use crate::arithmetic::sincos;
 
 /// Expands all lanes to an order.
 #[inline(always)]
-pub(super) fn expand<W: EightLanes, const N: usize>(team: &mut Team<N>, order: usize) {
+pub(super) fn expand<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, order: usize) {
     let mut f = [[W::ZERO; N]; 2];
     for i in 0..N {
-        let ([high, other_high], [low, other_low]) =
-            (load::<W>(&team.high[0][i]).halves(), load::<W>(&team.low[0][i]).halves());
-        let (s, c) = sincos::sin_cos::<W::Half>(high, low);
-        let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
-        let (s, c) = (W::join([s, other_s]), W::join([c, other_c]));
+        let [c, s] = unit::<W>(&team.high[0][i], &team.low[0][i]);
         let power = &mut team.powers[0];
-        (power.c[i], power.s[i], power.v[i]) = (store(c), store(s), team.high[1][i]);
+        (power.c[i], power.s[i], power.v[i]) = (c, s, team.high[1][i]);
         let v = load::<W>(&team.high[1][i]);
-        (f[0][i], f[1][i]) = (v.mul(c), v.mul(s));
+        (f[0][i], f[1][i]) = (v.mul(load(&c)), v.mul(load(&s)));
     }
     invert::<W, N>(team);
     for k in 0..order {
@@ -26,19 +23,9 @@ pub(super) fn expand<W: EightLanes, const N: usize>(team: &mut Team<N>, order: u
     }
 }
 
-#[inline(always)]
-fn load<W: EightLanes>(octet: &Octet) -> W {
-    W::of(&octet.0)
-}
-
-#[inline(always)]
-fn store<W: EightLanes>(lanes: W) -> Octet {
-    Octet(lanes.array())
-}
-
 /// Order k: from e_k, v_k and f_k = v e to those of the next one.
 #[inline(always)]
-pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut Team<N>, f: &mut [[W; N]; 2], k: usize) {
+pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, f: &mut [[W; N]; 2], k: usize) {
     let zero = W::ZERO;
     let order = W::splat((k + 1) as f64);
     let (mut gx, mut gy, mut torque) = ([zero; N], [zero; N], [zero; N]);
@@ -141,7 +128,7 @@ pub(super) fn mass_terms<W: EightLanes, const N: usize>(row: &[Octet; N], x: &[W
 
 /// M_0⁻¹ x.
 #[inline(always)]
-pub(super) fn solve<W: EightLanes, const N: usize>(team: &Team<N>, x: &[W; N]) -> [W; N] {
+pub(super) fn solve<W: EightLanes, const N: usize>(team: &FreeTeam<N>, x: &[W; N]) -> [W; N] {
     let mut solution = [W::ZERO; N];
     for i in 0..N {
         let mut sum = load::<W>(&team.inverse[i][0]).mul(x[0]);
@@ -155,7 +142,7 @@ pub(super) fn solve<W: EightLanes, const N: usize>(team: &Team<N>, x: &[W; N]) -
 
 /// M_0⁻¹ by elimination without interchanges, M_0 being positive definite.
 #[inline(always)]
-pub(super) fn invert<W: EightLanes, const N: usize>(team: &mut Team<N>) {
+pub(super) fn invert<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>) {
     let (zero, one) = (W::ZERO, W::ONE);
     let mut mass = [[zero; N]; N];
     for i in 0..N {
@@ -197,7 +184,7 @@ pub(super) fn invert<W: EightLanes, const N: usize>(team: &mut Team<N>) {
 
 /// Every lane's state at the end of its step.
 #[inline(always)]
-pub(super) fn finish<W: EightLanes, const N: usize>(team: &mut Team<N>, order: usize, taken: &Octet) {
+pub(super) fn finish<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, order: usize, taken: &Octet) {
     let h = load::<W>(taken);
     let square = h.mul(h);
     for i in 0..N {

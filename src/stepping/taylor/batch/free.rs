@@ -1,0 +1,146 @@
+//! Up to four free bodies: the equation of `bodies` with the lanes over trajectories instead of bodies.
+
+use super::series::{expand, finish};
+use super::{BatchMember, JUDGES, LaneSlot, MOST, Team};
+use crate::arithmetic::angle;
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::wide::EightLanes;
+use crate::dynamics::{Mechanism, State};
+
+/// Constants, states and coefficients of the trajectories in the lanes.
+#[derive(Clone, Debug)]
+pub(super) struct FreeTeam<const N: usize> {
+    /// A \[kg·m²\], zero on the diagonal.
+    pub coupling: [[Octet; N]; N],
+    pub diagonal: [Octet; N],
+    /// W \[N·m\].
+    pub weight: [[Octet; 2]; N],
+    /// M_0⁻¹.
+    pub inverse: [[Octet; N]; N],
+    /// Leading parts of angles and rates, and what they leave out.
+    pub high: [[Octet; N]; 2],
+    pub low: [[Octet; N]; 2],
+    /// Angles at the start of the step.
+    before: [Octet; N],
+    pub powers: [Power<N>; MOST + 1],
+}
+
+/// Coefficients of one power: cos, sin, v, and the two components of P.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Power<const N: usize> {
+    pub c: [Octet; N],
+    pub s: [Octet; N],
+    pub v: [Octet; N],
+    pub px: [Octet; N],
+    pub py: [Octet; N],
+}
+
+impl<const N: usize> FreeTeam<N> {
+    /// True for free bodies, however many.
+    pub fn fits_any(mechanism: &Mechanism) -> bool {
+        !mechanism.tree.off_axis
+            && mechanism.is_plain()
+            && mechanism.constraints.is_empty()
+            && mechanism.contacts.is_empty()
+    }
+}
+
+impl<const N: usize> Team for FreeTeam<N> {
+    fn new() -> Self {
+        let zero = [Octet::splat(0.0); N];
+        let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
+        Self {
+            coupling: [zero; N],
+            diagonal: [Octet::splat(1.0); N],
+            weight: [[Octet::splat(0.0); 2]; N],
+            inverse: [zero; N],
+            high: [zero; 2],
+            low: [zero; 2],
+            before: zero,
+            powers: [power; MOST + 1],
+        }
+    }
+
+    fn fits(mechanism: &Mechanism) -> bool {
+        mechanism.tree.coordinates == N && Self::fits_any(mechanism)
+    }
+
+    fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
+        let tree = &member.mechanism.tree;
+        for i in 0..N {
+            self.diagonal[i].0[lane] = tree.diagonal[i];
+            self.weight[i][0].0[lane] = tree.weight[i].re;
+            self.weight[i][1].0[lane] = tree.weight[i].im;
+            for j in i + 1..N {
+                self.coupling[i][j].0[lane] = tree.coupling[i * N + j].re;
+                self.coupling[j][i].0[lane] = tree.coupling[i * N + j].re;
+            }
+            for part in 0..2 {
+                self.high[part][i].0[lane] = member.state.y[part * N + i];
+                self.low[part][i].0[lane] = member.state.low[part * N + i];
+            }
+        }
+        order as f64 / 3.0 / tree.fastest_rate(&[])
+    }
+
+    /// Bodies hanging at rest.
+    fn park(&mut self, lane: usize) {
+        for part in [&mut self.high, &mut self.low] {
+            for numbers in part.iter_mut().flatten() {
+                numbers.0[lane] = 0.0;
+            }
+        }
+    }
+
+    fn begin(&mut self, _: &[LaneSlot; LANES]) {
+        self.before = self.high[0];
+    }
+
+    #[inline(always)]
+    fn expand<W: EightLanes>(&mut self, order: usize) {
+        expand::<W, N>(self, order);
+    }
+
+    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]> {
+        let coefficient = |k: usize, i: usize| self.powers[k].v[i].0[lane];
+        let mut sizes = [0.0; JUDGES];
+        for (back, size) in sizes.iter_mut().enumerate() {
+            *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
+        }
+        (0..N).all(|i| coefficient(order, i).is_finite()).then_some(sizes)
+    }
+
+    #[inline(always)]
+    fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet) {
+        finish::<W, N>(self, order, taken);
+    }
+
+    fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
+        for i in 0..N {
+            turns[i] += angle::wrap(&mut self.high[0][i].0[lane], &mut self.low[0][i].0[lane]);
+        }
+    }
+
+    fn leave(&self, lane: usize, state: &mut State) {
+        for part in 0..2 {
+            for i in 0..N {
+                state.y[part * N + i] = self.high[part][i].0[lane];
+                state.low[part * N + i] = self.low[part][i].0[lane];
+            }
+        }
+    }
+
+    fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
+        let start = self.before[body].0[lane];
+        if after == 0.0 {
+            return (start, self.powers[0].v[body].0[lane]);
+        }
+        let (mut angle, mut rate) = (0.0, 0.0);
+        for k in (0..=order).rev() {
+            let v = self.powers[k].v[body].0[lane];
+            rate = rate * after + v;
+            angle = angle * after + v / (k + 1) as f64;
+        }
+        (start + angle * after, rate)
+    }
+}
