@@ -92,6 +92,14 @@ pub(super) fn can_pass(a: &BodyAngles, b: &BodyAngles, span: f64) -> bool {
     })
 }
 
+/// False only where [`can_pass`] is, of a bar with these angles and rates at both ends of a step, the angle at its
+/// end continued; angles may be off by their rounding.
+pub(super) fn may_pass([[phi, omega], [end, rate]]: [[f64; 2]; 2], span: f64) -> bool {
+    let reach = span * (omega.abs().max(rate.abs()) + (rate - omega).abs());
+    let is_far_off = phi.abs().max(end.abs()) + reach < PI - 1e-6;
+    !is_far_off
+}
+
 /// The angle at `b`, less the turns of `a` \[rad\].
 fn winding(bar: usize, a: &BodyAngles, b: &BodyAngles) -> f64 {
     b.phi[bar] + TAU * (b.turns[bar] - a.turns[bar]) as f64

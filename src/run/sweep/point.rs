@@ -331,6 +331,9 @@ struct Lane {
 impl Lane {
     /// Looks for a bar that turns over in a step.
     fn look(&mut self, bodies: usize, passage: &Passage) {
+        if !(0..bodies).any(|bar| flip::may_pass(passage.ends(bar), passage.step)) {
+            return;
+        }
         let body_angles = |after: f64, body_angles: &mut BodyAngles| {
             body_angles.phi.clear();
             body_angles.turns.clear();

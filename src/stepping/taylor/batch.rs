@@ -62,6 +62,7 @@ pub struct Passage<'a> {
     pub from: Time,
     /// Its length \[s\].
     pub step: f64,
+    ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
     series: &'a dyn Fn(usize, f64) -> (f64, f64),
 }
 
@@ -70,6 +71,12 @@ impl Passage<'_> {
     /// from that at the start in [-π, π].
     pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
         (self.series)(body, after)
+    }
+
+    /// The same at the start and at the end, as the integration has them: without a sum, and to rounding those
+    /// of [`Passage::at`].
+    pub fn ends(&self, body: usize) -> [[f64; 2]; 2] {
+        (self.ends)(body)
     }
 }
 
@@ -173,6 +180,10 @@ trait Team {
 
     /// Every lane's state at the end of its step \[s\].
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
+
+    /// Angle \[rad\], continued from that at the start in [-π, π], and rate \[rad/s\] of a body at both ends of
+    /// the step just finished.
+    fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2];
 
     /// Brings a lane's angles back into [-π, π], and counts the turns.
     fn wrap(&mut self, lane: usize, turns: &mut [i64]);
@@ -340,10 +351,13 @@ impl<T: Team> Crew<T> {
                 }
             }
             let time = slot.time;
-            self.team.wrap(lane, &mut member.state.turns);
             let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
-            let passage = Passage { from, step, series: &series };
-            if member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until {
+            let ends = |body: usize| self.team.ends(lane, body);
+            let passage = Passage { from, step, ends: &ends, series: &series };
+            let is_over =
+                member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until;
+            self.team.wrap(lane, &mut member.state.turns);
+            if is_over {
                 self.team.leave(lane, &mut member.state);
                 member.state.time = time;
                 self.slots[lane].member = None;

@@ -37,6 +37,8 @@ pub(super) struct DrivenTeam {
     /// The free body's angle from the driven one's, in two terms, and both angles at the start of the step.
     between: [Octet; 2],
     before: [Octet; 2],
+    /// What the driven body turns in the step \[rad\].
+    swept: Octet,
     powers: [Power; MOST + 1],
 }
 
@@ -116,6 +118,7 @@ impl Team for DrivenTeam {
             low: [zero; 3],
             between: [zero; 2],
             before: [zero; 2],
+            swept: zero,
             powers: [Power { c: zero, s: zero, x: zero, y: zero, v: zero }; MOST + 1],
         }
     }
@@ -242,10 +245,20 @@ impl Team for DrivenTeam {
         let pull = x_moved.mul(w.add(v).add(rate)).add(x.mul(rate)).sub(w.mul(w.mul(swept)));
         let weights = turned[0].mul(load(&self.weight[0])).add(turned[1].mul(load(&self.weight[1])));
         let work = w.mul(load::<W>(&self.coupling).mul(pull)).sub(weights);
+        self.swept = store(w.mul(h));
         let drifted = load::<W>(&self.low[1]).mul(h);
         (self.high[0], self.low[0]) = added([&self.high[0], &self.low[0]], angle, drifted);
         (self.high[1], self.low[1]) = added([&self.high[1], &self.low[1]], rate, zero);
         (self.high[2], self.low[2]) = added([&self.high[2], &self.low[2]], work, zero);
+    }
+
+    fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
+        if body == self.driven[lane] {
+            let (start, rate) = (self.before[1].0[lane], self.rate.0[lane]);
+            return [[start, rate], [start + self.swept.0[lane], rate]];
+        }
+        let start = [self.before[0].0[lane], self.powers[0].v.0[lane]];
+        [start, [self.high[0].0[lane], self.high[1].0[lane]]]
     }
 
     fn wrap(&mut self, lane: usize, turns: &mut [i64]) {

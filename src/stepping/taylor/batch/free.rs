@@ -115,6 +115,11 @@ impl<const N: usize> Team for FreeTeam<N> {
         finish::<W, N>(self, order, taken);
     }
 
+    fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
+        let start = [self.before[body].0[lane], self.powers[0].v[body].0[lane]];
+        [start, [self.high[0][body].0[lane], self.high[1][body].0[lane]]]
+    }
+
     fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
         for i in 0..N {
             turns[i] += angle::wrap(&mut self.high[0][i].0[lane], &mut self.low[0][i].0[lane]);

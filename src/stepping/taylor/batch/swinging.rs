@@ -45,6 +45,8 @@ pub(super) struct SwingingTeam {
     /// The driven angle at the start of the step, in two terms, and the free one.
     turned: [Octet; 2],
     before: Octet,
+    /// What angle and rate of the driven body grow by in the step.
+    moved: [Octet; 2],
     given: [Given; DRIVEN],
     powers: [Power; MOST + 1],
 }
@@ -150,6 +152,7 @@ impl Team for SwingingTeam {
             low: [ZERO; 3],
             turned: [ZERO; 2],
             before: ZERO,
+            moved: [ZERO; 2],
             given: [Given { w: ZERO, c: ZERO, s: ZERO, bx: ZERO, by: ZERO }; DRIVEN],
             powers: [Power { c: ZERO, s: ZERO, v: ZERO, q: ZERO, power: ZERO }; MOST + 1],
         }
@@ -236,6 +239,7 @@ impl Team for SwingingTeam {
         // Even and odd powers apart: unit vectors and rates of both, means of the free one's rate and of the power.
         let (mut c, mut s, mut first_c, mut first_s) = ([zero; 2], [zero; 2], [zero; 2], [zero; 2]);
         let (mut rate, mut faster, mut angle, mut swept) = ([zero; 2], [zero; 2], [zero; 2], [zero; 2]);
+        let mut farther = [zero; 2];
         macro_rules! add {
             ($parity:literal, $k:expr) => {
                 let (power, given) = (&self.powers[$k], &self.given[$k]);
@@ -245,7 +249,9 @@ impl Team for SwingingTeam {
                 first_c[$parity] = first_c[$parity].mul_add(square, load(&given.c));
                 first_s[$parity] = first_s[$parity].mul_add(square, load(&given.s));
                 rate[$parity] = rate[$parity].mul_add(square, v);
-                faster[$parity] = faster[$parity].mul_add(square, load(&given.w));
+                let w = load::<W>(&given.w);
+                faster[$parity] = faster[$parity].mul_add(square, w);
+                farther[$parity] = farther[$parity].mul_add(square, over(w, $k + 1));
                 angle[$parity] = angle[$parity].mul_add(square, over(v, $k + 1));
                 let before = load::<W>(&self.powers[$k - 1].power);
                 swept[$parity] = swept[$parity].mul_add(square, over(before, $k));
@@ -268,6 +274,7 @@ impl Team for SwingingTeam {
         let (start, given) = (&self.powers[0], &self.given[0]);
         let (c, s, v) = (load::<W>(&start.c), load::<W>(&start.s), load::<W>(&start.v));
         let (first_c, first_s, w) = (load::<W>(&given.c), load::<W>(&given.s), load::<W>(&given.w));
+        self.moved = [store(h.mul(w.add(moved(farther, h)))), store(faster)];
         let w_new = w.add(faster);
         let (c_new, s_new) = (c.add(c_moved), s.add(s_moved));
         let turned = c_moved
@@ -284,6 +291,15 @@ impl Team for SwingingTeam {
         (self.high[0], self.low[0]) = added([&self.high[0], &self.low[0]], angle, drifted);
         (self.high[1], self.low[1]) = added([&self.high[1], &self.low[1]], rate, zero);
         (self.high[2], self.low[2]) = added([&self.high[2], &self.low[2]], work, zero);
+    }
+
+    fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
+        if body == self.driven[lane] {
+            let start = [self.turned[0].0[lane], self.given[0].w.0[lane]];
+            return [start, [start[0] + self.moved[0].0[lane], start[1] + self.moved[1].0[lane]]];
+        }
+        let start = [self.before.0[lane], self.powers[0].v.0[lane]];
+        [start, [self.high[0].0[lane], self.high[1].0[lane]]]
     }
 
     fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
