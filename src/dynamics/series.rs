@@ -47,7 +47,7 @@ mod work_integral;
 use self::action::ActionSeries;
 use self::bodywise::Bodywise;
 pub use self::coefficient::{Coefficient, Constants, SeriesNumber, Terms};
-pub use self::drive::{add as add_rates, powers};
+pub use self::drive::powers;
 use self::factors::{Factors, Scale};
 use self::friction::FrictionSeries;
 use self::polynomial::{Fractions, zeros};

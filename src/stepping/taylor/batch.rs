@@ -1,4 +1,5 @@
-//! Many trajectories at once, one a lane: ensembles of up to four free bodies, or of two of which one is driven.
+//! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs
+//! or without, or of two of which one is driven.
 //!
 //! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
@@ -6,7 +7,9 @@
 
 mod driven;
 mod free;
+mod laws;
 mod series;
+mod springs;
 mod swinging;
 
 use self::driven::DrivenTeam;
@@ -25,6 +28,8 @@ use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 const MOST: usize = 24;
 /// Largest number of bodies.
 const BODIES: usize = 4;
+/// Largest number of springs.
+const SPRINGS: usize = 8;
 
 /// One trajectory: its mechanism, its state in the form of
 /// [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
@@ -80,7 +85,7 @@ impl Passage<'_> {
     }
 }
 
-/// Integrates many trajectories of free mechanisms, or of such with a motor.
+/// Integrates many trajectories of free mechanisms, and of such with springs or with a motor.
 ///
 /// Source of the method: see [`Taylor`](super::Taylor), whose tolerance and orders these are.
 #[derive(Clone, Debug)]
@@ -107,13 +112,14 @@ impl Batch {
         Self { is_portable: kernel != Kernel::Fastest, ..self }
     }
 
-    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
-    /// neither springs nor motors nor walls; or two, one of them driven from the ground by a law that is no
-    /// formula.
+    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes, beside
+    /// gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or two bodies
+    /// without springs, one of them driven from the ground by a law that is no formula.
     pub fn takes(mechanism: &Mechanism) -> bool {
-        (1..=BODIES).contains(&mechanism.tree.coordinates) && FreeTeam::<0>::fits_any(mechanism)
-            || DrivenTeam::fits(mechanism)
-            || SwingingTeam::fits(mechanism)
+        let springs = mechanism.springs.len();
+        (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS && free::fits(mechanism)
+            || DrivenTeam::fits(mechanism, springs)
+            || SwingingTeam::fits(mechanism, springs)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
@@ -127,40 +133,47 @@ impl Batch {
         until: Time,
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
-        self.integrate_those::<FreeTeam<1>>(members, until, watch);
-        self.integrate_those::<FreeTeam<2>>(members, until, watch);
-        self.integrate_those::<FreeTeam<3>>(members, until, watch);
-        self.integrate_those::<FreeTeam<4>>(members, until, watch);
-        self.integrate_those::<DrivenTeam>(members, until, watch);
-        self.integrate_those::<SwingingTeam>(members, until, watch);
+        self.integrate_those::<FreeTeam<1, false>>(0, members, until, watch);
+        self.integrate_those::<FreeTeam<2, false>>(0, members, until, watch);
+        self.integrate_those::<FreeTeam<3, false>>(0, members, until, watch);
+        self.integrate_those::<FreeTeam<4, false>>(0, members, until, watch);
+        for springs in 1..=SPRINGS {
+            self.integrate_those::<FreeTeam<1, true>>(springs, members, until, watch);
+            self.integrate_those::<FreeTeam<2, true>>(springs, members, until, watch);
+            self.integrate_those::<FreeTeam<3, true>>(springs, members, until, watch);
+            self.integrate_those::<FreeTeam<4, true>>(springs, members, until, watch);
+        }
+        self.integrate_those::<DrivenTeam>(0, members, until, watch);
+        self.integrate_those::<SwingingTeam>(0, members, until, watch);
         for member in members.iter_mut().filter(|member| !Self::takes(member.mechanism)) {
-            let what = "lanes take free bodies, or two of which one is driven".into();
+            let what = "lanes take free bodies, with springs, or two of which one is driven".into();
             member.stopped =
                 Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
         }
     }
 
-    /// Integrates those of one kind.
+    /// Integrates those of one kind with so many springs.
     fn integrate_those<T: Team>(
         &self,
+        springs: usize,
         members: &mut [BatchMember],
         until: Time,
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
-        if members.iter().any(|member| T::fits(member.mechanism)) {
+        if members.iter().any(|member| T::fits(member.mechanism, springs)) {
             let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
-            vectors.run(Integration::<T>::new(self, members, until, watch));
+            vectors.run(Integration::<T>::new(self, springs, members, until, watch));
         }
     }
 }
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
 trait Team {
-    /// Empty lanes.
-    fn new() -> Self;
+    /// Empty lanes for mechanisms with so many springs.
+    fn new(springs: usize) -> Self;
 
-    /// True for a mechanism of this kind.
-    fn fits(mechanism: &Mechanism) -> bool;
+    /// True for a mechanism of this kind with so many springs.
+    fn fits(mechanism: &Mechanism, springs: usize) -> bool;
 
     /// Puts a trajectory into a lane; returns the longest step of an order in which the terms left out still
     /// fall \[s\].
@@ -170,7 +183,7 @@ trait Team {
     fn park(&mut self, lane: usize);
 
     /// Begins a step, from what the lanes are doing.
-    fn begin(&mut self, slots: &[LaneSlot; LANES]);
+    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]);
 
     /// Expands all lanes to an order.
     fn expand<W: EightLanes>(&mut self, order: usize);
@@ -198,6 +211,7 @@ trait Team {
 
 struct Integration<'a, 'b, T> {
     crew: Crew<T>,
+    springs: usize,
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
@@ -207,11 +221,12 @@ struct Integration<'a, 'b, T> {
 impl<'a, 'b, T: Team> Integration<'a, 'b, T> {
     fn new(
         batch: &'a Batch,
+        springs: usize,
         members: &'a mut [BatchMember<'b>],
         until: Time,
         watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
     ) -> Self {
-        Self { crew: Crew::new(batch.order, until), batch, members, until, watch }
+        Self { crew: Crew::new(batch.order, springs, until), springs, batch, members, until, watch }
     }
 }
 
@@ -222,10 +237,11 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
     fn run<W: EightLanes>(mut self) {
         let (order, mut waiting) = (self.batch.order, 0);
         loop {
-            self.crew.fill(self.batch, self.members, &mut waiting, self.until);
+            self.crew.fill(self.batch, self.springs, self.members, &mut waiting, self.until);
             if self.crew.is_idle() {
                 return;
             }
+            self.crew.team.begin::<W>(&self.crew.slots);
             self.crew.team.expand::<W>(order);
             let taken = self.crew.choose_steps(order);
             self.crew.team.finish::<W>(order, &taken);
@@ -274,7 +290,7 @@ struct Crew<T> {
 
 impl<T: Team> Crew<T> {
     /// Empty lanes.
-    fn new(order: usize, until: Time) -> Self {
+    fn new(order: usize, springs: usize, until: Time) -> Self {
         let empty = || LaneSlot {
             member: None,
             step_size: StepSize::new(1.0, order, 0.0),
@@ -284,14 +300,21 @@ impl<T: Team> Crew<T> {
             wanted: 0.0,
             taken: 0.0,
         };
-        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(T::new()) }
+        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(T::new(springs)) }
     }
 
     /// Puts trajectories that wait into the free lanes.
-    fn fill(&mut self, batch: &Batch, members: &[BatchMember], waiting: &mut usize, until: Time) {
+    fn fill(
+        &mut self,
+        batch: &Batch,
+        springs: usize,
+        members: &[BatchMember],
+        waiting: &mut usize,
+        until: Time,
+    ) {
         for lane in 0..LANES {
             if self.slots[lane].member.is_none() {
-                let next = next::<T>(members, waiting, until);
+                let next = next::<T>(springs, members, waiting, until);
                 self.slots[lane].member = next;
                 match next {
                     Some(index) => self.take_in(lane, batch, &members[index]),
@@ -301,7 +324,6 @@ impl<T: Team> Crew<T> {
             let slot = &mut self.slots[lane];
             slot.left = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
         }
-        self.team.begin(&self.slots);
     }
 
     /// Puts a trajectory into a lane.
@@ -318,12 +340,15 @@ impl<T: Team> Crew<T> {
     }
 
     /// The steps \[s\] that the series just expanded allow.
+    #[inline(always)]
     fn choose_steps(&mut self, order: usize) -> Octet {
         let mut taken = Octet::splat(0.0);
         for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
-            let sizes = self.team.sizes(lane, order);
-            slot.wanted = sizes.map_or(f64::NAN, |sizes| slot.step_size.step_of(order, &sizes));
-            slot.taken = if sizes.is_some() { step_size::taken(slot.wanted, slot.left) } else { 0.0 };
+            (slot.wanted, slot.taken) = (f64::NAN, 0.0);
+            if let Some(sizes) = self.team.sizes(lane, order) {
+                slot.wanted = slot.step_size.step_of(order, &sizes);
+                slot.taken = step_size::taken(slot.wanted, slot.left);
+            }
             *taken = slot.taken;
         }
         taken
@@ -402,11 +427,11 @@ fn unit<W: EightLanes>(high: &Octet, low: &Octet) -> [Octet; 2] {
 }
 
 /// The next trajectory of this kind that has a way to go.
-fn next<T: Team>(members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
+fn next<T: Team>(springs: usize, members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
     while *waiting < members.len() {
         let (index, member) = (*waiting, &members[*waiting]);
         *waiting += 1;
-        if member.state.time < until && T::fits(member.mechanism) {
+        if member.state.time < until && T::fits(member.mechanism, springs) {
             return Some(index);
         }
     }

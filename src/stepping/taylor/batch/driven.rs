@@ -7,10 +7,13 @@
 
 use super::super::driven::Driven;
 use super::super::terms::over;
+use super::super::wide::Wide;
+use super::laws::{Laws, half, put, reduced};
 use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store, unit};
+use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::EightLanes;
-use crate::arithmetic::{DoubleDouble, Scalar, angle};
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
 
@@ -20,13 +23,12 @@ const FINE: usize = 12;
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
 pub(super) struct DrivenTeam {
-    law: [Law; LANES],
+    laws: Laws,
     /// The body that is driven.
     driven: [usize; LANES],
     /// What an error of the unit vectors comes to in the work: a part, and a part times the free body's rate.
     share: [[f64; 2]; LANES],
-    /// w \[rad/s\], A \[kg·m²\], W of the driven body \[N·m\].
-    rate: Octet,
+    /// A \[kg·m²\], W of the driven body \[N·m\].
     coupling: Octet,
     weight: [Octet; 2],
     /// (W × , - A w²) over d as a product with (cos e, sin e, Im u) \[1/s²\], in two terms.
@@ -85,7 +87,7 @@ impl DrivenTeam {
         };
         let pull = y.mul_add(load(&high[2]), s.mul_add(load(&high[1]), c.mul_add(load(&high[0]), rest)));
         let v0 = load::<W>(&start.v);
-        let slower = v0.sub(load(&self.rate));
+        let slower = v0.sub(load(&self.laws.rate));
         let (mut c_sum, mut s_sum) = (v0.mul_add(c, e[0]), v0.mul_add(s, e[1]));
         let (mut x_sum, mut y_sum) = (slower.mul_add(x, u[0]), slower.mul_add(y, u[1]));
         if k > 0 {
@@ -103,14 +105,25 @@ impl DrivenTeam {
     }
 }
 
+impl DrivenTeam {
+    /// The free body's angle from the driven one's, in the lanes from `F` on.
+    #[inline(always)]
+    fn compare<L: Lanes, const F: usize>(&mut self) {
+        let phi = Wide { hi: half::<L, F>(&self.high[0]), lo: half::<L, F>(&self.low[0]) };
+        let turned = Wide { hi: half::<L, F>(&self.laws.angle[0]), lo: half::<L, F>(&self.laws.angle[1]) };
+        let between = reduced(phi.add(turned.minus()));
+        put::<L, F>(&mut self.between[0], between.hi);
+        put::<L, F>(&mut self.between[1], between.lo);
+    }
+}
+
 impl Team for DrivenTeam {
-    fn new() -> Self {
+    fn new(_: usize) -> Self {
         let zero = Octet::splat(0.0);
         Self {
-            law: std::array::from_fn(|_| Law::default()),
+            laws: Laws::new(),
             driven: [0; LANES],
             share: [[0.0; 2]; LANES],
-            rate: zero,
             coupling: zero,
             weight: [zero; 2],
             load: [[zero; 3]; 2],
@@ -123,14 +136,13 @@ impl Team for DrivenTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism) -> bool {
+    fn fits(mechanism: &Mechanism, _: usize) -> bool {
         Driven::of(mechanism).is_some() && mechanism.contacts.is_empty()
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         let Some(driven) = Driven::new(member.mechanism) else { return 0.0 };
         (self.driven[lane], self.share[lane]) = (driven.body, driven.share);
-        self.rate.0[lane] = driven.law.rate;
         self.coupling.0[lane] = driven.coupling;
         (self.weight[0].0[lane], self.weight[1].0[lane]) = (driven.weight.re, driven.weight.im);
         for (terms, load) in self.load.iter_mut().zip(driven.loads()) {
@@ -142,28 +154,22 @@ impl Team for DrivenTeam {
             self.high[i].0[lane] = member.state.y[i];
             self.low[i].0[lane] = member.state.low[i];
         }
-        let longest = driven.longest(order);
-        self.law[lane] = driven.law;
-        longest
+        self.laws.take_in(lane, &driven.law);
+        driven.longest(order)
     }
 
     /// At rest, without a motor.
     fn park(&mut self, lane: usize) {
-        let numbers = self.high.iter_mut().chain(&mut self.low).chain([&mut self.rate]);
-        numbers.for_each(|number| number.0[lane] = 0.0);
-        self.law[lane] = Law::default();
+        self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
+        self.laws.take_in(lane, &Law::default());
     }
 
-    fn begin(&mut self, slots: &[LaneSlot; LANES]) {
-        self.before[0] = self.high[0];
-        for (lane, slot) in slots.iter().enumerate() {
-            let law = &self.law[lane];
-            let turned = DoubleDouble::of(law.start) + slot.time.scale(law.rate);
-            let phi = DoubleDouble::sum(self.high[0].0[lane], self.low[0].0[lane]);
-            let between = (phi - turned).reduced().0;
-            (self.between[0].0[lane], self.between[1].0[lane]) = (between.hi, between.lo);
-            self.before[1].0[lane] = turned.reduced().0.hi;
-        }
+    #[inline(always)]
+    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
+        self.laws.begin::<W>(slots);
+        self.before = [self.high[0], self.laws.angle[0]];
+        self.compare::<W::Half, 0>();
+        self.compare::<W::Half, 4>();
     }
 
     #[inline(always)]
@@ -234,7 +240,7 @@ impl Team for DrivenTeam {
         let start = &self.powers[0];
         let (c, s, x, y) =
             (load::<W>(&start.c), load::<W>(&start.s), load::<W>(&start.x), load::<W>(&start.y));
-        let (w, v) = (load::<W>(&self.rate), load::<W>(&start.v));
+        let (w, v) = (load::<W>(&self.laws.rate), load::<W>(&start.v));
         let (angle, swept) = (h.mul(v.add(angle)), h.mul(y.add(swept)));
         // What the driven body has turned: e_1 = e conj(u).
         let (c_new, s_new) = (c.add(c_moved), s.add(s_moved));
@@ -254,7 +260,7 @@ impl Team for DrivenTeam {
 
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
         if body == self.driven[lane] {
-            let (start, rate) = (self.before[1].0[lane], self.rate.0[lane]);
+            let (start, rate) = (self.before[1].0[lane], self.laws.rate.0[lane]);
             return [[start, rate], [start + self.swept.0[lane], rate]];
         }
         let start = [self.before[0].0[lane], self.powers[0].v.0[lane]];
@@ -275,7 +281,7 @@ impl Team for DrivenTeam {
 
     fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
         if body == self.driven[lane] {
-            let rate = self.rate.0[lane];
+            let rate = self.laws.rate.0[lane];
             return (self.before[1].0[lane] + rate * after, rate);
         }
         let (mut angle, mut rate) = (0.0, 0.0);

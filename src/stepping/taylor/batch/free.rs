@@ -1,6 +1,8 @@
-//! Up to four free bodies: the equation of `bodies` with the lanes over trajectories instead of bodies.
+//! Up to four free bodies, with springs or without: the equation of `bodies` with the lanes over trajectories
+//! instead of bodies.
 
 use super::series::{expand, finish};
+use super::springs::Springs;
 use super::{BatchMember, JUDGES, LaneSlot, MOST, Team};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
@@ -9,7 +11,7 @@ use crate::dynamics::{Mechanism, State};
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
-pub(super) struct FreeTeam<const N: usize> {
+pub(super) struct FreeTeam<const N: usize, const SPRUNG: bool> {
     /// A \[kg·m²\], zero on the diagonal.
     pub coupling: [[Octet; N]; N],
     pub diagonal: [Octet; N],
@@ -23,6 +25,7 @@ pub(super) struct FreeTeam<const N: usize> {
     /// Angles at the start of the step.
     before: [Octet; N],
     pub powers: [Power<N>; MOST + 1],
+    pub springs: Springs<N>,
 }
 
 /// Coefficients of one power: cos, sin, v, and the two components of P.
@@ -35,18 +38,19 @@ pub(super) struct Power<const N: usize> {
     pub py: [Octet; N],
 }
 
-impl<const N: usize> FreeTeam<N> {
-    /// True for free bodies, however many.
-    pub fn fits_any(mechanism: &Mechanism) -> bool {
-        !mechanism.tree.off_axis
-            && mechanism.is_plain()
-            && mechanism.constraints.is_empty()
-            && mechanism.contacts.is_empty()
-    }
+/// True for bodies that nothing but gravity and springs acts on, however many.
+pub(super) fn fits(mechanism: &Mechanism) -> bool {
+    !mechanism.tree.off_axis
+        && mechanism.coordinates() == mechanism.bodies.len()
+        && mechanism.torsions.is_empty()
+        && mechanism.actions.is_empty()
+        && mechanism.forces.is_empty()
+        && mechanism.constraints.is_empty()
+        && mechanism.contacts.is_empty()
 }
 
-impl<const N: usize> Team for FreeTeam<N> {
-    fn new() -> Self {
+impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
+    fn new(springs: usize) -> Self {
         let zero = [Octet::splat(0.0); N];
         let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
         Self {
@@ -58,11 +62,15 @@ impl<const N: usize> Team for FreeTeam<N> {
             low: [zero; 2],
             before: zero,
             powers: [power; MOST + 1],
+            springs: Springs::new(springs),
         }
     }
 
-    fn fits(mechanism: &Mechanism) -> bool {
-        mechanism.tree.coordinates == N && Self::fits_any(mechanism)
+    fn fits(mechanism: &Mechanism, springs: usize) -> bool {
+        mechanism.tree.coordinates == N
+            && SPRUNG != mechanism.springs.is_empty()
+            && mechanism.springs.len() == springs
+            && fits(mechanism)
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
@@ -80,7 +88,10 @@ impl<const N: usize> Team for FreeTeam<N> {
                 self.low[part][i].0[lane] = member.state.low[part * N + i];
             }
         }
-        order as f64 / 3.0 / tree.fastest_rate(&[])
+        if SPRUNG {
+            self.springs.take_in(lane, member.mechanism, &member.state);
+        }
+        order as f64 / 3.0 / tree.fastest_rate(&member.mechanism.springs)
     }
 
     /// Bodies hanging at rest.
@@ -90,15 +101,17 @@ impl<const N: usize> Team for FreeTeam<N> {
                 numbers.0[lane] = 0.0;
             }
         }
+        self.springs.park(lane);
     }
 
-    fn begin(&mut self, _: &[LaneSlot; LANES]) {
+    #[inline(always)]
+    fn begin<W: EightLanes>(&mut self, _: &[LaneSlot; LANES]) {
         self.before = self.high[0];
     }
 
     #[inline(always)]
     fn expand<W: EightLanes>(&mut self, order: usize) {
-        expand::<W, N>(self, order);
+        expand::<W, N, SPRUNG>(self, order);
     }
 
     fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]> {
@@ -107,12 +120,15 @@ impl<const N: usize> Team for FreeTeam<N> {
         for (back, size) in sizes.iter_mut().enumerate() {
             *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
         }
+        if SPRUNG {
+            self.springs.judge(lane, order, &mut sizes);
+        }
         (0..N).all(|i| coefficient(order, i).is_finite()).then_some(sizes)
     }
 
     #[inline(always)]
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet) {
-        finish::<W, N>(self, order, taken);
+        finish::<W, N, SPRUNG>(self, order, taken);
     }
 
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
@@ -132,6 +148,9 @@ impl<const N: usize> Team for FreeTeam<N> {
                 state.y[part * N + i] = self.high[part][i].0[lane];
                 state.low[part * N + i] = self.low[part][i].0[lane];
             }
+        }
+        if SPRUNG {
+            self.springs.leave(lane, state);
         }
     }
 

@@ -8,24 +8,36 @@ use crate::arithmetic::lanes::wide::EightLanes;
 
 /// Expands all lanes to an order.
 #[inline(always)]
-pub(super) fn expand<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, order: usize) {
+pub(super) fn expand<W: EightLanes, const N: usize, const SPRUNG: bool>(
+    team: &mut FreeTeam<N, SPRUNG>,
+    order: usize,
+) {
     let mut f = [[W::ZERO; N]; 2];
+    if SPRUNG {
+        team.springs.begin::<W>([&team.high[0], &team.low[0]], &mut team.powers[0]);
+    }
     for i in 0..N {
-        let [c, s] = unit::<W>(&team.high[0][i], &team.low[0][i]);
         let power = &mut team.powers[0];
-        (power.c[i], power.s[i], power.v[i]) = (c, s, team.high[1][i]);
-        let v = load::<W>(&team.high[1][i]);
+        if !SPRUNG {
+            [power.c[i], power.s[i]] = unit::<W>(&team.high[0][i], &team.low[0][i]);
+        }
+        power.v[i] = team.high[1][i];
+        let (c, s, v) = (power.c[i], power.s[i], load::<W>(&team.high[1][i]));
         (f[0][i], f[1][i]) = (v.mul(load(&c)), v.mul(load(&s)));
     }
-    invert::<W, N>(team);
+    invert::<W, N, SPRUNG>(team);
     for k in 0..order {
-        raise::<W, N>(team, &mut f, k);
+        raise(team, &mut f, k);
     }
 }
 
 /// Order k: from e_k, v_k and f_k = v e to those of the next one.
 #[inline(always)]
-pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, f: &mut [[W; N]; 2], k: usize) {
+pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
+    team: &mut FreeTeam<N, SPRUNG>,
+    f: &mut [[W; N]; 2],
+    k: usize,
+) {
     let zero = W::ZERO;
     let order = W::splat((k + 1) as f64);
     let (mut gx, mut gy, mut torque) = ([zero; N], [zero; N], [zero; N]);
@@ -33,6 +45,10 @@ pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, f: &m
         let s = over(f[0][i], k + 1);
         let c = zero.sub(over(f[1][i], k + 1));
         (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (store(c), store(s));
+    }
+    let mut pull = [[zero; N]; 2];
+    if SPRUNG {
+        pull = team.springs.pull::<W>(k, &team.powers[k + 1]);
     }
     // Eight sums at a time keep the multipliers busy, those of one body in two vectors or of two bodies in one;
     // the newest coefficients come last.
@@ -72,8 +88,12 @@ pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, f: &m
             (mass_terms::<W, N>(&team.coupling[i], &gx, i), mass_terms::<W, N>(&team.coupling[i], &gy, i));
         let inner = load::<W>(&team.powers[0].c[i]).mul_add(ax, load::<W>(&team.powers[0].s[i]).mul(ay));
         torque[i] = order.neg_mul_add(inner, torque[i]);
+        if SPRUNG {
+            let (c, s) = (load::<W>(&team.powers[0].c[i]), load::<W>(&team.powers[0].s[i]));
+            torque[i] = c.neg_mul_add(pull[0][i], s.neg_mul_add(pull[1][i], torque[i]));
+        }
     }
-    let mut x = solve::<W, N>(team, &torque);
+    let mut x = solve(team, &torque);
     if k < 2 {
         // x is rounded, not merely computed: one step of the residual.
         let mut residual = torque;
@@ -92,7 +112,7 @@ pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, f: &m
                 }
             }
         }
-        let correction = solve::<W, N>(team, &residual);
+        let correction = solve(team, &residual);
         for i in 0..N {
             x[i] = x[i].add(correction[i]);
         }
@@ -110,7 +130,11 @@ pub(super) fn raise<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, f: &m
             mass_terms::<W, N>(&team.coupling[i], &f[0], i),
             mass_terms::<W, N>(&team.coupling[i], &f[1], i),
         );
-        (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (store(ax.mul(order)), store(ay.mul(order)));
+        let (mut px, mut py) = (ax.mul(order), ay.mul(order));
+        if SPRUNG {
+            (px, py) = (px.add(pull[0][i]), py.add(pull[1][i]));
+        }
+        (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (store(px), store(py));
     }
 }
 
@@ -128,7 +152,10 @@ pub(super) fn mass_terms<W: EightLanes, const N: usize>(row: &[Octet; N], x: &[W
 
 /// M_0⁻¹ x.
 #[inline(always)]
-pub(super) fn solve<W: EightLanes, const N: usize>(team: &FreeTeam<N>, x: &[W; N]) -> [W; N] {
+pub(super) fn solve<W: EightLanes, const N: usize, const SPRUNG: bool>(
+    team: &FreeTeam<N, SPRUNG>,
+    x: &[W; N],
+) -> [W; N] {
     let mut solution = [W::ZERO; N];
     for i in 0..N {
         let mut sum = load::<W>(&team.inverse[i][0]).mul(x[0]);
@@ -142,7 +169,7 @@ pub(super) fn solve<W: EightLanes, const N: usize>(team: &FreeTeam<N>, x: &[W; N
 
 /// M_0⁻¹ by elimination without interchanges, M_0 being positive definite.
 #[inline(always)]
-pub(super) fn invert<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>) {
+pub(super) fn invert<W: EightLanes, const N: usize, const SPRUNG: bool>(team: &mut FreeTeam<N, SPRUNG>) {
     let (zero, one) = (W::ZERO, W::ONE);
     let mut mass = [[zero; N]; N];
     for i in 0..N {
@@ -184,17 +211,35 @@ pub(super) fn invert<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>) {
 
 /// Every lane's state at the end of its step.
 #[inline(always)]
-pub(super) fn finish<W: EightLanes, const N: usize>(team: &mut FreeTeam<N>, order: usize, taken: &Octet) {
+pub(super) fn finish<W: EightLanes, const N: usize, const SPRUNG: bool>(
+    team: &mut FreeTeam<N, SPRUNG>,
+    order: usize,
+    taken: &Octet,
+) {
     let h = load::<W>(taken);
     let square = h.mul(h);
+    if SPRUNG {
+        team.springs.finish(order, h);
+    }
     for i in 0..N {
         let (mut angles, mut rates) = ([W::ZERO; 2], [W::ZERO; 2]);
+        // Even and odd powers apart, in registers.
+        macro_rules! add {
+            ($parity:literal, $k:expr) => {
+                let v = load::<W>(&team.powers[$k].v[i]);
+                angles[$parity] = angles[$parity].mul_add(square, over(v, $k + 1));
+                rates[$parity] = rates[$parity].mul_add(square, v);
+            };
+        }
         let mut k = order;
-        while k > 0 {
-            let v = load::<W>(&team.powers[k].v[i]);
-            angles[k % 2] = angles[k % 2].mul_add(square, over(v, k + 1));
-            rates[k % 2] = rates[k % 2].mul_add(square, v);
+        if k % 2 == 1 {
+            add!(1, k);
             k -= 1;
+        }
+        while k > 0 {
+            add!(0, k);
+            add!(1, k - 1);
+            k -= 2;
         }
         let angle = angles[0].mul_add(h, angles[1]).mul_add(h, load::<W>(&team.powers[0].v[i])).mul(h);
         let rate = rates[0].mul_add(h, rates[1]).mul(h);

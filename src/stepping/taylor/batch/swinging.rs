@@ -13,22 +13,20 @@
 
 use super::super::driven::Driven;
 use super::super::terms::over;
+use super::laws::{Laws, RATES};
 use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::{DoubleDouble, angle};
-use crate::dynamics::series::add_rates;
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
 
-/// Powers of the driven body's unit vector.
-const DRIVEN: usize = MOST + 2;
 const ZERO: Octet = Octet([0.0; LANES]);
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
 pub(super) struct SwingingTeam {
-    law: [Law; LANES],
+    laws: Laws,
     /// The body that is driven.
     driven: [usize; LANES],
     /// What an error of the unit vectors comes to in the work: a part, and a part times the free body's rate.
@@ -42,19 +40,17 @@ pub(super) struct SwingingTeam {
     /// Leading parts of angle, rate and work, and what they leave out.
     high: [Octet; 3],
     low: [Octet; 3],
-    /// The driven angle at the start of the step, in two terms, and the free one.
-    turned: [Octet; 2],
+    /// The free body's angle at the start of the step.
     before: Octet,
     /// What angle and rate of the driven body grow by in the step.
     moved: [Octet; 2],
-    given: [Given; DRIVEN],
+    given: [Given; RATES],
     powers: [Power; MOST + 1],
 }
 
-/// One power of the driven body: the rate, the unit vector, and its second derivative.
+/// One power of the driven body: the unit vector, and its second derivative.
 #[derive(Clone, Copy, Debug)]
 struct Given {
-    w: Octet,
     c: Octet,
     s: Octet,
     bx: Octet,
@@ -75,20 +71,20 @@ impl SwingingTeam {
     /// The driven body up to what order `order` of the free one asks for.
     #[inline(always)]
     fn drive<W: EightLanes>(&mut self, order: usize) {
-        [self.given[0].c, self.given[0].s] = unit::<W>(&self.turned[0], &self.turned[1]);
+        [self.given[0].c, self.given[0].s] = unit::<W>(&self.laws.angle[0], &self.laws.angle[1]);
         for k in 0..=order {
             let (mut c, mut s, mut other_c, mut other_s) = (W::ZERO, W::ZERO, W::ZERO, W::ZERO);
             let mut j = 0;
             while j < k {
-                let (w, late) = (load::<W>(&self.given[j].w), &self.given[k - j]);
+                let (w, late) = (load::<W>(&self.laws.rates[j]), &self.given[k - j]);
                 (c, s) = (w.mul_add(load(&late.c), c), w.mul_add(load(&late.s), s));
-                let (w, late) = (load::<W>(&self.given[j + 1].w), &self.given[k - j - 1]);
+                let (w, late) = (load::<W>(&self.laws.rates[j + 1]), &self.given[k - j - 1]);
                 other_c = w.mul_add(load(&late.c), other_c);
                 other_s = w.mul_add(load(&late.s), other_s);
                 j += 2;
             }
             if j == k {
-                let (w, late) = (load::<W>(&self.given[j].w), &self.given[0]);
+                let (w, late) = (load::<W>(&self.laws.rates[j]), &self.given[0]);
                 (c, s) = (w.mul_add(load(&late.c), c), w.mul_add(load(&late.s), s));
             }
             let next_c = over(W::ZERO.sub(s.add(other_s)), k + 1);
@@ -139,9 +135,9 @@ impl SwingingTeam {
 }
 
 impl Team for SwingingTeam {
-    fn new() -> Self {
+    fn new(_: usize) -> Self {
         Self {
-            law: std::array::from_fn(|_| Law::default()),
+            laws: Laws::new(),
             driven: [0; LANES],
             share: [[0.0; 2]; LANES],
             coupling: ZERO,
@@ -150,15 +146,14 @@ impl Team for SwingingTeam {
             load: [[ZERO; 3]; 2],
             high: [ZERO; 3],
             low: [ZERO; 3],
-            turned: [ZERO; 2],
             before: ZERO,
             moved: [ZERO; 2],
-            given: [Given { w: ZERO, c: ZERO, s: ZERO, bx: ZERO, by: ZERO }; DRIVEN],
+            given: [Given { c: ZERO, s: ZERO, bx: ZERO, by: ZERO }; RATES],
             powers: [Power { c: ZERO, s: ZERO, v: ZERO, q: ZERO, power: ZERO }; MOST + 1],
         }
     }
 
-    fn fits(mechanism: &Mechanism) -> bool {
+    fn fits(mechanism: &Mechanism, _: usize) -> bool {
         let fits = |(_, law): (usize, &Law)| law.profile.is_none() && !law.is_steady();
         Driven::pattern(mechanism).is_some_and(fits) && mechanism.contacts.is_empty()
     }
@@ -169,7 +164,8 @@ impl Team for SwingingTeam {
         let (free, [fastest, bend]) = (1 - driven, law.bounds(state.time.hi));
         let (a, d, pull, weight) =
             (tree.coupling[1].re, tree.diagonal[free], tree.weight[free], tree.weight[driven]);
-        (self.driven[lane], self.law[lane]) = (driven, law.clone());
+        self.driven[lane] = driven;
+        self.laws.take_in(lane, law);
         let swing = (fastest * a).abs() / mechanism.energy_scale;
         let share = [swing * fastest + weight.norm_squared().sqrt() / mechanism.energy_scale, swing];
         self.share[lane] = share.map(|share| share / mechanism.units.time);
@@ -189,24 +185,15 @@ impl Team for SwingingTeam {
 
     /// At rest, without a motor.
     fn park(&mut self, lane: usize) {
-        let rates = self.given.iter_mut().map(|given| &mut given.w);
-        let numbers = self.high.iter_mut().chain(&mut self.low).chain(rates);
-        numbers.for_each(|number| number.0[lane] = 0.0);
-        self.law[lane] = Law::default();
+        self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
+        self.laws.take_in(lane, &Law::default());
     }
 
-    fn begin(&mut self, slots: &[LaneSlot; LANES]) {
+    #[inline(always)]
+    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
         self.before = self.high[0];
-        for (lane, slot) in slots.iter().enumerate().filter(|(_, slot)| slot.member.is_some()) {
-            let law = &self.law[lane];
-            let turned = law.winding(slot.time).0.reduced().0;
-            (self.turned[0].0[lane], self.turned[1].0[lane]) = (turned.hi, turned.lo);
-            let mut rates = [0.0; DRIVEN];
-            add_rates(law, 1.0, slot.time, &mut rates, 0, 1);
-            for (given, rate) in self.given.iter_mut().zip(rates) {
-                given.w.0[lane] = rate;
-            }
-        }
+        self.laws.begin::<W>(slots);
+        self.laws.expand::<W>();
     }
 
     #[inline(always)]
@@ -249,7 +236,7 @@ impl Team for SwingingTeam {
                 first_c[$parity] = first_c[$parity].mul_add(square, load(&given.c));
                 first_s[$parity] = first_s[$parity].mul_add(square, load(&given.s));
                 rate[$parity] = rate[$parity].mul_add(square, v);
-                let w = load::<W>(&given.w);
+                let w = load::<W>(&self.laws.rates[$k]);
                 faster[$parity] = faster[$parity].mul_add(square, w);
                 farther[$parity] = farther[$parity].mul_add(square, over(w, $k + 1));
                 angle[$parity] = angle[$parity].mul_add(square, over(v, $k + 1));
@@ -273,7 +260,8 @@ impl Team for SwingingTeam {
         let (angle, swept) = (moved(angle, h), moved(swept, h));
         let (start, given) = (&self.powers[0], &self.given[0]);
         let (c, s, v) = (load::<W>(&start.c), load::<W>(&start.s), load::<W>(&start.v));
-        let (first_c, first_s, w) = (load::<W>(&given.c), load::<W>(&given.s), load::<W>(&given.w));
+        let (first_c, first_s, w) =
+            (load::<W>(&given.c), load::<W>(&given.s), load::<W>(&self.laws.rates[0]));
         self.moved = [store(h.mul(w.add(moved(farther, h)))), store(faster)];
         let w_new = w.add(faster);
         let (c_new, s_new) = (c.add(c_moved), s.add(s_moved));
@@ -295,7 +283,7 @@ impl Team for SwingingTeam {
 
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
         if body == self.driven[lane] {
-            let start = [self.turned[0].0[lane], self.given[0].w.0[lane]];
+            let start = [self.laws.angle[0].0[lane], self.laws.rates[0].0[lane]];
             return [start, [start[0] + self.moved[0].0[lane], start[1] + self.moved[1].0[lane]]];
         }
         let start = [self.before.0[lane], self.powers[0].v.0[lane]];
@@ -316,10 +304,10 @@ impl Team for SwingingTeam {
 
     fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
         let is_driven = body == self.driven[lane];
-        let start = if is_driven { &self.turned[0] } else { &self.before };
+        let start = if is_driven { &self.laws.angle[0] } else { &self.before };
         let (mut angle, mut rate) = (0.0, 0.0);
         for k in (0..=order).rev() {
-            let v = if is_driven { self.given[k].w.0[lane] } else { self.powers[k].v.0[lane] };
+            let v = if is_driven { self.laws.rates[k].0[lane] } else { self.powers[k].v.0[lane] };
             rate = rate * after + v;
             angle = angle * after + v / (k + 1) as f64;
         }

@@ -40,7 +40,7 @@ fn ends(vectors: Vectors) -> Vec<State> {
         true => Going::Enough,
         false => Going::On,
     };
-    vectors.run(Integration::<FreeTeam<2>>::new(&batch, &mut members, until, &mut watch));
+    vectors.run(Integration::<FreeTeam<2, false>>::new(&batch, 0, &mut members, until, &mut watch));
     members.into_iter().map(|member| member.state).collect()
 }
 
