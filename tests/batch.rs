@@ -200,7 +200,7 @@ fn bodies_with_springs_agree_with_double_double_whoever_is_beside_them() {
         let mut text: serde_json::Value =
             serde_json::from_str(&chain_text(bars, 0.1 * i as f64)).expect("JSON");
         let end = |name: &str, x: f64, y: f64| serde_json::json!({"body": name, "point": [x, y]});
-        let (free_length, damping) = ([0.4, 0.0][i / 3 % 2], [0.0, 0.0, 0.3][i % 3]);
+        let (free_length, damping) = ([0.4, 0.0][i / 3 % 2], [0.0, 0.0, 0.3][(i + i / 3) % 3]);
         let mut springs = vec![serde_json::json!({
             "name": "s0", "between": [end("ground", -0.3, 0.2), end("b0", 0.3, 0.02)], "stiffness": 7.0 + i as f64,
             "free_length": free_length, "damping": damping,

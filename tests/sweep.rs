@@ -110,6 +110,7 @@ fn estimates_of_points_are_near_the_truth() {
         ("free", "dp8", 1e-7, 6.0),
         ("gentle", "taylor", 1e-5, 8.0),
         ("motor", "taylor", 1e-8, 6.0),
+        ("spring", "taylor", 1e-8, 6.0),
     ] {
         let request = Request { rtol: Some(tolerance), every: Some(0.5), ..request(method, until) };
         let angle = if scene == "motor" { "motor.rate=4..9:4" } else { "bar1.phi=-2.5..2.5:4" };

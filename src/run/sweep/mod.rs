@@ -167,8 +167,11 @@ impl Sweep {
         }
         let mut plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
         if in_lanes {
-            let bodies =
-                if mechanism.constraints.is_empty() { "free bodies" } else { "bodies with one motor" };
+            let bodies = match (mechanism.springs.is_empty(), mechanism.constraints.is_empty()) {
+                (true, true) => "free bodies",
+                (false, _) => "bodies with springs",
+                (true, false) => "bodies with one motor",
+            };
             plan.why = Some(format!("taylor: {bodies} are integrated several at a time"));
         }
         // What one point gets unasked, all get.
