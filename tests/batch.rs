@@ -144,10 +144,9 @@ fn driven(count: usize) -> Vec<(Arc<Mechanism>, State)> {
         .collect()
 }
 
-/// Integrates these mechanisms for three seconds in both orders and by both kernels, and one by one in
-/// double-double.
-fn agree_with_double_double_whoever_is_beside(all: &[(Arc<Mechanism>, State)], bound: f64) {
-    let until = Time::from(3.0);
+/// Integrates these mechanisms in both orders and by both kernels, and one by one in double-double.
+fn agree_with_double_double_whoever_is_beside(all: &[(Arc<Mechanism>, State)], until: f64, bound: f64) {
+    let until = Time::from(until);
     let members = |reversed: bool| -> Vec<BatchMember> {
         let mut members: Vec<_> = all.iter().map(|(m, state)| BatchMember::new(m, state.clone())).collect();
         if reversed {
@@ -188,7 +187,7 @@ fn agree_with_double_double_whoever_is_beside(all: &[(Arc<Mechanism>, State)], b
 
 #[test]
 fn driven_bodies_agree_with_double_double_whoever_is_beside_them() {
-    agree_with_double_double_whoever_is_beside(&driven(11), 1e-12);
+    agree_with_double_double_whoever_is_beside(&driven(11), 3.0, 1e-12);
 }
 
 /// Chains of one to three bars with one or two springs, from the ground or between bars, with and without
@@ -221,7 +220,8 @@ fn bodies_with_springs_agree_with_double_double_whoever_is_beside_them() {
     };
     let all: Vec<_> = (0..23).map(sprung).collect();
     assert!(all.iter().all(|(mechanism, _)| Batch::takes(mechanism)));
-    agree_with_double_double_whoever_is_beside(&all, 3e-12);
+    // Some of them are chaotic: a second adds two digits.
+    agree_with_double_double_whoever_is_beside(&all, 1.0, 1e-12);
 }
 
 #[test]
