@@ -92,8 +92,8 @@ pub(super) fn can_pass(a: &BodyAngles, b: &BodyAngles, span: f64) -> bool {
     })
 }
 
-/// False only where [`can_pass`] is, of a bar with these angles and rates at both ends of a step, the angle at its
-/// end continued; angles may be off by their rounding.
+/// False only where [`can_pass`] is, of a bar with these angles and rates at both ends of a step, the angle
+/// at its end continued; angles may be off by their rounding.
 pub(super) fn may_pass([[phi, omega], [end, rate]]: [[f64; 2]; 2], span: f64) -> bool {
     let reach = span * (omega.abs().max(rate.abs()) + (rate - omega).abs());
     let is_far_off = phi.abs().max(end.abs()) + reach < PI - 1e-6;

@@ -430,7 +430,8 @@ impl Lane {
     }
 }
 
-/// The largest violation of any constraint so far, at position and velocity level; constraints are given angles.
+/// The largest violation of any constraint so far, at position and velocity level; constraints are given
+/// angles.
 fn violation(mechanism: &Mechanism, motion: &Motion, before: Option<[f64; 2]>) -> Option<[f64; 2]> {
     let mut jacobian = vec![DoubleDouble::ZERO; motion.phi.len()];
     mechanism.constraints.iter().fold(before, |most, row| {

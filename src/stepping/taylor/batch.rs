@@ -78,8 +78,8 @@ impl Passage<'_> {
         (self.series)(body, after)
     }
 
-    /// The same at the start and at the end, as the integration has them: without a sum, and to rounding those
-    /// of [`Passage::at`].
+    /// The same at the start and at the end, as the integration has them: without a sum, and to rounding
+    /// those of [`Passage::at`].
     pub fn ends(&self, body: usize) -> [[f64; 2]; 2] {
         (self.ends)(body)
     }
@@ -112,9 +112,9 @@ impl Batch {
         Self { is_portable: kernel != Kernel::Fastest, ..self }
     }
 
-    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes, beside
-    /// gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or two bodies
-    /// without springs, one of them driven from the ground by a law that is no formula.
+    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
+    /// beside gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or
+    /// two bodies without springs, one of them driven from the ground by a law that is no formula.
     pub fn takes(mechanism: &Mechanism) -> bool {
         let springs = mechanism.springs.len();
         (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS && free::fits(mechanism)
@@ -194,8 +194,8 @@ trait Team {
     /// Every lane's state at the end of its step \[s\].
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
 
-    /// Angle \[rad\], continued from that at the start in [-π, π], and rate \[rad/s\] of a body at both ends of
-    /// the step just finished.
+    /// Angle \[rad\], continued from that at the start in [-π, π], and rate \[rad/s\] of a body at both ends
+    /// of the step just finished.
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2];
 
     /// Brings a lane's angles back into [-π, π], and counts the turns.
@@ -391,8 +391,8 @@ impl<T: Team> Crew<T> {
     }
 }
 
-// Closures and `map` are compiled apart, without the processor's vectors, and arrays that loops go over stay in
-// memory: what follows, and all that uses it, is written out.
+// Closures and `map` are compiled apart, without the processor's vectors, and arrays that loops go over stay
+// in memory: what follows, and all that uses it, is written out.
 
 #[inline(always)]
 fn load<W: EightLanes>(octet: &Octet) -> W {

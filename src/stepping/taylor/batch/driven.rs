@@ -2,7 +2,8 @@
 //! [`driven`](super::super::driven) with the lanes over trajectories.
 //!
 //! ```text
-//! d (k+1) v_{k+1} = e_k × W - A w² Im u_k,    (k+1) e_{k+1} = left(Σ v_j e_{k-j}),    (k+1) u_{k+1} = left(Σ v_j u_{k-j} - w u_k)
+//! d (k+1) v_{k+1} = e_k × W - A w² Im u_k
+//! (k+1) e_{k+1} = left(Σ v_j e_{k-j}),    (k+1) u_{k+1} = left(Σ v_j u_{k-j} - w u_k)
 //! ```
 
 use super::super::driven::Driven;

@@ -50,8 +50,8 @@ pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
     if SPRUNG {
         pull = team.springs.pull::<W>(k, &team.powers[k + 1]);
     }
-    // Eight sums at a time keep the multipliers busy, those of one body in two vectors or of two bodies in one;
-    // the newest coefficients come last.
+    // Eight sums at a time keep the multipliers busy, those of one body in two vectors or of two bodies in
+    // one; the newest coefficients come last.
     let at_once = 2 / W::VECTORS;
     for first in (0..N).step_by(at_once) {
         let count = at_once.min(N - first);
@@ -95,27 +95,7 @@ pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
     }
     let mut x = solve(team, &torque);
     if k < 2 {
-        // x is rounded, not merely computed: one step of the residual.
-        let mut residual = torque;
-        for i in 0..N {
-            residual[i] = load::<W>(&team.diagonal[i]).neg_mul_add(x[i], residual[i]);
-            for j in 0..N {
-                if j != i {
-                    let (ci, si, cj, sj) = (
-                        load::<W>(&team.powers[0].c[i]),
-                        load::<W>(&team.powers[0].s[i]),
-                        load::<W>(&team.powers[0].c[j]),
-                        load::<W>(&team.powers[0].s[j]),
-                    );
-                    let mass = load::<W>(&team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
-                    residual[i] = mass.neg_mul_add(x[j], residual[i]);
-                }
-            }
-        }
-        let correction = solve(team, &residual);
-        for i in 0..N {
-            x[i] = x[i].add(correction[i]);
-        }
+        refine(team, &torque, &mut x);
     }
     for i in 0..N {
         let v = over(x[i], k + 1);
@@ -135,6 +115,35 @@ pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
             (px, py) = (px.add(pull[0][i]), py.add(pull[1][i]));
         }
         (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (store(px), store(py));
+    }
+}
+
+/// One step of the residual, so that x is rounded, not merely computed.
+#[inline(always)]
+fn refine<W: EightLanes, const N: usize, const SPRUNG: bool>(
+    team: &FreeTeam<N, SPRUNG>,
+    torque: &[W; N],
+    x: &mut [W; N],
+) {
+    let mut residual = *torque;
+    for i in 0..N {
+        residual[i] = load::<W>(&team.diagonal[i]).neg_mul_add(x[i], residual[i]);
+        for j in 0..N {
+            if j != i {
+                let (ci, si, cj, sj) = (
+                    load::<W>(&team.powers[0].c[i]),
+                    load::<W>(&team.powers[0].s[i]),
+                    load::<W>(&team.powers[0].c[j]),
+                    load::<W>(&team.powers[0].s[j]),
+                );
+                let mass = load::<W>(&team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+                residual[i] = mass.neg_mul_add(x[j], residual[i]);
+            }
+        }
+    }
+    let correction = solve(team, &residual);
+    for i in 0..N {
+        x[i] = x[i].add(correction[i]);
     }
 }
 

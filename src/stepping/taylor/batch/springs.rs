@@ -1,5 +1,5 @@
-//! Springs and dampers between the bodies in the lanes: the recurrences of [`springs`](super::super::springs) with
-//! the lanes over trajectories.
+//! Springs and dampers between the bodies in the lanes: the recurrences of
+//! [`springs`](super::super::springs) with the lanes over trajectories.
 
 use super::super::terms::over;
 use super::super::wide::Wide;
@@ -243,7 +243,7 @@ impl<const N: usize> Springs<N> {
         let mut k = order;
         while k > 0 {
             let power = over(load::<W>(&self.power[k - 1]), k);
-            if k % 2 == 0 {
+            if k.is_multiple_of(2) {
                 sums[0] = sums[0].mul_add(square, power);
             } else {
                 sums[1] = sums[1].mul_add(square, power);

@@ -1,12 +1,12 @@
 //! Two bodies, one of them driven from the ground by any sum of sines and a parabola.
 //!
-//! With e_1 and w the unit vector and rate of the driven body, which are known, e and v those of the free one, W
-//! its weight and A = A12:
+//! With e_1 and w the unit vector and rate of the driven body, which are known, e and v those of the free
+//! one, W its weight and A = A12:
 //!
 //! ```text
 //! (k+1) e_1,k+1 = left(Σ w_j e_1,k-j),      B = e_1'',      q = B·left(e)
 //! d (k+1) v_{k+1} = e_k × W - A q_k,        (k+1) e_{k+1} = left(Σ v_j e_{k-j})
-//! work = D Δ(w²)/2 + A (Δ(v w e·e_1) - ∫ v q dt) - Δe_1·W_1            D: inertia of the driven body, W_1: its weight
+//! work = D Δ(w²)/2 + A (Δ(v w e·e_1) - ∫ v q dt) - Δe_1·W_1      D, W_1: inertia, weight of the driven one
 //! ```
 //!
 //! The work is what changes the angular momentum of the driven body beside gravity; the energy is not asked.
@@ -223,7 +223,7 @@ impl Team for SwingingTeam {
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet) {
         let h = load::<W>(taken);
         let (square, zero) = (h.mul(h), W::ZERO);
-        // Even and odd powers apart: unit vectors and rates of both, means of the free one's rate and of the power.
+        // Even and odd powers apart: unit vectors and rates of both, means of the rates and of the power.
         let (mut c, mut s, mut first_c, mut first_s) = ([zero; 2], [zero; 2], [zero; 2], [zero; 2]);
         let (mut rate, mut faster, mut angle, mut swept) = ([zero; 2], [zero; 2], [zero; 2], [zero; 2]);
         let mut farther = [zero; 2];
