@@ -116,8 +116,8 @@ fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
     }
 }
 
-/// Several driven mechanisms with their starts, some of them with the motor on the outer bar, every other one at
-/// a constant rate.
+/// Several driven mechanisms with their starts, some of them with the motor on the outer bar, every other one
+/// at a constant rate.
 fn driven(count: usize) -> Vec<(Arc<Mechanism>, State)> {
     (0..count)
         .map(|i| {
@@ -128,7 +128,10 @@ fn driven(count: usize) -> Vec<(Arc<Mechanism>, State)> {
             if i % 2 == 1 {
                 motor["law"]["acceleration"] = (0.2 * i as f64).into();
                 let sines: Vec<_> = (0..i % 3)
-                    .map(|k| serde_json::json!({"amplitude": 0.4 + 0.1 * k as f64, "frequency": 3 + 5 * k, "phase": i}))
+                    .map(|k| {
+                        let amplitude = 0.4 + 0.1 * k as f64;
+                        serde_json::json!({"amplitude": amplitude, "frequency": 3 + 5 * k, "phase": i})
+                    })
                     .collect();
                 motor["law"]["sines"] = sines.into();
             }
@@ -201,8 +204,8 @@ fn bodies_with_springs_agree_with_double_double_whoever_is_beside_them() {
         let end = |name: &str, x: f64, y: f64| serde_json::json!({"body": name, "point": [x, y]});
         let (free_length, damping) = ([0.4, 0.0][i / 3 % 2], [0.0, 0.0, 0.3][(i + i / 3) % 3]);
         let mut springs = vec![serde_json::json!({
-            "name": "s0", "between": [end("ground", -0.3, 0.2), end("b0", 0.3, 0.02)], "stiffness": 7.0 + i as f64,
-            "free_length": free_length, "damping": damping,
+            "name": "s0", "between": [end("ground", -0.3, 0.2), end("b0", 0.3, 0.02)],
+            "stiffness": 7.0 + i as f64, "free_length": free_length, "damping": damping,
         })];
         if i % 4 > 1 {
             let last = format!("b{}", bars - 1);
