@@ -53,7 +53,7 @@ pub trait Arithmetic: Copy + Debug + 'static {
 }
 
 /// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
-pub trait Lanes: Arithmetic {
+pub trait Lanes: Arithmetic + Send {
     /// True where long kernels are worth unrolling; where each operation is a call, a loop is as fast and
     /// compiles in a tenth of the time.
     const UNROLLED: bool;
@@ -79,6 +79,9 @@ pub trait Lanes: Arithmetic {
 
     /// Runs code on these lanes, compiled by itself and not as a part of what calls it.
     fn apart<C: Code>(code: C) -> C::Output;
+
+    /// Performs a task, compiled for these lanes.
+    fn perform<T: wide::Task>(task: T) -> T::Output;
 }
 
 /// Plain code, with a software fused multiply-add where the processor lacks one.
@@ -201,6 +204,10 @@ impl Lanes for Portable {
     #[inline(never)]
     fn apart<C: Code>(code: C) -> C::Output {
         code.run::<Self>()
+    }
+
+    fn perform<T: wide::Task>(task: T) -> T::Output {
+        task.perform()
     }
 }
 

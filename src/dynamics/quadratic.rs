@@ -95,7 +95,7 @@ impl<C: Real> Quadratic<C> {
     }
 
     /// Gradients, element by element; an element may come up more than once.
-    #[inline]
+    #[inline(always)]
     pub fn gradients<T: Over<C>>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, Complex<T>)) {
         for &(k, g) in &self.linear {
             each(k, Complex::of(g));
@@ -107,7 +107,7 @@ impl<C: Real> Quadratic<C> {
     }
 
     /// Parts of dQ/dq, coordinate by coordinate; a coordinate may come up more than once.
-    #[inline]
+    #[inline(always)]
     pub fn slopes<T: Over<C>>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
         self.gradients(z, |k, gradient| {
             if k < self.angles {

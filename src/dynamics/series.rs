@@ -28,6 +28,7 @@ mod action;
 mod aim;
 mod bodywise;
 mod coefficient;
+pub mod columns;
 mod doubles;
 mod drive;
 mod factors;
@@ -37,7 +38,9 @@ mod long;
 mod order;
 mod own;
 pub mod polynomial;
+mod products;
 mod rows;
+mod slots;
 mod spring;
 mod tape;
 mod user;
@@ -81,7 +84,7 @@ pub struct Series<T: SeriesNumber> {
     pub rate: Vec<T>,
     /// Power of motors and dampers (powers 0…P-1) \[W/s^m\].
     pub power: Vec<T>,
-    /// R (P × n) \[N·m/s^m\].
+    /// R (P × n) \[N·m/s^m\]; of numbers whose series are factors the present power alone.
     rest: Vec<Complex<T>>,
     /// s' (powers 0…P) ((P+1) × n).
     drive: Vec<T>,
@@ -107,6 +110,9 @@ pub struct Series<T: SeriesNumber> {
     reduced: Vec<T>,
     pivot: Vec<T>,
     solution: Vec<T>,
+    /// M_0⁻¹ (f × f) and the right side it is multiplied with, for numbers that have it.
+    inverse: Vec<T>,
+    right: Vec<T>,
     /// What stands in place of the matrices where the mechanism is evaluated body by body; they are empty
     /// then.
     bodywise: Option<Box<Bodywise<T>>>,
@@ -131,6 +137,8 @@ impl<T: SeriesNumber> Series<T> {
         let is_bodywise = !T::HAS_CONSTANTS && !partition.driven();
         let bodywise = is_bodywise.then(|| Bodywise::new(mechanism, order)).flatten().map(Box::new);
         let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
+        let mut factors = Factors::new(mechanism.bodies.len(), partition.driven(), order);
+        factors.couple(terms.tree);
         Self {
             order,
             elements: n,
@@ -141,7 +149,7 @@ impl<T: SeriesNumber> Series<T> {
             omega: zeros((order + 1) * n),
             rate: zeros((order + 1) * f),
             power: zeros(order),
-            rest: vec![Complex::ZERO; order * n],
+            rest: vec![Complex::ZERO; if T::HAS_CONSTANTS { n } else { order * n }],
             drive: zeros((order + 1) * n),
             torque: zeros(order * n),
             applied: zeros(order * n),
@@ -160,8 +168,10 @@ impl<T: SeriesNumber> Series<T> {
             reduced: matrix(f * f),
             pivot: matrix(f.max(n)),
             solution: zeros(f),
+            inverse: zeros(if T::HAS_COUPLINGS { f * f } else { 0 }),
+            right: zeros(if T::HAS_COUPLINGS { f } else { 0 }),
             bodywise,
-            factors: Factors::new(mechanism.bodies.len(), partition.driven(), order),
+            factors,
             limbs: Vec::new(),
             partition,
         }
@@ -202,6 +212,7 @@ impl<T: SeriesNumber> Series<T> {
 
     /// Expands the motion of terms through coordinates `u` \[rad\] (leading part and rest) and rates `u_rate`
     /// \[rad/s\] at time `t`.
+    #[inline(always)]
     pub fn expand_terms(
         &mut self,
         terms: &Terms<T::Constant>,
@@ -240,6 +251,7 @@ impl<T: SeriesNumber> Series<T> {
     }
 
     /// Power zero, and the laws' series.
+    #[inline(always)]
     fn begin(&mut self, t: T::Time, u: &[T], u_rest: &[T], u_rate: &[T]) {
         let (n, angles) = (self.elements, self.angles);
         self.rate[..u.len()].copy_from_slice(u_rate);
@@ -325,7 +337,9 @@ impl<T: SeriesNumber> Series<T> {
                 self.balance::<N>(terms, m);
                 self.slide::<N>(terms, m);
             }
-            self.work_integral(terms, m);
+            if T::HAS_WORK {
+                self.work_integral(terms, m);
+            }
         }
     }
 }

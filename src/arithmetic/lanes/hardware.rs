@@ -11,7 +11,7 @@
 
 #![allow(unsafe_code)]
 
-use super::wide::{EightLanes, WideCode};
+use super::wide::{EightLanes, Slots, Task, WideCode};
 use super::{Arithmetic, Code, Lanes};
 use std::arch::x86_64::*;
 
@@ -97,6 +97,20 @@ fn compiled<C: Code>(code: C) -> C::Output {
 #[inline(never)]
 fn compiled_apart<C: Code>(code: C) -> C::Output {
     code.run::<Avx>()
+}
+
+/// A task compiled for AVX and FMA.
+#[target_feature(enable = "avx,fma")]
+#[inline]
+fn performed<T: Task>(task: T) -> T::Output {
+    task.perform()
+}
+
+/// A task compiled for AVX-512.
+#[target_feature(enable = "avx,fma,avx512f")]
+#[inline]
+fn performed_wide<T: Task>(task: T) -> T::Output {
+    task.perform()
 }
 
 /// The instruction itself.
@@ -218,6 +232,11 @@ impl Lanes for Avx {
     fn apart<C: Code>(code: C) -> C::Output {
         instruction!(compiled_apart(code))
     }
+
+    #[inline(always)]
+    fn perform<T: Task>(task: T) -> T::Output {
+        instruction!(performed(task))
+    }
 }
 
 impl Arithmetic for Avx512 {
@@ -260,10 +279,9 @@ impl Arithmetic for Avx512 {
     }
 }
 
-impl EightLanes for Avx512 {
-    type Half = Avx;
-
-    const VECTORS: usize = 1;
+impl Slots for Avx512 {
+    const COUNT: usize = 8;
+    const UNROLLED: bool = true;
 
     #[inline(always)]
     fn of(lanes: &[f64; 8]) -> Self {
@@ -276,6 +294,17 @@ impl EightLanes for Avx512 {
         instruction!(_mm512_storeu_pd(lanes.as_mut_ptr(), self.0));
         lanes
     }
+
+    #[inline(always)]
+    fn perform<T: Task>(task: T) -> T::Output {
+        instruction!(performed_wide(task))
+    }
+}
+
+impl EightLanes for Avx512 {
+    type Half = Avx;
+
+    const VECTORS: usize = 1;
 
     #[inline(always)]
     fn halves(self) -> [Avx; 2] {

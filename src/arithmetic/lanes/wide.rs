@@ -1,22 +1,45 @@
 //! Eight doubles at once, in one vector of AVX-512 or two of four lanes, with the same bits.
 
-use super::{Arithmetic, Hardware, Lanes, Portable, hardware, is_disabled};
+use super::{Arithmetic, Hardware, Lanes, Portable, hardware, is_disabled, sum};
+use std::marker::PhantomData;
 
 #[cfg(target_arch = "x86_64")]
 pub use super::hardware::WideHardware;
 
+/// Up to eight doubles.
+pub trait Slots: Arithmetic + Send {
+    /// How many.
+    const COUNT: usize;
+    /// True where long kernels are worth unrolling.
+    const UNROLLED: bool;
+
+    /// From an array, of which those beyond the last slot are left out.
+    fn of(lanes: &[f64; 8]) -> Self;
+    /// As an array, with zeros beyond the last slot.
+    fn array(self) -> [f64; 8];
+
+    /// Performs a task, compiled for these slots.
+    fn perform<T: Task>(task: T) -> T::Output;
+}
+
+/// Code over slots of a kind that it knows itself; its [`Task::perform`], and every function below it, is
+/// `#[inline(always)]`.
+pub trait Task {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn perform(self) -> Self::Output;
+}
+
 /// Eight doubles.
-pub trait EightLanes: Arithmetic {
+pub trait EightLanes: Slots {
     /// Four of them.
     type Half: Lanes;
 
     /// How many vectors they are in, 1 or 2.
     const VECTORS: usize;
 
-    /// From an array.
-    fn of(lanes: &[f64; 8]) -> Self;
-    /// As an array.
-    fn array(self) -> [f64; 8];
     /// The first four, and the others.
     fn halves(self) -> [Self::Half; 2];
     /// Of these.
@@ -63,10 +86,9 @@ impl<L: Lanes> Arithmetic for [L; 2] {
     }
 }
 
-impl<L: Lanes> EightLanes for [L; 2] {
-    type Half = L;
-
-    const VECTORS: usize = 2;
+impl<L: Lanes> Slots for [L; 2] {
+    const COUNT: usize = 8;
+    const UNROLLED: bool = L::UNROLLED;
 
     #[inline(always)]
     fn of(&[a, b, c, d, e, f, g, h]: &[f64; 8]) -> Self {
@@ -80,6 +102,17 @@ impl<L: Lanes> EightLanes for [L; 2] {
     }
 
     #[inline(always)]
+    fn perform<T: Task>(task: T) -> T::Output {
+        L::perform(task)
+    }
+}
+
+impl<L: Lanes> EightLanes for [L; 2] {
+    type Half = L;
+
+    const VECTORS: usize = 2;
+
+    #[inline(always)]
     fn halves(self) -> [L; 2] {
         self
     }
@@ -87,6 +120,70 @@ impl<L: Lanes> EightLanes for [L; 2] {
     #[inline(always)]
     fn join(halves: [L; 2]) -> Self {
         halves
+    }
+}
+
+/// One double, in code compiled for lanes `L`.
+#[derive(Clone, Copy, Debug)]
+pub struct Single<L>(f64, PhantomData<L>);
+
+impl<L: Lanes> Arithmetic for Single<L> {
+    const ZERO: Self = Self(0.0, PhantomData);
+    const ONE: Self = Self(1.0, PhantomData);
+
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        Self(value, PhantomData)
+    }
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self::splat(self.0 + other.0)
+    }
+
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self::splat(self.0 - other.0)
+    }
+
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self::splat(self.0 * other.0)
+    }
+
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self::splat(self.0 / other.0)
+    }
+
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        Self::splat(sum::fused(self.0, factor.0, addend.0))
+    }
+
+    #[inline(always)]
+    fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
+        Self::splat(sum::fused(-self.0, factor.0, addend.0))
+    }
+}
+
+impl<L: Lanes> Slots for Single<L> {
+    const COUNT: usize = 1;
+    const UNROLLED: bool = L::UNROLLED;
+
+    #[inline(always)]
+    fn of(lanes: &[f64; 8]) -> Self {
+        Self::splat(lanes[0])
+    }
+
+    #[inline(always)]
+    fn array(self) -> [f64; 8] {
+        [self.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+    }
+
+    #[inline(always)]
+    fn perform<T: Task>(task: T) -> T::Output {
+        L::perform(task)
     }
 }
 

@@ -3,14 +3,14 @@
 
 use super::parts;
 use super::{Body, Mechanism, dense_constants};
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
 use crate::dynamics::force::formula::Formulas;
 use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::partition::CoordinatePartition;
-use crate::dynamics::series::{SeriesNumber, Terms};
+use crate::dynamics::series::{Constants, Terms};
 use crate::dynamics::tree::{self, Tree};
 use crate::scene::{Decimal, Scene};
 use std::sync::Arc;
@@ -226,7 +226,7 @@ impl<C: Decimal> ExactMechanism<C> {
     }
 }
 
-impl<T: SeriesNumber<Constant = T> + Decimal> ExactMechanism<T> {
+impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
     /// What is left of every constraint equation, and its rate, at a time; adds its Jacobian to `jacobian`
     /// (rows × n).
     pub fn residuals(&self, t: T::Time, phi: &[T], omega: &[T], jacobian: &mut [T]) -> Vec<[T; 2]> {

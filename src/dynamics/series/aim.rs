@@ -35,6 +35,7 @@ impl<T: SeriesNumber> AimSeries<T> {
 
     /// Finds power m of the aim and its derivatives, from the powers up to m of the motion's elements and
     /// rates.
+    #[inline(always)]
     pub fn advance(&mut self, m: usize, at: At<T>) {
         self.advance_tape(m, at);
         let n = at.n;
@@ -74,11 +75,13 @@ impl<T: SeriesNumber> AimSeries<T> {
     }
 
     /// df/dq at the start, coordinate by coordinate.
+    #[inline(always)]
     pub fn slopes(&self, mut each: impl FnMut(usize, T)) {
         self.aim.slopes.iter().for_each(|&(k, slope)| each(k, self.tape.of(slope)[0]));
     }
 
     /// Adds power m of the generalized forces that multipliers below that power exert.
+    #[inline(always)]
     pub fn turning_terms(&self, m: usize, multiplier: impl Fn(usize) -> T, load: &mut [T]) {
         for &(k, slope) in &self.aim.slopes {
             let slope = self.tape.of(slope);

@@ -1,7 +1,8 @@
 //! Numbers there are series of, and what the equations of a mechanism are to them.
 
-use super::factors::CauchyFactor;
+use super::factors::Factored;
 use super::{Series, bodywise, drive};
+use crate::arithmetic::lanes::wide::Task;
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Over, Real};
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
@@ -75,15 +76,29 @@ pub trait Constants: Sized {
 }
 
 /// A number whose series are compiled with this crate, once, and not anew wherever they are used.
-pub trait SeriesNumber: Real + Constants + Over<<Self as Constants>::Constant> {
-    /// A series of them as a factor of Cauchy products.
-    type Factor: CauchyFactor<Self>;
+pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constant> {
+    /// False where nobody asks for the power of motors and dampers.
+    const HAS_WORK: bool = true;
+    /// True where couplings between bodies are kept in the form in which they are multiplied.
+    const HAS_COUPLINGS: bool = false;
 
     /// Power zero, and the laws' series.
     fn begin(series: &mut Series<Self>, t: Self::Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
 
     /// The powers from `first` on.
     fn orders(series: &mut Series<Self>, terms: &Terms<Self::Constant>, first: usize);
+
+    /// Performs a task by itself, compiled as the numbers' orders are.
+    #[inline(never)]
+    fn perform<K: Task>(task: K) -> K::Output {
+        task.perform()
+    }
+
+    /// The sum with the product of a number and a constant that has derivatives or has not.
+    #[inline(always)]
+    fn with_product(self, factor: Self, constant: Self, _is_varied: bool) -> Self {
+        self + factor * constant
+    }
 
     /// The number kept to so many limbs, where it has limbs.
     #[inline(always)]
@@ -125,9 +140,11 @@ macro_rules! coefficient {
             }
         }
 
-        impl $(<const $size: usize>)? SeriesNumber for $number {
+        impl $(<const $size: usize>)? Factored for $number {
             type Factor = ();
+        }
 
+        impl $(<const $size: usize>)? SeriesNumber for $number {
             fn begin(series: &mut Series<Self>, t: Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
                 series.begin(t, u, u_rest, u_rate);
             }

@@ -4,7 +4,8 @@
 //! double-doubles have nothing of this: the series of those are multiplied where they stand.
 
 use super::coefficient::SeriesNumber;
-use crate::arithmetic::{Complex, Real};
+use crate::arithmetic::{Complex, Real, Scalar};
+use crate::dynamics::tree::Tree;
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
 
@@ -12,6 +13,8 @@ use std::ops::RangeInclusive;
 pub trait CauchyFactor<T>: Clone + Debug {
     /// What all series of a step have in common.
     type Scale: Clone + Debug + Default;
+    /// What is known of an odd order's products before that order.
+    type Ahead: Clone + Debug + Default;
 
     /// Room for powers up to `order`.
     fn new(order: usize) -> Self;
@@ -46,6 +49,30 @@ pub trait CauchyFactor<T>: Clone + Debug {
         of: RangeInclusive<usize>,
     ) -> T;
 
+    /// Order `m` of z w: the products of total power m+1 of two series with one, but for power 0 of the pair.
+    #[inline(always)]
+    fn turned(
+        pair: [&Self; 2],
+        other: &Self,
+        scale: &Self::Scale,
+        m: usize,
+        _ahead: &mut Self::Ahead,
+    ) -> [T; 2] {
+        Self::products(pair, other, scale, m + 1, 1..=m + 1)
+    }
+
+    /// Order `m` of z × R, likewise: that of total power m.
+    #[inline(always)]
+    fn crossed(
+        [a, b]: [&Self; 2],
+        [c, d]: [&Self; 2],
+        scale: &Self::Scale,
+        m: usize,
+        _ahead: &mut Self::Ahead,
+    ) -> T {
+        Self::sum_of_products([[a, d], [b, c]], -1.0, scale, m, 1..=m)
+    }
+
     /// False where the powers grow by more than products are made for.
     fn is_sound(&self) -> bool;
 }
@@ -53,6 +80,7 @@ pub trait CauchyFactor<T>: Clone + Debug {
 /// Of numbers that are multiplied where they stand: there is nothing to hand over.
 impl<T: Real> CauchyFactor<T> for () {
     type Scale = ();
+    type Ahead = ();
 
     fn new(_order: usize) -> Self {}
 
@@ -79,8 +107,53 @@ impl<T: Real> CauchyFactor<T> for () {
     }
 }
 
+/// Of numbers that are multiplied one by one.
+impl<T: Real> CauchyFactor<T> for Vec<T> {
+    type Scale = ();
+    type Ahead = ();
+
+    fn new(order: usize) -> Self {
+        Self::with_capacity(order + 1)
+    }
+
+    fn restart(&mut self, _scale: &()) {
+        self.clear();
+    }
+
+    fn push(&mut self, _scale: &(), power: T) {
+        Self::push(self, power);
+    }
+
+    fn product(&self, other: &Self, _scale: &(), total: usize, of: RangeInclusive<usize>) -> T {
+        of.fold(T::ZERO, |sum, j| sum + self[j] * other[total - j])
+    }
+
+    fn sum_of_products(
+        [[a, b], [c, d]]: [[&Self; 2]; 2],
+        sign: f64,
+        scale: &(),
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> T {
+        a.product(b, scale, total, of.clone()) + c.product(d, scale, total, of).scale(sign)
+    }
+
+    fn is_sound(&self) -> bool {
+        true
+    }
+}
+
+/// A number whose series are factors of Cauchy products.
+pub trait Factored: Real {
+    /// A series of them as such a factor.
+    type Factor: CauchyFactor<Self>;
+}
+
+/// What is known of an odd order's products before that order.
+type Ahead<T> = <<T as Factored>::Factor as CauchyFactor<T>>::Ahead;
+
 /// What all series of a step have in common.
-pub type Scale<T> = <<T as SeriesNumber>::Factor as CauchyFactor<T>>::Scale;
+pub type Scale<T> = <<T as Factored>::Factor as CauchyFactor<T>>::Scale;
 
 /// A series of vectors as a factor.
 #[derive(Clone, Debug)]
@@ -122,6 +195,19 @@ impl<T: SeriesNumber> VectorFactor<T> {
         Complex::new(re, im)
     }
 
+    /// [`CauchyFactor::turned`] by a series of numbers.
+    #[inline(always)]
+    pub fn turned(&self, other: &T::Factor, scale: &Scale<T>, m: usize, ahead: &mut Ahead<T>) -> Complex<T> {
+        let [re, im] = T::Factor::turned([&self.re, &self.im], other, scale, m, ahead);
+        Complex::new(re, im)
+    }
+
+    /// [`CauchyFactor::crossed`] with a series of vectors.
+    #[inline(always)]
+    pub fn crossed(&self, other: &Self, scale: &Scale<T>, m: usize, ahead: &mut Ahead<T>) -> T {
+        T::Factor::crossed([&self.re, &self.im], [&other.re, &other.im], scale, m, ahead)
+    }
+
     /// The dot product with a series of vectors.
     #[inline(always)]
     pub fn dot(&self, other: &Self, scale: &Scale<T>, total: usize, of: RangeInclusive<usize>) -> T {
@@ -152,6 +238,11 @@ pub struct Factors<T: SeriesNumber> {
     pub(super) rest: Vec<VectorFactor<T>>,
     pub(super) drive: Vec<T::Factor>,
     pub(super) torque: Vec<T::Factor>,
+    /// What is known of the next order, body by body.
+    pub(super) ahead: Vec<Ahead<T>>,
+    /// H beside the diagonal, row by row, where it is real: column, entry, and true where that has
+    /// derivatives; empty for numbers whose couplings are looked up in the tree.
+    pub(super) coupling: Vec<Vec<(usize, T, bool)>>,
 }
 
 impl<T: SeriesNumber> Factors<T> {
@@ -168,11 +259,28 @@ impl<T: SeriesNumber> Factors<T> {
             rest: vectors(),
             drive: numbers(driven),
             torque: numbers(driven),
+            ahead: vec![Ahead::<T>::default(); bodies],
+            coupling: Vec::new(),
         }
+    }
+
+    /// Takes the couplings of a tree.
+    pub fn couple(&mut self, tree: &Tree<T::Constant>) {
+        let n = tree.coordinates;
+        if !T::HAS_COUPLINGS || tree.off_axis || !tree.is_dense() {
+            return;
+        }
+        let entry = |i: usize, j: usize| {
+            let constant = tree.coupling[i.min(j) * n + i.max(j)].re;
+            let is_there = i != j && constant != T::Constant::ZERO;
+            is_there.then(|| (j, T::constant(constant), constant != T::Constant::of(constant.value())))
+        };
+        self.coupling = (0..n).map(|i| (0..n).filter_map(|j| entry(i, j)).collect()).collect();
     }
 
     /// Power zero of the rates, powers zero and one of the unit vectors, of `n` elements each, and all powers
     /// of s'.
+    #[inline(always)]
     pub fn begin(&mut self, n: usize, z: &[Complex<T>], omega: &[T], drive: &[T]) {
         let scale = &self.scale;
         for (i, factor) in self.z.iter_mut().enumerate() {

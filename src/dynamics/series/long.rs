@@ -1,6 +1,6 @@
 //! Series of numbers of many digits: constants and time have as many, and laws are evaluated in them.
 
-use super::factors::CauchyFactor;
+use super::factors::{CauchyFactor, Factored};
 use super::{Constants, Series, SeriesNumber, Terms, bodywise, own};
 use crate::arithmetic::Complex;
 use crate::arithmetic::digits::{Digits, Factor, Scale};
@@ -30,6 +30,7 @@ impl<const W: usize> Constants for Digits<W> {
 
 impl<const W: usize> CauchyFactor<Digits<W>> for Factor<W> {
     type Scale = Scale;
+    type Ahead = ();
 
     fn new(order: usize) -> Self {
         Self::new(order)
@@ -63,9 +64,11 @@ impl<const W: usize> CauchyFactor<Digits<W>> for Factor<W> {
     }
 }
 
-impl<const W: usize> SeriesNumber for Digits<W> {
+impl<const W: usize> Factored for Digits<W> {
     type Factor = Factor<W>;
+}
 
+impl<const W: usize> SeriesNumber for Digits<W> {
     fn begin(series: &mut Series<Self>, t: Self, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
         series.begin(t, u, u_rest, u_rate);
     }

@@ -5,10 +5,39 @@ use super::factors::Factors;
 use super::polynomial::{UNROLLED, convolve, width};
 use super::{At, Series, SeriesNumber, Terms};
 use crate::arithmetic::Complex;
+use crate::arithmetic::lanes::wide::Task;
 use crate::dynamics::schur;
 use crate::dynamics::tree::{self, Tree, size};
+use std::ops::Range;
+
+/// A part of an order that is compiled by itself.
+enum Part<'a, 'b, T: SeriesNumber> {
+    Factors { series: &'a mut Series<T>, terms: &'a Terms<'b, T::Constant> },
+    Forces { series: &'a mut Series<T>, terms: &'a Terms<'b, T::Constant>, m: usize },
+    Rows { series: &'a mut Series<T>, m: usize },
+}
+
+impl<T: SeriesNumber> Task for Part<'_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn perform(self) {
+        match self {
+            Self::Factors { series, terms } => series.factor_rows(terms),
+            Self::Forces { series, terms, m } => series.other_forces(terms, m),
+            Self::Rows { series, m } => series.solve_rows(m),
+        }
+    }
+}
 
 impl<T: SeriesNumber> Series<T> {
+    /// Where R_m is, of `n` elements; where series are factors of products, their powers before are there.
+    #[inline(always)]
+    fn row(m: usize, n: usize) -> Range<usize> {
+        let m = if T::HAS_CONSTANTS { 0 } else { m };
+        m * n..(m + 1) * n
+    }
+
     /// The factors of M_0, and those of the rows.
     #[inline(always)]
     pub(super) fn factor<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
@@ -28,12 +57,56 @@ impl<T: SeriesNumber> Series<T> {
             self.reduced.copy_from_slice(&self.mass);
             tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
         }
-        if !self.rows.is_empty() {
-            self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
-            let diagonal = &terms.structure.tree.diagonal;
-            let diagonal = self.partition.independent.iter().map(|&body| diagonal[body]);
-            self.rows.mark(schur::is_deep(&self.pivot[..f], diagonal));
+        if T::HAS_COUPLINGS {
+            self.invert();
         }
+        if !self.rows.is_empty() {
+            T::perform(Part::Factors { series: self, terms });
+        }
+    }
+
+    /// The inverse of the factored matrix: an order then waits for one sum, not for passes there and back.
+    #[inline(always)]
+    fn invert(&mut self) {
+        let f = self.partition.count();
+        self.inverse.fill(T::ZERO);
+        for (c, column) in self.inverse.chunks_exact_mut(f.max(1)).enumerate() {
+            column[c] = T::ONE;
+            tree::solve::<T, 0>(f, &self.reduced, &self.pivot, column);
+        }
+    }
+
+    /// The product of the inverse, which is symmetric, with the solution so far: its right side.
+    #[inline(always)]
+    fn by_inverse<const N: usize>(&mut self) {
+        let f = if self.is_tied { self.partition.count() } else { size::<N>(self.elements) };
+        let (right, solution) = (&mut self.right[..f], &mut self.solution[..f]);
+        right.copy_from_slice(solution);
+        for (c, row) in self.inverse[..f * f].chunks_exact(f.max(1)).enumerate() {
+            let mut sum = right[0] * row[0];
+            for d in 1..f {
+                sum = sum.with_product(right[d], row[d], true);
+            }
+            solution[c] = sum;
+        }
+    }
+
+    /// The factors of the rows.
+    #[inline(always)]
+    fn factor_rows(&mut self, terms: &Terms<T::Constant>) {
+        let (n, f) = (self.elements, self.partition.count());
+        self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
+        let diagonal = &terms.structure.tree.diagonal;
+        let diagonal = self.partition.independent.iter().map(|&body| diagonal[body]);
+        self.rows.mark(schur::is_deep(&self.pivot[..f], diagonal));
+    }
+
+    /// Multipliers of order m, and the accelerations with them.
+    #[inline(always)]
+    fn solve_rows(&mut self, m: usize) {
+        let n = self.elements;
+        self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+        self.rows.push(m, &self.z[..n], &mut self.rest[Self::row(m, n)]);
     }
 
     /// f_{m+1} into `turned` and u_m into `bend`; the driven part of a_m, where there is one, is in it.
@@ -45,9 +118,9 @@ impl<T: SeriesNumber> Series<T> {
         let factor = T::of((m + 1) as f64);
         bend[angles..].fill(Complex::ZERO);
         if T::HAS_CONSTANTS {
-            let Factors { scale, z, omega, .. } = &self.factors;
+            let Factors { scale, z, omega, ahead, .. } = &mut self.factors;
             for i in 0..angles {
-                let sum = z[i].times(&omega[i], scale, m + 1, 1..=m + 1);
+                let sum = z[i].turned(&omega[i], scale, m, &mut ahead[i]);
                 let left = sum.left();
                 let times = |x: T| x.scale((m + 1) as f64);
                 (turned[i], bend[i]) = (sum, Complex::new(times(left.re), times(left.im)));
@@ -79,9 +152,9 @@ impl<T: SeriesNumber> Series<T> {
             }
         }
         self.gravity_forces(terms, m);
-        mass_terms::<T, N>(terms.tree, &self.bend, &mut self.rest[m * n..(m + 1) * n]);
+        mass_terms::<T, N>(terms.tree, &self.factors.coupling, &self.bend, &mut self.rest[Self::row(m, n)]);
         self.force(terms, m);
-        let (before, rest) = self.rest.split_at_mut(m * n);
+        let (before, rest) = self.rest.split_at_mut(Self::row(m, n).start);
         let rest = &mut rest[..n];
         let (z, load) = (&self.z[..(m + 1) * n], &mut self.load[..n]);
         for x in (angles..n).step_by(2) {
@@ -90,9 +163,9 @@ impl<T: SeriesNumber> Series<T> {
         }
         if T::HAS_CONSTANTS {
             // Of l = 0 only, R is not complete yet.
-            let Factors { scale, z: factors, rest: known, .. } = &self.factors;
+            let Factors { scale, z: factors, rest: known, ahead, .. } = &mut self.factors;
             for k in 0..angles {
-                let sum = factors[k].cross(&known[k], scale, m, 1..=m);
+                let sum = factors[k].crossed(&known[k], scale, m, &mut ahead[k]);
                 load[k] -= sum + z[k].cross(rest[k]);
             }
             return;
@@ -113,7 +186,7 @@ impl<T: SeriesNumber> Series<T> {
     /// Gravity in R_m, and nothing else.
     #[inline(always)]
     pub(super) fn gravity_forces(&mut self, terms: &Terms<T::Constant>, m: usize) {
-        for (rest, &weight) in self.rest[m * self.elements..].iter_mut().zip(&terms.tree.weight) {
+        for (rest, &weight) in self.rest[Self::row(m, self.elements)].iter_mut().zip(&terms.tree.weight) {
             *rest = if m == 0 { -Complex::of(weight) } else { Complex::ZERO };
         }
     }
@@ -122,7 +195,7 @@ impl<T: SeriesNumber> Series<T> {
     #[inline(always)]
     pub(super) fn force(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let n = self.elements;
-        let rest = &mut self.rest[m * n..(m + 1) * n];
+        let rest = &mut self.rest[Self::row(m, n)];
         let mut on_bodies = self.friction.as_mut().map(|friction| &mut friction.applied[..]);
         if let Some(on_bodies) = &mut on_bodies {
             on_bodies.fill(Complex::ZERO);
@@ -135,6 +208,15 @@ impl<T: SeriesNumber> Series<T> {
                 ends.for_each(|(body, force)| body.iter().for_each(|&body| on_bodies[body] += force));
             }
         }
+        T::perform(Part::Forces { series: self, terms, m });
+    }
+
+    /// All but springs.
+    #[inline(always)]
+    fn other_forces(&mut self, terms: &Terms<T::Constant>, m: usize) {
+        let n = self.elements;
+        let rest = &mut self.rest[Self::row(m, n)];
+        let mut on_bodies = self.friction.as_mut().map(|friction| &mut friction.applied[..]);
         if !terms.torsions.is_empty() || !self.actions.is_empty() || !self.forces.is_empty() {
             let applied = &mut self.applied[m * n..(m + 1) * n];
             applied.fill(T::ZERO);
@@ -173,18 +255,22 @@ impl<T: SeriesNumber> Series<T> {
     pub(super) fn solve<const N: usize>(&mut self, terms: &Terms<T::Constant>, m: usize) {
         let (n, f) = (size::<N>(self.elements), self.partition.count());
         let angles = size::<N>(self.angles);
-        let rest = &mut self.rest[m * n..(m + 1) * n];
         if self.is_tied {
             self.partition.gather(&self.load, &mut self.solution);
-            tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
         } else {
             self.solution[..n].copy_from_slice(&self.load[..n]);
+        }
+        if T::HAS_COUPLINGS {
+            self.by_inverse::<N>();
+        } else if self.is_tied {
+            tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
+        } else {
             tree::solve::<T, N>(n, &self.reduced, &self.pivot, &mut self.solution);
         }
         if !self.rows.is_empty() {
-            self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
-            self.rows.push(m, &self.z[..n], rest);
+            T::perform(Part::Rows { series: self, m });
         }
+        let rest = &mut self.rest[Self::row(m, n)];
         if let Some(&limbs) = self.limbs.get(m + 1) {
             self.solution.iter_mut().for_each(|x| *x = x.kept(limbs));
             self.turned.iter_mut().for_each(|x| *x = Complex::new(x.re.kept(limbs), x.im.kept(limbs)));
@@ -222,7 +308,7 @@ impl<T: SeriesNumber> Series<T> {
         for i in 0..angles {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
-        mass_terms::<T, N>(terms.tree, &self.bend, rest);
+        mass_terms::<T, N>(terms.tree, &self.factors.coupling, &self.bend, rest);
         if T::HAS_CONSTANTS {
             self.factors.push(newest, omega, rest);
         }
@@ -233,10 +319,22 @@ impl<T: SeriesNumber> Series<T> {
 #[inline(always)]
 fn mass_terms<T: SeriesNumber, const N: usize>(
     tree: &Tree<T::Constant>,
+    rows: &[Vec<(usize, T, bool)>],
     x: &[Complex<T>],
     rest: &mut [Complex<T>],
 ) {
     let n = size::<N>(tree.coordinates);
+    if T::HAS_COUPLINGS && !rows.is_empty() {
+        for (rest, row) in rest.iter_mut().zip(rows) {
+            let mut sum = *rest;
+            for &(j, constant, is_varied) in row {
+                sum.re = sum.re.with_product(x[j].re, constant, is_varied);
+                sum.im = sum.im.with_product(x[j].im, constant, is_varied);
+            }
+            *rest = sum;
+        }
+        return;
+    }
     let (coupling, x, rest) = (&tree.coupling[..n * n], &x[..n], &mut rest[..n]);
     for i in 0..n {
         for j in i + 1..n {

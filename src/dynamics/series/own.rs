@@ -3,8 +3,7 @@
 //! What such a law is comes from its numbers by plain arithmetic.  Angles that grow with time are made by
 //! `grown(rate, start)`, which knows the time and how to keep its digits.
 
-use super::coefficient::SeriesNumber;
-use super::factors::Scale;
+use super::factors::{Factored, Scale};
 use super::tape::FactorTape;
 use crate::arithmetic::{Complex, Over};
 use crate::dynamics::law::{Law, Phase};
@@ -38,7 +37,7 @@ pub fn value<T: Over<T> + Decimal>(law: &Law<T>, t: T, grown: impl Fn(T, T) -> T
 }
 
 /// Adds the series of a law's rate: see `drive.rs`.
-pub fn add<T: SeriesNumber + Over<T> + Decimal>(
+pub fn add<T: Factored + Over<T> + Decimal>(
     law: &Law<T>,
     sign: f64,
     t: T,
@@ -68,7 +67,7 @@ pub fn add<T: SeriesNumber + Over<T> + Decimal>(
 }
 
 /// Powers 0 … `order` of a law by a formula about a time \[u/s^m\].
-fn profile_powers<T: SeriesNumber + Decimal>(profile: &Profile<T>, t: T, order: usize) -> Vec<T> {
+fn profile_powers<T: Factored + Decimal>(profile: &Profile<T>, t: T, order: usize) -> Vec<T> {
     let (tape, law, numbers) = profile.parts();
     let mut series = FactorTape::new(tape, order, |input| input > 0);
     for m in 0..=order {

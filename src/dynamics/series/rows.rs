@@ -17,7 +17,6 @@ use super::polynomial::{copy, zeros};
 use super::user::At;
 use crate::arithmetic::{Complex, DoubleDouble, Over, Real};
 use crate::dynamics::constraint::{ConstraintEquation, Measure};
-use crate::dynamics::kernel::dot;
 use crate::dynamics::law::Law;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::quadratic::Quadratic;
@@ -62,6 +61,7 @@ enum Kind<T: SeriesNumber> {
 
 impl<T: SeriesNumber> Kind<T> {
     /// Parts of dC/dq, coordinate by coordinate; a coordinate may come up more than once.
+    #[inline(always)]
     fn slopes(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
         match self {
             Self::Place { place, aim, .. } => {
@@ -76,6 +76,7 @@ impl<T: SeriesNumber> Kind<T> {
     }
 
     /// `free`, and what else there is of power m of the second derivative, less that of its law.
+    #[inline(always)]
     fn known(&self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], free: T) -> T {
         match self {
             Self::Place { place, drive, aim, .. } => {
@@ -150,6 +151,7 @@ impl<T: SeriesNumber> RowSeries<T> {
     }
 
     /// Marks S as delicate where M is.
+    #[inline(always)]
     pub fn mark(&mut self, is_deep: bool) {
         self.weakest.is_delicate |= is_deep;
     }
@@ -161,6 +163,7 @@ impl<T: SeriesNumber> RowSeries<T> {
     }
 
     /// The laws' series at time `t`.
+    #[inline(always)]
     pub fn begin(&mut self, t: T::Time) {
         for kind in &mut self.kinds {
             if let Kind::Angle { law, drive, .. } | Kind::Place { law: Some(law), drive, .. } = kind {
@@ -172,6 +175,7 @@ impl<T: SeriesNumber> RowSeries<T> {
 
     /// Power m of the aims, and what multipliers below that power exert on the coordinates by them into
     /// `load`.
+    #[inline(always)]
     pub fn advance_aims(&mut self, m: usize, at: At<T>, load: &mut [T]) {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter_mut().enumerate() {
@@ -183,6 +187,7 @@ impl<T: SeriesNumber> RowSeries<T> {
     }
 
     /// J and S, from the factors of the mass matrix of the coordinates.
+    #[inline(always)]
     pub fn prepare(
         &mut self,
         partition: &CoordinatePartition<T::Constant>,
@@ -231,6 +236,7 @@ impl<T: SeriesNumber> RowSeries<T> {
 
     /// What is known of power m of every row's second derivative, less that of its law: where its multipliers
     /// will be.
+    #[inline(always)]
     pub fn known(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>]) -> &mut [T] {
         let r = self.kinds.len();
         let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
@@ -242,11 +248,16 @@ impl<T: SeriesNumber> RowSeries<T> {
 
     /// Multipliers of power m from the free accelerations of the coordinates, which become the constrained
     /// ones.
+    #[inline(always)]
     pub fn solve(&mut self, m: usize, z: &[Complex<T>], bend: &[Complex<T>], solution: &mut [T]) {
         let (r, f) = (self.kinds.len(), self.coordinates);
         let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
         for (i, kind) in self.kinds.iter().enumerate() {
-            multiplier[i] = kind.known(m, z, bend, dot(&self.jacobian[i * f..(i + 1) * f], solution));
+            let mut free = T::ZERO;
+            for c in 0..f {
+                free += self.jacobian[i * f + c] * solution[c];
+            }
+            multiplier[i] = kind.known(m, z, bend, free);
         }
         tree::solve::<T, 0>(r, &self.schur, &self.pivot, multiplier);
         for (i, &multiplier) in multiplier.iter().enumerate() {
@@ -257,17 +268,24 @@ impl<T: SeriesNumber> RowSeries<T> {
     }
 
     /// Adds what the multipliers of power m put on the unit vectors to `rest`.
+    #[inline(always)]
     pub fn push(&self, m: usize, z: &[Complex<T>], rest: &mut [Complex<T>]) {
         let r = self.kinds.len();
         for (kind, &multiplier) in self.kinds.iter().zip(&self.multiplier[m * r..]) {
-            if let Kind::Place { place, .. } = kind {
-                place.gradients(z, |k, gradient| rest[k] += gradient.times(multiplier));
+            let Kind::Place { place, .. } = kind else { continue };
+            for &(k, g) in &place.linear {
+                rest[k] += Complex::of(g).times(multiplier);
+            }
+            for &(j, k, h) in &place.bilinear {
+                rest[k] += z[j].turn(h.conj()).times(multiplier);
+                rest[j] += z[k].turn(h).times(multiplier);
             }
         }
     }
 
     /// Adds what the multipliers below power m put on the elements as these turn to `rest`: only gradients
     /// that are not constant.
+    #[inline(always)]
     pub fn geometric_terms(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter().enumerate() {
@@ -310,6 +328,7 @@ impl<T: SeriesNumber> RowSeries<T> {
 }
 
 /// Adds what the multipliers of a function below power m put on the elements as these turn to `rest`.
+#[inline(always)]
 pub fn turning_terms<T: Over<C>, C: Real>(
     place: &Quadratic<C>,
     m: usize,
@@ -339,6 +358,7 @@ fn with_rates<T: Real>(multiplier: &[T], rows: usize, rates: &[T]) -> T {
 
 /// Power m of a row's second derivative without the accelerations of power m: `bend` is what e'' has without
 /// them.
+#[inline(always)]
 fn bent<T: Real + Over<C>, C: Real>(
     place: &Quadratic<C>,
     m: usize,
@@ -347,7 +367,13 @@ fn bent<T: Real + Over<C>, C: Real>(
 ) -> T {
     let n = bend.len();
     let mut sum = T::ZERO;
-    place.gradients(&z[..n], |k, gradient| sum += gradient.dot(bend[k]));
+    for &(k, g) in &place.linear {
+        sum += Complex::of(g).dot(bend[k]);
+    }
+    for &(j, k, h) in &place.bilinear {
+        sum += z[j].turn(h.conj()).dot(bend[k]);
+        sum += z[k].turn(h).dot(bend[j]);
+    }
     let mut products = T::ZERO;
     for &(j, k, h) in &place.bilinear {
         for l in 1..=m + 1 {

@@ -162,6 +162,7 @@ impl<T: SeriesNumber> SpringSeries<T> {
     }
 
     /// What free length and damper add to the force at power m, as products of factors.
+    #[inline(always)]
     fn factored_force(
         &mut self,
         spring: &Spring<T::Constant>,

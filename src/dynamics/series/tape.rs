@@ -4,13 +4,12 @@
 //!
 //! [`TapeSeries`]: crate::arithmetic::tape::TapeSeries
 
-use super::coefficient::SeriesNumber;
-use super::factors::{CauchyFactor, Scale};
+use super::factors::{CauchyFactor, Factored, Scale};
 use crate::arithmetic::tape::{Operation, Slot, Tape};
 
 /// The series of one result.
 #[derive(Clone, Debug)]
-struct Result<T: SeriesNumber> {
+struct Result<T: Factored> {
     /// Powers found so far.
     powers: Vec<T>,
     /// True where all powers but the first are zero.
@@ -24,13 +23,13 @@ struct Result<T: SeriesNumber> {
 
 /// Powers 0 … P of all results of a tape.
 #[derive(Clone, Debug)]
-pub struct FactorTape<T: SeriesNumber> {
+pub struct FactorTape<T: Factored> {
     results: Vec<Result<T>>,
     /// Who is a factor of a product, plainly and [weighted](Result::weighted).
     is_factor: Vec<[bool; 2]>,
 }
 
-impl<T: SeriesNumber> FactorTape<T> {
+impl<T: Factored> FactorTape<T> {
     /// Room for powers up to `order`; `is_number` tells the inputs that do not change with time.
     pub fn new(tape: &Tape, order: usize, is_number: impl Fn(u32) -> bool) -> Self {
         let operations = tape.operations();
@@ -55,6 +54,7 @@ impl<T: SeriesNumber> FactorTape<T> {
     }
 
     /// Power `m` of a result.
+    #[inline(always)]
     pub fn power(&self, slot: Slot, m: usize) -> T {
         self.results[slot as usize].powers.get(m).copied().unwrap_or(T::ZERO)
     }
@@ -67,6 +67,7 @@ impl<T: SeriesNumber> FactorTape<T> {
     }
 
     /// Finds power `m` of all results, from that of the inputs and from all powers before.
+    #[inline(always)]
     pub fn advance(&mut self, tape: &Tape, m: usize, scale: &Scale<T>, input: impl Fn(u32) -> T) {
         for (i, &operation) in tape.operations().iter().enumerate() {
             if operation == Operation::Beside || (m > 0 && self.results[i].is_constant) {
@@ -91,6 +92,7 @@ impl<T: SeriesNumber> FactorTape<T> {
         }
     }
 
+    #[inline(always)]
     fn push(&mut self, i: usize, m: usize, scale: &Scale<T>, power: T) {
         let (result, [is_plain, is_weighted]) = (&mut self.results[i], self.is_factor[i]);
         if m == 0 {
@@ -148,6 +150,7 @@ impl<T: SeriesNumber> FactorTape<T> {
     }
 
     /// Power `m` above zero of an operation with operands, and of the second result beside it.
+    #[inline(always)]
     fn next(&self, i: usize, operation: Operation, m: usize, scale: &Scale<T>) -> (T, Option<T>) {
         let at = |slot: Slot| &self.results[slot as usize];
         let of = |slot: Slot| self.power(slot, m);

@@ -37,6 +37,7 @@ pub struct At<'a, T> {
 
 impl<T: SeriesNumber> At<'_, T> {
     /// Power `m` of an input.
+    #[inline(always)]
     fn power(&self, force: &UserForce<T::Constant>, input: Input, m: usize) -> T {
         let z = |m: usize| &self.z[m * self.n..(m + 1) * self.n];
         let omega = |m: usize| &self.omega[m * self.n..(m + 1) * self.n];
@@ -96,6 +97,7 @@ impl<T: SeriesNumber> UserSeries<T> {
     }
 
     /// Takes power m of the forces off the elements' balance, and adds that of torques to `load`.
+    #[inline(always)]
     pub fn act(
         &mut self,
         force: &UserForce<T::Constant>,
@@ -134,6 +136,7 @@ impl<T: SeriesNumber> UserSeries<T> {
     }
 
     /// Power m of the power accounted as work \[W/s^m\].
+    #[inline(always)]
     pub fn power(&self, force: &UserForce<T::Constant>, m: usize) -> T {
         force.parts[1].power.map_or(T::ZERO, |slot| self.0[1].power(slot, m))
     }

@@ -20,8 +20,9 @@ use crate::arithmetic::Scalar;
 use crate::arithmetic::eight::LANES;
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::schur::NEAR;
+use crate::dynamics::series::Constants;
+use crate::dynamics::series::columns::{Columns, LEADING, columns};
 use crate::dynamics::series::varied::Number;
-use crate::dynamics::series::{Constants, Series};
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
 use crate::scene::exact::Watched;
 use crate::scene::{Scene, Template};
@@ -44,8 +45,9 @@ pub(super) const NEAR_SINGULAR: f64 = f64::INFINITY;
 /// What series and neighbours may differ by, over the largest derivative, and of rounding.
 const AGREEMENT: f64 = 1e-3;
 const ROUNDING: f64 = 1e-9;
-/// Powers that may be what is integrated.
-const LEADING: usize = 4;
+/// Accelerations of this share of one over the square of the unit of time are as good as none: where motions
+/// begin at a position of rest, what is left of them is rounding alone.
+const REST: f64 = 1e-6;
 
 /// Columns of numbers of a scene, in blocks of lanes.
 pub(super) struct Expanded(Vec<(usize, Block)>);
@@ -78,6 +80,8 @@ impl Expanded {
     pub fn agrees(&mut self, motion: &Motion, neighbours: &mut [Option<Neighbours>]) -> bool {
         let (t, phi, omega) = plain(motion);
         let mut forcing: Vec<Vec<f64>> = Vec::new();
+        let unit = self.0.first().map_or(1.0, |(_, block)| block.mechanism.structure.units.time);
+        let least = REST / (unit * unit);
         let mut sizes = Vec::new();
         for neighbours in neighbours.iter_mut() {
             let (mut sum, mut size) = (vec![0.0; phi.len()], 0.0_f64);
@@ -85,7 +89,7 @@ impl Expanded {
                 let weight = neighbour.weight;
                 for (sum, &acceleration) in sum.iter_mut().zip(neighbour.accelerations(t, &phi, &omega)) {
                     *sum += weight * acceleration;
-                    size = size.max((ROUNDING * weight * acceleration).abs());
+                    size = size.max(ROUNDING * weight.abs() * acceleration.abs().max(least));
                 }
             }
             size = sum.iter().fold(size, |size, slope| size.max(AGREEMENT * slope.abs()));
@@ -152,7 +156,7 @@ fn larger(a: f64, b: f64) -> f64 {
 struct Block {
     mechanism: ExactMechanism<Number>,
     coordinates: Coordinates,
-    series: Series<Number>,
+    series: Box<dyn Columns>,
     /// The power the last expansion ended at.
     order: usize,
     /// All coordinates and rates with the columns as derivatives.
@@ -160,8 +164,8 @@ struct Block {
     /// The independent ones, and what the leading part leaves out of the coordinates.
     own: [Vec<Number>; 2],
     rest: Vec<Number>,
-    /// 1/(m+1).
-    fractions: [f64; ORDER + 1],
+    /// What powers come to in a step.
+    shares: Vec<f64>,
     jacobian: Vec<Number>,
 }
 
@@ -189,7 +193,7 @@ impl Block {
         }
         let coordinates =
             if structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent };
-        let series = Series::of_terms(&mechanism.terms(), coordinates, ORDER);
+        let series = columns(&mechanism.terms(), coordinates, ORDER, numbers.len());
         let room = |count: usize| vec![Number::ZERO; count];
         let f = series.coordinates();
         Ok(Self {
@@ -200,7 +204,7 @@ impl Block {
             all: [room(n), room(n)],
             own: [room(f), room(f)],
             rest: room(f),
-            fractions: std::array::from_fn(|m| 1.0 / (m + 1) as f64),
+            shares: Vec::with_capacity(ORDER),
             jacobian: room(rows * n),
         })
     }
@@ -246,40 +250,20 @@ impl Block {
         }
     }
 
-    /// The last powers in a step of `h` \[s\] over what is integrated, of so many columns, and the power up to
-    /// which the next step is worth expanding.
-    fn tail(&self, h: f64, count: usize) -> (f64, usize) {
-        let (f, order) = (self.own[0].len(), self.series.order());
-        let note = |sizes: &mut [f64; LANES], numbers: &[Number], factor: f64| {
-            for number in numbers {
-                for lane in 0..LANES {
-                    sizes[lane] = larger(sizes[lane], number.slope[lane].abs() * factor);
-                }
+    /// The last powers in a step of `h` \[s\] over what is integrated, and the power up to which the next
+    /// step is worth expanding.
+    fn tail(&mut self, h: f64) -> (f64, usize) {
+        let order = self.series.order();
+        self.series.shares(&self.own[0], h, &mut self.shares);
+        let (mut small, mut enough) = (0, None);
+        for (m, &share) in (LEADING..).zip(&self.shares) {
+            small = if share <= ENOUGH { small + 1 } else { 0 };
+            if small >= SMALL && m >= LEAST {
+                enough.get_or_insert(m + 1);
             }
-        };
-        let mut whole = [0.0; LANES];
-        note(&mut whole, &self.own[0], 1.0 / h);
-        let (mut power, mut tail, mut small, mut enough) = (1.0, 0.0, 0, None);
-        for m in 0..=order {
-            let rates = &self.series.rate[m * f..(m + 1) * f];
-            if m < LEADING {
-                note(&mut whole, rates, power);
-            } else {
-                let mut sizes = [0.0; LANES];
-                note(&mut sizes, rates, power);
-                let share =
-                    |lane: usize| if whole[lane] > 0.0 { sizes[lane] / whole[lane] } else { whole[lane] };
-                let share = (0..count).map(share).fold(0.0, larger);
-                small = if share <= ENOUGH { small + 1 } else { 0 };
-                if small >= SMALL && m >= LEAST {
-                    enough.get_or_insert(m + 1);
-                }
-                if m > order - JUDGES {
-                    tail = larger(tail, share);
-                }
-            }
-            power *= h;
         }
+        let last = self.shares.iter().rev().take(JUDGES);
+        let tail = last.fold(0.0, |tail, &share| larger(tail, share));
         (tail, enough.unwrap_or(order + 2).min(ORDER))
     }
 
@@ -293,7 +277,7 @@ impl Block {
             _ => self.mechanism.partition.independent[c],
         };
         let of = |c: usize| {
-            let Number { value, slope, .. } = self.series.rate[f + c];
+            let Number { value, slope, .. } = self.series.rate(1, c);
             (body(c), value, slope.to_vec())
         };
         (0..f).map(of).collect()
@@ -303,15 +287,15 @@ impl Block {
     fn expand(&mut self, motion: &Motion, h: f64, columns: &[Vec<f64>]) -> f64 {
         self.take(motion, columns);
         let [u, rate] = &self.own;
-        self.series.expand_terms(&self.mechanism.terms(), motion.time, u, &self.rest, rate);
-        if self.series.weakest().share < NEAR {
+        let weakest = self.series.expand(&self.mechanism.terms(), (motion.time, u, &self.rest, rate));
+        if weakest.share < NEAR {
             return NEAR_SINGULAR;
         }
         self.order = self.series.order();
         if columns.is_empty() {
             return 0.0;
         }
-        let (tail, enough) = self.tail(h, columns.len());
+        let (tail, enough) = self.tail(h);
         if tail > LIMIT && self.order < ORDER {
             self.series.expand_up_to(ORDER);
             return self.expand(motion, h, columns);
@@ -322,22 +306,7 @@ impl Block {
 
     /// Takes them on by `h` \[s\] along their series.
     fn advance(&mut self, motion: &Motion, h: f64, columns: &mut [Vec<f64>]) {
-        let f = self.own[0].len();
-        for c in 0..f {
-            let (mut turn, mut speed) = ([0.0; LANES], [0.0; LANES]);
-            for m in (0..=self.order).rev() {
-                let power = &self.series.rate[m * f + c].slope;
-                let fraction = self.fractions[m];
-                for lane in 0..LANES {
-                    turn[lane] = turn[lane] * h + power[lane] * fraction;
-                    speed[lane] = speed[lane] * h + power[lane];
-                }
-            }
-            for lane in 0..LANES {
-                self.own[0][c].slope[lane] += h * turn[lane];
-            }
-            self.own[1][c].slope = speed;
-        }
+        self.series.advance(self.order, h, &mut self.own);
         self.give(motion.time + h, columns);
     }
 
