@@ -42,6 +42,7 @@ mod products;
 mod rows;
 mod slots;
 mod spring;
+mod tangent;
 mod tape;
 mod user;
 pub mod varied;

@@ -3,6 +3,7 @@
 //! A single direction has one slot, several have eight, in the vectors of the processor.
 
 use super::slots::InSlots;
+use super::tangent::Tangent;
 use super::varied::Number;
 use super::{Series, Terms};
 use crate::arithmetic::Scalar;
@@ -11,6 +12,7 @@ use crate::arithmetic::lanes::wide::{EightLanes, Single, Slots, Task, Vectors, W
 use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Coordinates, Time};
 use std::fmt::Debug;
+use std::marker::PhantomData;
 
 /// Powers that may be what is integrated.
 pub const LEADING: usize = 4;
@@ -62,10 +64,14 @@ struct Room<'a, 'b> {
 
 impl Room<'_, '_> {
     fn of<S: Slots + Send>(&self) -> Box<dyn Columns> {
+        let fractions = (0..=self.order).map(|m| 1.0 / (m + 1) as f64).collect();
+        if let Some(expansion) = Tangent::<S>::new(self.terms, self.coordinates, self.order) {
+            return Box::new(InColumns { expansion, fractions, slots: PhantomData });
+        }
         let series = Series::<InSlots<S>>::of_terms(self.terms, self.coordinates, self.order);
         let room = || vec![InSlots::ZERO; series.coordinates()];
-        let fractions = (0..=self.order).map(|m| 1.0 / (m + 1) as f64).collect();
-        Box::new(InColumns { begin: [room(), room(), room()], series, fractions })
+        let expansion = Whole { begin: [room(), room(), room()], series };
+        Box::new(InColumns { expansion, fractions, slots: PhantomData })
     }
 }
 
@@ -78,39 +84,129 @@ impl WideCode for Room<'_, '_> {
     }
 }
 
-/// The series, and where they begin: coordinates, what the leading part leaves out of them, and rates.
+/// Powers of a motion with their derivatives, of one kind or another.
+trait Expansion<S: Slots>: Debug + Send {
+    fn coordinates(&self) -> usize;
+    fn order(&self) -> usize;
+    fn expand_up_to(&mut self, order: usize);
+    /// What of it is not compiled for the slots.
+    fn prepare(&mut self, terms: &Terms<Number>, begin: Begin);
+    fn expand(&mut self, terms: &Terms<Number>, begin: Begin);
+    fn weakest(&self) -> Weakest;
+    /// Power `m` of a rate, and its derivatives.
+    fn value(&self, m: usize, coordinate: usize) -> f64;
+    fn slope(&self, m: usize, coordinate: usize) -> S;
+}
+
+/// Series of numbers with derivatives, and where they begin: coordinates, what the leading part leaves out of
+/// them, and rates.
 #[derive(Debug)]
-struct InColumns<S: Slots> {
+struct Whole<S: Slots> {
     series: Series<InSlots<S>>,
     begin: [Vec<InSlots<S>>; 3],
-    /// 1/(m+1).
-    fractions: Vec<f64>,
 }
 
-struct Expand<'a, 'b, S: Slots> {
-    columns: &'a mut InColumns<S>,
-    terms: &'a Terms<'b, Number>,
-    begin: Begin<'a>,
-}
+impl<S: Slots + Send> Expansion<S> for Whole<S> {
+    fn coordinates(&self) -> usize {
+        self.series.coordinates()
+    }
 
-impl<S: Slots> Task for Expand<'_, '_, S> {
-    type Output = ();
+    fn order(&self) -> usize {
+        self.series.order()
+    }
+
+    fn expand_up_to(&mut self, order: usize) {
+        self.series.expand_up_to(order);
+    }
+
+    fn prepare(&mut self, _terms: &Terms<Number>, _begin: Begin) {}
 
     #[inline(always)]
-    fn perform(self) {
-        let InColumns { series, begin: [u, rest, rate], .. } = self.columns;
-        let (t, from_u, from_rest, from_rate) = self.begin;
+    fn expand(&mut self, terms: &Terms<Number>, (t, from_u, from_rest, from_rate): Begin) {
+        let Self { series, begin: [u, rest, rate] } = self;
         for c in 0..u.len() {
             u[c] = InSlots::load(&from_u[c]);
             rest[c] = InSlots::load(&from_rest[c]);
             rate[c] = InSlots::load(&from_rate[c]);
         }
-        series.expand_terms(self.terms, t, u, rest, rate);
+        series.expand_terms(terms, t, u, rest, rate);
+    }
+
+    fn weakest(&self) -> Weakest {
+        self.series.weakest()
+    }
+
+    fn value(&self, m: usize, coordinate: usize) -> f64 {
+        self.series.rate[m * self.series.coordinates() + coordinate].value
+    }
+
+    #[inline(always)]
+    fn slope(&self, m: usize, coordinate: usize) -> S {
+        self.series.rate[m * self.series.coordinates() + coordinate].slope
     }
 }
 
-struct Shares<'a, S: Slots> {
-    columns: &'a InColumns<S>,
+impl<S: Slots + Send> Expansion<S> for Tangent<S> {
+    fn coordinates(&self) -> usize {
+        self.coordinates()
+    }
+
+    fn order(&self) -> usize {
+        self.order()
+    }
+
+    fn expand_up_to(&mut self, order: usize) {
+        self.expand_up_to(order);
+    }
+
+    fn prepare(&mut self, terms: &Terms<Number>, begin: Begin) {
+        self.expand_values(terms, begin);
+    }
+
+    #[inline(always)]
+    fn expand(&mut self, terms: &Terms<Number>, begin: Begin) {
+        self.expand(terms, begin);
+    }
+
+    fn weakest(&self) -> Weakest {
+        self.weakest()
+    }
+
+    fn value(&self, m: usize, coordinate: usize) -> f64 {
+        self.value(m, coordinate)
+    }
+
+    #[inline(always)]
+    fn slope(&self, m: usize, coordinate: usize) -> S {
+        self.slope(m, coordinate)
+    }
+}
+
+#[derive(Debug)]
+struct InColumns<S, E> {
+    expansion: E,
+    /// 1/(m+1).
+    fractions: Vec<f64>,
+    slots: PhantomData<S>,
+}
+
+struct Expand<'a, 'b, S, E> {
+    columns: &'a mut InColumns<S, E>,
+    terms: &'a Terms<'b, Number>,
+    begin: Begin<'a>,
+}
+
+impl<S: Slots, E: Expansion<S>> Task for Expand<'_, '_, S, E> {
+    type Output = ();
+
+    #[inline(always)]
+    fn perform(self) {
+        self.columns.expansion.expand(self.terms, self.begin);
+    }
+}
+
+struct Shares<'a, S, E> {
+    columns: &'a InColumns<S, E>,
     u: &'a [Number],
     h: f64,
     shares: &'a mut Vec<f64>,
@@ -130,22 +226,21 @@ fn note<S: Slots>(sizes: &mut [f64; LANES], slope: &[f64; LANES], factor: f64) {
     }
 }
 
-impl<S: Slots> Task for Shares<'_, S> {
+impl<S: Slots, E: Expansion<S>> Task for Shares<'_, S, E> {
     type Output = ();
 
     #[inline(always)]
     fn perform(self) {
-        let Self { columns: InColumns { series, .. }, u, h, shares } = self;
+        let Self { columns: InColumns { expansion, .. }, u, h, shares } = self;
         let f = u.len();
         let (mut whole, mut power) = ([0.0; LANES], 1.0);
         for u in u {
             note::<S>(&mut whole, &u.slope, 1.0 / h);
         }
-        for m in 0..=series.order() {
-            let rates = &series.rate[m * f..(m + 1) * f];
+        for m in 0..=expansion.order() {
             if m < LEADING {
-                for rate in rates {
-                    note::<S>(&mut whole, &rate.slopes(), power);
+                for c in 0..f {
+                    note::<S>(&mut whole, &expansion.slope(m, c).array(), power);
                 }
                 if m + 1 == LEADING {
                     for whole in &mut whole {
@@ -154,8 +249,8 @@ impl<S: Slots> Task for Shares<'_, S> {
                 }
             } else {
                 let (mut sizes, mut share) = ([0.0; LANES], 0.0);
-                for rate in rates {
-                    note::<S>(&mut sizes, &rate.slopes(), power);
+                for c in 0..f {
+                    note::<S>(&mut sizes, &expansion.slope(m, c).array(), power);
                 }
                 for lane in 0..S::COUNT {
                     share = larger(share, sizes[lane] * whole[lane]);
@@ -167,26 +262,26 @@ impl<S: Slots> Task for Shares<'_, S> {
     }
 }
 
-struct Advance<'a, S: Slots> {
-    columns: &'a InColumns<S>,
+struct Advance<'a, S, E> {
+    columns: &'a InColumns<S, E>,
     order: usize,
     h: f64,
     own: &'a mut [Vec<Number>; 2],
 }
 
-impl<S: Slots> Task for Advance<'_, S> {
+impl<S: Slots, E: Expansion<S>> Task for Advance<'_, S, E> {
     type Output = ();
 
     #[inline(always)]
     fn perform(self) {
-        let Self { columns: InColumns { series, fractions, .. }, order, h, own: [u, rates] } = self;
+        let Self { columns: InColumns { expansion, fractions, .. }, order, h, own: [u, rates] } = self;
         let (f, h) = (u.len(), S::splat(h));
         for c in 0..f {
             let (mut turn, mut speed) = (S::ZERO, S::ZERO);
             let mut m = order + 1;
             while m > 0 {
                 m -= 1;
-                let power = series.rate[m * f + c].slope;
+                let power = expansion.slope(m, c);
                 turn = turn.mul_add(h, power.mul(S::splat(fractions[m])));
                 speed = speed.mul_add(h, power);
             }
@@ -196,26 +291,27 @@ impl<S: Slots> Task for Advance<'_, S> {
     }
 }
 
-impl<S: Slots + Send> Columns for InColumns<S> {
+impl<S: Slots + Send, E: Expansion<S>> Columns for InColumns<S, E> {
     fn coordinates(&self) -> usize {
-        self.series.coordinates()
+        self.expansion.coordinates()
     }
 
     fn order(&self) -> usize {
-        self.series.order()
+        self.expansion.order()
     }
 
     fn expand_up_to(&mut self, order: usize) {
-        self.series.expand_up_to(order);
+        self.expansion.expand_up_to(order);
     }
 
     fn expand(&mut self, terms: &Terms<Number>, begin: Begin) -> Weakest {
+        self.expansion.prepare(terms, begin);
         S::perform(Expand { columns: self, terms, begin });
-        self.series.weakest()
+        self.expansion.weakest()
     }
 
     fn rate(&self, m: usize, coordinate: usize) -> Number {
-        self.series.rate[m * self.series.coordinates() + coordinate].store()
+        Number::new(self.expansion.value(m, coordinate), self.expansion.slope(m, coordinate).array())
     }
 
     fn shares(&self, u: &[Number], h: f64, shares: &mut Vec<f64>) {

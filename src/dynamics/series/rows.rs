@@ -327,6 +327,37 @@ impl<T: SeriesNumber> RowSeries<T> {
     }
 }
 
+impl RowSeries<f64> {
+    /// Borders M⁻¹, which is in the first rows and columns, with the rows: accelerations and multipliers of
+    /// a right side b and of rows that ask for c are `[[A, B], [Bᵀ, -K]]` (b, c), with K = S⁻¹, B = M⁻¹ Jᵀ K,
+    /// A = M⁻¹ - B J M⁻¹.
+    pub fn border(&self, response: &mut [f64]) {
+        let (r, f) = (self.kinds.len(), self.coordinates);
+        let size = r + f;
+        let (bodies, rows) = response.split_at_mut(f * size);
+        for (s, row) in rows.chunks_exact_mut(size).enumerate() {
+            let (b, k) = row.split_at_mut(f);
+            k.fill(0.0);
+            k[s] = 1.0;
+            tree::solve::<f64, 0>(r, &self.schur, &self.pivot, k);
+            b.fill(0.0);
+            for (k, minv_jt) in k.iter_mut().zip(self.minv_jt.chunks_exact(f)) {
+                for (b, minv_jt) in b.iter_mut().zip(minv_jt) {
+                    *b += *k * minv_jt;
+                }
+                *k = -*k;
+            }
+            for (i, body) in bodies.chunks_exact_mut(size).enumerate() {
+                body[f + s] = b[i];
+                let minv_jt = self.minv_jt[s * f + i];
+                for (a, b) in body.iter_mut().zip(b.iter()) {
+                    *a -= minv_jt * b;
+                }
+            }
+        }
+    }
+}
+
 /// Adds what the multipliers of a function below power m put on the elements as these turn to `rest`.
 #[inline(always)]
 pub fn turning_terms<T: Over<C>, C: Real>(

@@ -1,7 +1,6 @@
 //! Numbers with derivatives in the processor's registers: the arithmetic of those in memory, products fused.
 
 use super::varied::Number;
-use crate::arithmetic::eight::LANES;
 use crate::arithmetic::lanes::wide::Slots;
 use crate::arithmetic::{DoubleDouble, Over, Real, Scalar};
 use std::cmp::Ordering;
@@ -31,12 +30,6 @@ impl<S: Slots> InSlots<S> {
     #[inline(always)]
     pub fn store(self) -> Number {
         Number::new(self.value, self.slope.array())
-    }
-
-    /// Its derivatives as an array.
-    #[inline(always)]
-    pub fn slopes(self) -> [f64; LANES] {
-        self.slope.array()
     }
 
     /// f(a) where f' is known.

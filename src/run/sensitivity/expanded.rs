@@ -109,6 +109,22 @@ impl Expanded {
         })
     }
 
+    /// Writes what each number alone does to the accelerations of a motion, from entry `first` on; numbers
+    /// that do nothing have no entries.
+    pub fn force(&mut self, motion: &Motion, forcing: &mut [Vec<f64>], first: usize) {
+        let mut columns = forcing;
+        for (count, block) in &mut self.0 {
+            let (own, rest) = columns.split_at_mut(*count);
+            block.force(motion);
+            for (lane, forcing) in own.iter_mut().enumerate().filter(|(_, forcing)| !forcing.is_empty()) {
+                for c in 0..block.rest.len() {
+                    forcing[first + block.body(c)] = block.series.rate(1, c).slope[lane];
+                }
+            }
+            columns = rest;
+        }
+    }
+
     /// Calls `each` with all blocks and their columns.
     fn each(&mut self, mut columns: &mut [Vec<f64>], mut each: impl FnMut(&mut Block, &mut [Vec<f64>])) {
         for (count, block) in &mut self.0 {
@@ -218,10 +234,7 @@ impl Block {
             omega[k] = Number::new(motion.omega[k].hi, slopes(columns, n + k));
         }
         for c in 0..self.rest.len() {
-            let body = match self.coordinates {
-                Coordinates::All => c,
-                _ => self.mechanism.partition.independent[c],
-            };
+            let body = self.body(c);
             self.own[0][c] = self.all[0][body];
             self.own[1][c] = self.all[1][body];
             self.rest[c] = Number::constant(motion.phi[body].lo);
@@ -267,20 +280,33 @@ impl Block {
         (tail, enough.unwrap_or(order + 2).min(ORDER))
     }
 
+    /// The body whose angle an independent coordinate is.
+    fn body(&self, coordinate: usize) -> usize {
+        match self.coordinates {
+            Coordinates::All => coordinate,
+            _ => self.mechanism.partition.independent[coordinate],
+        }
+    }
+
+    /// Expands a motion as far as its accelerations, which every number alone moves.
+    fn force(&mut self, motion: &Motion) {
+        let order = self.series.order();
+        self.series.expand_up_to(1);
+        self.take(motion, &[]);
+        let [u, rate] = &self.own;
+        self.series.expand(&self.mechanism.terms(), (motion.time, u, &self.rest, rate));
+        self.series.expand_up_to(order);
+    }
+
     /// Accelerations of the independent coordinates of a motion, with what each number alone does to them:
     /// coordinate, value, and derivatives, lane by lane.
     fn forcing(&mut self, motion: &Motion) -> Vec<(usize, f64, Vec<f64>)> {
-        self.expand(motion, 1.0, &[]);
-        let f = self.own[0].len();
-        let body = |c: usize| match self.coordinates {
-            Coordinates::All => c,
-            _ => self.mechanism.partition.independent[c],
-        };
+        self.force(motion);
         let of = |c: usize| {
             let Number { value, slope, .. } = self.series.rate(1, c);
-            (body(c), value, slope.to_vec())
+            (self.body(c), value, slope.to_vec())
         };
-        (0..f).map(of).collect()
+        (0..self.rest.len()).map(of).collect()
     }
 
     /// Expands them beside a motion; returns the last powers in a step of `h` \[s\] over what is integrated.
@@ -292,9 +318,6 @@ impl Block {
             return NEAR_SINGULAR;
         }
         self.order = self.series.order();
-        if columns.is_empty() {
-            return 0.0;
-        }
         let (tail, enough) = self.tail(h);
         if tail > LIMIT && self.order < ORDER {
             self.series.expand_up_to(ORDER);

@@ -279,6 +279,10 @@ impl Variation {
             if let Some(dissipation) = &mut self.dissipation {
                 dissipation.look(&self.mechanism, motion);
             }
+            if let Some(expanded) = &mut self.expanded {
+                expanded.force(motion, &mut self.forcing, i * n);
+                continue;
+            }
             for (forcing, neighbours) in self.forcing.iter_mut().zip(&mut self.neighbours) {
                 for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
                     let weight = neighbour.weight;

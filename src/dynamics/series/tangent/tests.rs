@@ -1,0 +1,118 @@
+//! The derivatives against those of series of numbers with derivatives.
+
+use super::*;
+use crate::arithmetic::Scalar;
+use crate::arithmetic::lanes::wide::{EightLanes, Single, Task, Vectors, WideCode};
+use crate::dynamics::compile::exact::ExactMechanism;
+use crate::dynamics::series::slots::InSlots;
+use crate::dynamics::{Mechanism, Time};
+use crate::scene::Template;
+use crate::scene::exact::Watched;
+use std::sync::Arc;
+
+const ORDER: usize = 16;
+
+/// A mechanism whose constants have derivatives, and where it starts.
+fn mechanism(name: &str, numbers: &[&'static str]) -> (ExactMechanism<Number>, Vec<Number>, Vec<Number>) {
+    let path = format!("examples/scenes/{name}.json");
+    let template = Template::read(path.as_ref(), &[]).expect("a shipped scene");
+    let plain = template.scene().expect("a valid scene");
+    let structure = Arc::new(Mechanism::new(&plain).expect("a valid scene"));
+    let value = |path: &str| template.value(&template.variable(path).expect("a number")).expect("a scene");
+    let seed =
+        |(lane, &path): (usize, &&'static str)| (path, Number::unknown(value(path).expect("a value"), lane));
+    let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
+    let (scene, _) = template.exact_with(&[], &known, Watched::Changes).expect("known numbers");
+    let start = structure.start(&plain);
+    let varied = |k: usize, value: f64| {
+        Number::new(value, std::array::from_fn(|lane| libm::sin(1.0 + k as f64 + 1.7 * lane as f64)))
+    };
+    let n = structure.coordinates();
+    let phi = (0..n).map(|k| varied(k, start.unwrapped(k) + 0.02 * k as f64)).collect();
+    let omega = (0..n).map(|k| varied(n + k, 1.0 - 0.3 * k as f64)).collect();
+    (ExactMechanism::new(&scene, &structure).expect("the same mechanism"), phi, omega)
+}
+
+/// Powers of the rates both ways.
+struct Both<'a> {
+    terms: Terms<'a, Number>,
+    coordinates: Coordinates,
+    begin: Begin<'a>,
+    is_single: bool,
+}
+
+struct Expanded<'a, 'b, S: Slots>(&'a mut Tangent<S>, &'a Terms<'b, Number>, Begin<'a>);
+
+impl<S: Slots> Task for Expanded<'_, '_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn perform(self) {
+        self.0.expand(self.1, self.2);
+    }
+}
+
+impl Both<'_> {
+    fn of<S: Slots>(&self) -> [Vec<Number>; 2] {
+        let mut tangent = Tangent::<S>::new(&self.terms, self.coordinates, ORDER).expect("such a mechanism");
+        tangent.expand_values(&self.terms, self.begin);
+        S::perform(Expanded(&mut tangent, &self.terms, self.begin));
+        let f = tangent.coordinates();
+        let found = (0..(ORDER + 1) * f).map(|i| {
+            let (m, c) = (i / f, i % f);
+            Number::new(tangent.value(m, c), tangent.slope(m, c).array())
+        });
+        let mut whole = Series::<InSlots<S>>::of_terms(&self.terms, self.coordinates, ORDER);
+        let (t, u, rest, rate) = self.begin;
+        let [u, rest, rate] =
+            [u, rest, rate].map(|all| all.iter().map(InSlots::<S>::load).collect::<Vec<_>>());
+        whole.expand_terms(&self.terms, t, &u, &rest, &rate);
+        let expected = whole.rate[..(ORDER + 1) * f].iter().map(|rate| rate.store());
+        [found.collect(), expected.collect()]
+    }
+}
+
+impl WideCode for Both<'_> {
+    type Output = [Vec<Number>; 2];
+
+    fn run<W: EightLanes>(self) -> [Vec<Number>; 2] {
+        if self.is_single { self.of::<Single<W::Half>>() } else { self.of::<W>() }
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_numbers_that_have_them() {
+    let chain = ["bars.bar1.density", "bars.bar2.length", "gravity[0]"];
+    let loops = ["bars.U0.mass", "bars.C0.inertia", "gravity[1]"];
+    for (name, numbers, coordinates) in [
+        ("free", chain, Coordinates::Independent),
+        ("chain8", chain, Coordinates::Independent),
+        ("four_bars", loops, Coordinates::All),
+    ] {
+        let (mechanism, phi, omega) = mechanism(name, &numbers);
+        let rest = vec![Number::ZERO; phi.len()];
+        for is_single in [false, true] {
+            let both = Both {
+                terms: mechanism.terms(),
+                coordinates,
+                begin: (Time::default(), &phi, &rest, &omega),
+                is_single,
+            };
+            let [found, expected] = Vectors::default().run(both);
+            let f = phi.len();
+            for m in 0..=ORDER {
+                let (from, to) = (m * f, (m + 1) * f);
+                for lane in 0..8 {
+                    let of = |numbers: &[Number]| {
+                        numbers[from..to].iter().map(|number| number.slope[lane]).collect::<Vec<_>>()
+                    };
+                    let (found, expected) = (of(&found), of(&expected));
+                    let size = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+                    let apart =
+                        (found.iter().zip(&expected)).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+                    assert!(apart <= 1e-11 * size, "{name}, power {m}, lane {lane}: {apart} of {size}");
+                }
+            }
+        }
+    }
+}
