@@ -168,7 +168,11 @@ fn a_ball_is_derived_through_a_corner() {
 #[test]
 fn derivatives_of_shipped_scenes_with_switches_agree_with_differences_of_references() {
     for (name, at, paths) in [
-        ("stick_slip", 4.0, &["hinges.B.friction.static", "hinges.B.friction.kinetic", "spring.stiffness"][..]),
+        (
+            "stick_slip",
+            4.0,
+            &["hinges.B.friction.static", "hinges.B.friction.kinetic", "spring.stiffness"][..],
+        ),
         ("friction_pendulum", 1.5, &["gravity[0]", "bar1.phi", "hinges.A.friction.kinetic"]),
         ("bang_bang", 2.0, &["bar.phi", "size"]),
         ("trebuchet", 0.4, &["gravity[1]"]),

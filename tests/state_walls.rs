@@ -308,6 +308,19 @@ fn runs_end_in_the_same_bits_however_sampled() {
 
 #[test]
 fn what_has_no_meaning_is_refused_with_its_place() {
+    // A start behind a wall whose place depends on the start itself.
+    let arm = scene(
+        r#"{"name": "arm", "bars": [{"name": "arm", "mass": 1, "length": 1, "centre": [0.5, 0], "inertia": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]}],
+        "walls": [{"name": "stop", "body": "arm", "point": [1, 0], "restitution": 0.5,
+            "line": {"through": [-0.3, 0], "normal": [1, 0]}, "law": "0.1*sin(arm.phi)"}],
+        "start": {"arm": {"phi": 2.4, "omega": 0}}, "until": 1, "every": 1}"#,
+    );
+    let error = driftless::Mechanism::new(&arm).expect_err("behind").to_string();
+    assert!(
+        error.contains("wall `stop` has its point") && error.contains("behind it at the start"),
+        "{error}"
+    );
     let refused = |law: &str, more: &str| {
         let text = format!(
             r#"{{"name": "ball", "gravity": [0, -{G}], "bars": [{{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}}],

@@ -162,8 +162,10 @@ fn chosen(
     let kept = request.stabilize.unwrap_or(usual(mechanism));
     let (has_rows, is_free, n) =
         (!mechanism.constraints.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
-    let classic =
-        if has_rows && kept == Stabilization::Projection { MethodId::Dp8 } else { MethodId::Dop853 };
+    let classic = match is_free && !(has_rows && kept == Stabilization::Projection) {
+        true => MethodId::Dop853,
+        false => MethodId::Dp8,
+    };
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
     let is_expanded = mechanism.recursion.is_some() && is_kept && mechanism.has_series();
     if !mechanism.frictions.is_empty() && request.step.is_none() {

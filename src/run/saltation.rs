@@ -38,6 +38,9 @@ const SHARE: f64 = 0.05;
 /// column add up to zero.
 pub(super) type Weighted = (f64, Arc<Mechanism>);
 
+/// The neighbours of a column, by number, as they are after a jump.
+type Follow<'a> = dyn Fn(usize, &Jump) -> Result<Vec<Weighted>, String> + 'a;
+
 /// A function of a mechanism and a motion.
 type Function<'a> = &'a dyn Fn(&Arc<Mechanism>, &Motion) -> Option<Vec<f64>>;
 
@@ -56,7 +59,7 @@ pub(super) struct Passage<'a> {
     /// The parameters that events set, by number.
     pub set: &'a [usize],
     /// The neighbours of a column, by number, as they are after a jump.
-    pub follow: &'a dyn Fn(usize, &Jump) -> Result<Vec<Weighted>, String>,
+    pub follow: &'a Follow<'a>,
 }
 
 /// What came of it beside the columns.
@@ -328,9 +331,8 @@ fn strike(
         own.impact_at(contact, motion.time, &phi, &omega).map(|impact| impact.omega)
     };
     // Neighbours must meet the wall as well.
-    let approach = |motion: &Motion| {
-        Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()])
-    };
+    let approach =
+        |motion: &Motion| Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()]);
     let most = column.entries.iter().fold(late.abs(), |most, entry| most.max(entry.abs()));
     let scale = |entry: f64| if most > 0.0 { entry / most } else { 0.0 };
     let unit: Vec<f64> = column.entries.iter().map(|&entry| scale(entry)).collect();

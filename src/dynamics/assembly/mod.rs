@@ -110,6 +110,10 @@ impl Mechanism {
                 conditioning: if self.constraints.is_empty() { 1.0 } else { f64::NAN },
                 ..Assembly::default()
             };
+            // Where such a wall is, the reader of scenes does not know.
+            if self.contacts.iter().any(|contact| contact.row.aim.is_some()) {
+                self.check_start(scene)?;
+            }
             return Ok(self);
         }
         let given = |bar: usize| scene.given.get(bar).copied().unwrap_or(Given::ANGLE_AND_RATE);

@@ -161,10 +161,10 @@ impl<S: Slots> Known<S> {
     /// Those of terms, where these have nothing else.
     fn of(terms: &Terms<Number>) -> Option<Self> {
         let (tree, structure) = (terms.tree, terms.structure);
-        let has_forces = !(terms.springs.is_empty() && terms.torsions.is_empty())
-            || !(terms.actions.is_empty() && terms.forces.is_empty() && structure.frictions.is_empty());
+        let acts = [terms.springs.len(), terms.torsions.len(), terms.actions.len(), terms.forces.len()];
+        let is_forced = acts != [0; 4] || !structure.frictions.is_empty();
         let n = tree.coordinates;
-        if has_forces || tree.off_axis || !tree.is_dense() || n != tree.angles || terms.partition.driven() {
+        if is_forced || tree.off_axis || !tree.is_dense() || n != tree.angles || terms.partition.driven() {
             return None;
         }
         let mut known = Self {

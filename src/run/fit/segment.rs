@@ -74,7 +74,9 @@ pub(super) fn pass(
         && variation.mechanism.held.is_empty()
         && !variation.set.is_set.contains(&true);
     if is_part && !is_known {
-        return Err("what sticks, rests on a wall or is set by events does not go on from a place alone".into());
+        return Err(
+            "what sticks, rests on a wall or is set by events does not go on from a place alone".into()
+        );
     }
     let end = sampler.end.ok_or("the motion ends before the data")?;
     let place = [

@@ -34,7 +34,8 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
     let is_only_struck = jumps.iter().all(|jump| jump.contact.is_some());
     let is_free = |mechanism: &Mechanism| mechanism.held.is_empty() && mechanism.frictions.is_empty();
     if !(is_only_struck && is_free(mechanism) && is_free(&last.mechanism)) {
-        let what = "several walls are met at once where a point rests, dry friction acts or an event happens, too";
+        let what =
+            "several walls are met at once where a point rests, dry friction acts or an event happens, too";
         return Err(what.into());
     }
     let mut walls: Vec<usize> =
@@ -46,8 +47,7 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
     let mut passed = Passed::default();
     let side = Side::new(moment.mechanism, moment.before);
     for (wall, gradient, approach) in moment.met(&side) {
-        let late =
-            |column: &Column| side.late(moment.mechanism, wall, (&gradient, approach), column);
+        let late = |column: &Column| side.late(moment.mechanism, wall, (&gradient, approach), column);
         passed.walls.push((wall, columns.iter().map(late).collect()));
     }
     for column in columns {

@@ -113,7 +113,11 @@ impl Tangent {
     ///
     /// # Errors
     /// There are no laws with such values.
-    pub(super) fn neighbours_at(&self, mechanism: &Mechanism, given: &[f64]) -> Result<Vec<Weighted>, String> {
+    pub(super) fn neighbours_at(
+        &self,
+        mechanism: &Mechanism,
+        given: &[f64],
+    ) -> Result<Vec<Weighted>, String> {
         let mut found = Vec::new();
         for (&number, &change) in self.set.iter().zip(given).filter(|(_, change)| **change != 0.0) {
             let (half, sides) = on_both_sides(mechanism, number).ok_or(NO_LAWS)?;
