@@ -14,52 +14,19 @@
 //! numbers.  Everything new of an order is found at once, by one matrix of M_0 and the constraints.  Mechanisms
 //! with anything else in them are expanded on such numbers.
 
+mod known;
+mod pair;
+
+use self::known::{Gradient, Known};
 use super::columns::Begin;
 use super::varied::Number;
 use super::{Series, Terms, zeros};
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::wide::Slots;
 use crate::dynamics::Coordinates;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::partition::DependentAngle;
 use crate::dynamics::schur::Weakest;
-use crate::dynamics::tree::{self, Tree};
-
-/// An entry of H.
-#[derive(Clone, Copy, Debug)]
-struct Coupling<S> {
-    column: usize,
-    value: f64,
-    slope: S,
-}
-
-/// Entries of H, row by row, and where rows begin and end.
-#[derive(Debug)]
-struct Couplings<S> {
-    entries: Vec<Coupling<S>>,
-    rows: Vec<usize>,
-}
-
-/// What a row asks of a body, g.
-#[derive(Clone, Copy, Debug)]
-struct Gradient<S> {
-    row: usize,
-    body: usize,
-    value: Complex<f64>,
-    slope: [S; 2],
-}
-
-/// The constants and their derivatives.
-#[derive(Debug)]
-struct Known<S> {
-    coupling: Couplings<S>,
-    /// Those entries that have derivatives.
-    varied: Couplings<S>,
-    /// Derivatives of d_k and of gravity, body by body.
-    diagonal: Vec<S>,
-    weight: Vec<[S; 2]>,
-    gradient: Vec<Gradient<S>>,
-}
+use crate::dynamics::tree;
 
 /// Derivatives of the powers of a motion.
 #[derive(Debug)]
@@ -89,101 +56,6 @@ pub struct Tangent<S> {
     new: Vec<S>,
     /// 1/m.
     fractions: Vec<f64>,
-}
-
-/// g of a row, where it has nothing else.
-fn gradient(row: &ConstraintEquation<Number>) -> Option<&[(usize, Complex<Number>)]> {
-    match &row.measure {
-        Measure::Place(place) if place.bilinear.is_empty() && row.law.is_none() && row.aim.is_none() => {
-            Some(&place.linear)
-        }
-        _ => None,
-    }
-}
-
-impl<S: Slots> Couplings<S> {
-    /// Those beside the diagonal that are wanted.
-    fn of(tree: &Tree<Number>, is_wanted: impl Fn(Number) -> bool) -> Self {
-        let n = tree.coordinates;
-        let (mut entries, mut rows) = (Vec::new(), vec![0]);
-        for row in 0..n {
-            for column in (0..n).filter(|&column| column != row) {
-                let entry = tree.coupling[row.min(column) * n + row.max(column)].re;
-                if is_wanted(entry) {
-                    entries.push(Coupling { column, value: entry.value, slope: S::of(&entry.slope) });
-                }
-            }
-            rows.push(entries.len());
-        }
-        Self { entries, rows }
-    }
-
-    #[inline(always)]
-    fn row(&self, row: usize) -> &[Coupling<S>] {
-        &self.entries[self.rows[row]..self.rows[row + 1]]
-    }
-
-    /// Adds H x to power m of R.
-    #[inline(always)]
-    fn add(&self, [x_re, x_im]: &[Vec<S>; 2], [re, im]: &mut [Vec<S>; 2], room: usize, m: usize) {
-        for row in 0..x_re.len() {
-            let place = row * room + m;
-            let (mut sum_re, mut sum_im) = (re[place], im[place]);
-            for entry in self.row(row) {
-                let value = S::splat(entry.value);
-                sum_re = x_re[entry.column].mul_add(value, sum_re);
-                sum_im = x_im[entry.column].mul_add(value, sum_im);
-            }
-            (re[place], im[place]) = (sum_re, sum_im);
-        }
-    }
-
-    /// Adds dH z'' likewise.
-    #[inline(always)]
-    fn add_varied(&self, curve: &[Complex<f64>], [re, im]: &mut [Vec<S>; 2], room: usize, m: usize) {
-        if self.entries.is_empty() {
-            return;
-        }
-        for row in 0..curve.len() {
-            let place = row * room + m;
-            let (mut sum_re, mut sum_im) = (re[place], im[place]);
-            for entry in self.row(row) {
-                let z = curve[entry.column];
-                sum_re = entry.slope.mul_add(S::splat(z.re), sum_re);
-                sum_im = entry.slope.mul_add(S::splat(z.im), sum_im);
-            }
-            (re[place], im[place]) = (sum_re, sum_im);
-        }
-    }
-}
-
-impl<S: Slots> Known<S> {
-    /// Those of terms, where these have nothing else.
-    fn of(terms: &Terms<Number>) -> Option<Self> {
-        let (tree, structure) = (terms.tree, terms.structure);
-        let acts = [terms.springs.len(), terms.torsions.len(), terms.actions.len(), terms.forces.len()];
-        let is_forced = acts != [0; 4] || !structure.frictions.is_empty();
-        let n = tree.coordinates;
-        if is_forced || tree.off_axis || !tree.is_dense() || n != tree.angles || terms.partition.driven() {
-            return None;
-        }
-        let mut known = Self {
-            coupling: Couplings::of(tree, |entry| entry.value != 0.0),
-            varied: Couplings::of(tree, |entry| entry != Number::constant(entry.value)),
-            diagonal: tree.diagonal.iter().map(|number| S::of(&number.slope)).collect(),
-            weight: tree.weight.iter().map(|w| [S::of(&w.re.slope), S::of(&w.im.slope)]).collect(),
-            gradient: Vec::new(),
-        };
-        for (row, equation) in terms.constraints.iter().enumerate() {
-            known.gradient.extend(gradient(equation)?.iter().map(|&(body, g)| Gradient {
-                row,
-                body,
-                value: Complex::new(g.re.value, g.im.value),
-                slope: [S::of(&g.re.slope), S::of(&g.im.slope)],
-            }));
-        }
-        Some(known)
-    }
 }
 
 impl<S: Slots> Tangent<S> {
@@ -253,19 +125,33 @@ impl<S: Slots> Tangent<S> {
         self.rate[coordinate * self.room + m]
     }
 
-    /// Expands the motion.
+    /// True of two bodies without loops, which have code of their own where it is worth it.
+    #[inline(always)]
+    fn is_pair(&self) -> bool {
+        S::UNROLLED && (self.bodies, self.rows) == (2, 0)
+    }
+
+    /// Expands the motion, but for that of a pair.
     pub fn expand_values(&mut self, terms: &Terms<Number>, (t, u, rest, rate): Begin) {
+        let is_pair = self.is_pair();
         let [own_u, own_rest, own_rate] = &mut self.begin;
         for c in 0..self.bodies {
             (own_u[c], own_rest[c], own_rate[c]) = (u[c].value, rest[c].value, rate[c].value);
         }
         let plain = terms.structure.terms();
-        self.values.expand_terms(&plain, t, own_u, own_rest, own_rate);
+        if !is_pair {
+            self.values.expand_terms(&plain, t, own_u, own_rest, own_rate);
+        }
     }
 
     /// Expands the derivatives.
     #[inline(always)]
-    pub fn expand(&mut self, terms: &Terms<Number>, (_, u, _, rate): Begin) {
+    pub fn expand(&mut self, terms: &Terms<Number>, (t, u, _, rate): Begin) {
+        if self.is_pair() {
+            let [own_u, own_rest, own_rate] = &mut self.begin;
+            self.values.begin(t, own_u, own_rest, own_rate);
+            self.values.orders_here::<2>(&terms.structure.terms(), 0);
+        }
         self.turn_over();
         self.find_along();
         self.find_response(terms);
@@ -275,8 +161,18 @@ impl<S: Slots> Tangent<S> {
             self.angle[first + 1] = rate;
             self.rate[first] = rate;
         }
+        if self.is_pair() {
+            for m in 0..self.order() {
+                self.advance_pair(m);
+            }
+            return;
+        }
         for m in 0..self.order() {
-            self.bend(m);
+            for k in 0..self.bodies {
+                let products = self.products(k, m);
+                (self.bend[0][k], self.bend[1][k], self.left[k]) = products;
+                self.curve[k] = self.curve(k, m);
+            }
             self.balance(m);
             self.solve();
             self.push(m);
@@ -309,8 +205,8 @@ impl<S: Slots> Tangent<S> {
                 let count = order - l;
                 let (re, im) = (&re[room - count..], &im[room - count..]);
                 let along = &mut along[room - order..room - l];
-                for i in 0..count {
-                    along[i] += re[i] * rest.re + im[i] * rest.im;
+                for ((along, re), im) in along.iter_mut().zip(re).zip(im) {
+                    *along += re * rest.re + im * rest.im;
                 }
             }
         }
@@ -334,42 +230,45 @@ impl<S: Slots> Tangent<S> {
         }
     }
 
-    /// z'' of order m, its derivatives without those of the new accelerations, and all products of what is
-    /// known.
+    /// z'' of order m.
     #[inline(always)]
-    fn bend(&mut self, m: usize) {
+    fn curve(&self, k: usize, m: usize) -> Complex<f64> {
+        let (place, times) = ((k + 1) * self.room - 3 - m, ((m + 1) * (m + 2)) as f64);
+        Complex::new(self.z[0][place] * times, self.z[1][place] * times)
+    }
+
+    /// Derivatives of z'' of order m without those of the new accelerations, and what products of powers that
+    /// are known leave of the equation of a body.
+    #[inline(always)]
+    fn products(&self, k: usize, m: usize) -> (S, S, S) {
         let (room, times) = (self.room, ((m + 1) * (m + 2)) as f64);
-        for k in 0..self.bodies {
-            let (first, last) = (k * room, (k + 1) * room);
-            let (re, im) = (&self.z[0][first..last], &self.z[1][first..last]);
-            // Powers m+2, m+1, … of z, powers m, m-1, … of it, and those of D.
-            let start = room - 3 - m;
-            let (high_re, high_im) = (&re[start..][..m + 2], &im[start..][..m + 2]);
-            let (low_re, low_im) = (&re[start + 2..][..m], &im[start + 2..][..m]);
-            let along = &self.along[first..last][start + 2..][..m + 1];
-            let angle = &self.angle[first..][..m + 2];
-            let (rest_re, rest_im) = (&self.rest[0][first..][..m], &self.rest[1][first..][..m]);
-            let (mut turn_re, mut turn_im) = (S::ZERO, S::ZERO);
-            let (mut pull, mut cross_re, mut cross_im) = (S::ZERO, S::ZERO, S::ZERO);
-            let mut j = 0;
-            while j < m {
-                turn_re = angle[j].mul_add(S::splat(high_re[j]), turn_re);
-                turn_im = angle[j].mul_add(S::splat(high_im[j]), turn_im);
-                pull = angle[j].mul_add(S::splat(along[j]), pull);
-                cross_re = rest_im[j].mul_add(S::splat(low_re[j]), cross_re);
-                cross_im = rest_re[j].mul_add(S::splat(low_im[j]), cross_im);
-                j += 1;
-            }
-            pull = angle[m].mul_add(S::splat(along[m]), pull);
-            turn_re = angle[m].mul_add(S::splat(high_re[m]), turn_re);
-            turn_im = angle[m].mul_add(S::splat(high_im[m]), turn_im);
-            turn_re = angle[m + 1].mul_add(S::splat(high_re[m + 1]), turn_re);
-            turn_im = angle[m + 1].mul_add(S::splat(high_im[m + 1]), turn_im);
-            self.bend[0][k] = turn_im.mul(S::splat(-times));
-            self.bend[1][k] = turn_re.mul(S::splat(times));
-            self.left[k] = cross_re.sub(cross_im).sub(pull);
-            self.curve[k] = Complex::new(high_re[0] * times, high_im[0] * times);
+        let (first, last) = (k * room, (k + 1) * room);
+        let (re, im) = (&self.z[0][first..last], &self.z[1][first..last]);
+        // Powers m+2, m+1, … of z, powers m, m-1, … of it, and those of D.
+        let start = room - 3 - m;
+        let (high_re, high_im) = (&re[start..][..m + 2], &im[start..][..m + 2]);
+        let (low_re, low_im) = (&re[start + 2..][..m], &im[start + 2..][..m]);
+        let along = &self.along[first..last][start + 2..][..m + 1];
+        let angle = &self.angle[first..][..m + 2];
+        let (rest_re, rest_im) = (&self.rest[0][first..][..m], &self.rest[1][first..][..m]);
+        let (mut turn_re, mut turn_im) = (S::ZERO, S::ZERO);
+        let (mut pull, mut cross_re, mut cross_im) = (S::ZERO, S::ZERO, S::ZERO);
+        let mut j = 0;
+        while j < m {
+            turn_re = angle[j].mul_add(S::splat(high_re[j]), turn_re);
+            turn_im = angle[j].mul_add(S::splat(high_im[j]), turn_im);
+            pull = angle[j].mul_add(S::splat(along[j]), pull);
+            cross_re = rest_im[j].mul_add(S::splat(low_re[j]), cross_re);
+            cross_im = rest_re[j].mul_add(S::splat(low_im[j]), cross_im);
+            j += 1;
         }
+        pull = angle[m].mul_add(S::splat(along[m]), pull);
+        turn_re = angle[m].mul_add(S::splat(high_re[m]), turn_re);
+        turn_im = angle[m].mul_add(S::splat(high_im[m]), turn_im);
+        turn_re = angle[m + 1].mul_add(S::splat(high_re[m + 1]), turn_re);
+        turn_im = angle[m + 1].mul_add(S::splat(high_im[m + 1]), turn_im);
+        let (bend_re, bend_im) = (turn_im.mul(S::splat(-times)), turn_re.mul(S::splat(times)));
+        (bend_re, bend_im, cross_re.sub(cross_im).sub(pull))
     }
 
     /// R without what is new, and what is left of the equations.

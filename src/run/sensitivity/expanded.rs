@@ -32,8 +32,8 @@ use std::sync::Arc;
 pub(super) const ORDER: usize = 22;
 /// The largest of the last powers in a step, over what is integrated.
 pub(super) const LIMIT: f64 = 1e-12;
-/// The same for powers that are left out in the next step.
-const ENOUGH: f64 = 1e-13;
+/// The same for the last [`SMALL`] powers: those left out in the next step are far smaller.
+const ENOUGH: f64 = 3e-12;
 /// So many such powers in a row, since powers may be missing by symmetry.
 const SMALL: usize = 4;
 /// The least power expansions end at.

@@ -1,0 +1,146 @@
+//! The constants of hinge trees and loops with their derivatives, in slots.
+
+use crate::arithmetic::Complex;
+use crate::arithmetic::lanes::wide::Slots;
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::series::Terms;
+use crate::dynamics::series::varied::Number;
+use crate::dynamics::tree::Tree;
+
+/// An entry of H.
+#[derive(Clone, Copy, Debug)]
+pub struct Coupling<S> {
+    /// Its column.
+    pub column: usize,
+    /// Its value and derivatives.
+    pub value: f64,
+    pub slope: S,
+}
+
+/// Entries of H, row by row, and where rows begin and end.
+#[derive(Debug)]
+pub struct Couplings<S> {
+    /// Row by row.
+    pub entries: Vec<Coupling<S>>,
+    rows: Vec<usize>,
+}
+
+/// What a row asks of a body, g.
+#[derive(Clone, Copy, Debug)]
+pub struct Gradient<S> {
+    /// The row and the body.
+    pub row: usize,
+    pub body: usize,
+    /// Its value and derivatives.
+    pub value: Complex<f64>,
+    pub slope: [S; 2],
+}
+
+/// The constants and their derivatives.
+#[derive(Debug)]
+pub struct Known<S> {
+    /// H beside the diagonal.
+    pub coupling: Couplings<S>,
+    /// Those entries that have derivatives.
+    pub varied: Couplings<S>,
+    /// Derivatives of d_k and of gravity, body by body.
+    pub diagonal: Vec<S>,
+    pub weight: Vec<[S; 2]>,
+    /// What rows ask of bodies.
+    pub gradient: Vec<Gradient<S>>,
+}
+
+/// g of a row, where it has nothing else.
+fn gradient(row: &ConstraintEquation<Number>) -> Option<&[(usize, Complex<Number>)]> {
+    match &row.measure {
+        Measure::Place(place) if place.bilinear.is_empty() && row.law.is_none() && row.aim.is_none() => {
+            Some(&place.linear)
+        }
+        _ => None,
+    }
+}
+
+impl<S: Slots> Couplings<S> {
+    /// Those beside the diagonal that are wanted.
+    fn of(tree: &Tree<Number>, is_wanted: impl Fn(Number) -> bool) -> Self {
+        let n = tree.coordinates;
+        let (mut entries, mut rows) = (Vec::new(), vec![0]);
+        for row in 0..n {
+            for column in (0..n).filter(|&column| column != row) {
+                let entry = tree.coupling[row.min(column) * n + row.max(column)].re;
+                if is_wanted(entry) {
+                    entries.push(Coupling { column, value: entry.value, slope: S::of(&entry.slope) });
+                }
+            }
+            rows.push(entries.len());
+        }
+        Self { entries, rows }
+    }
+
+    #[inline(always)]
+    fn row(&self, row: usize) -> &[Coupling<S>] {
+        &self.entries[self.rows[row]..self.rows[row + 1]]
+    }
+
+    /// Adds H x to power m of R.
+    #[inline(always)]
+    pub fn add(&self, [x_re, x_im]: &[Vec<S>; 2], [re, im]: &mut [Vec<S>; 2], room: usize, m: usize) {
+        for row in 0..x_re.len() {
+            let place = row * room + m;
+            let (mut sum_re, mut sum_im) = (re[place], im[place]);
+            for entry in self.row(row) {
+                let value = S::splat(entry.value);
+                sum_re = x_re[entry.column].mul_add(value, sum_re);
+                sum_im = x_im[entry.column].mul_add(value, sum_im);
+            }
+            (re[place], im[place]) = (sum_re, sum_im);
+        }
+    }
+
+    /// Adds dH z'' likewise.
+    #[inline(always)]
+    pub fn add_varied(&self, curve: &[Complex<f64>], [re, im]: &mut [Vec<S>; 2], room: usize, m: usize) {
+        if self.entries.is_empty() {
+            return;
+        }
+        for row in 0..curve.len() {
+            let place = row * room + m;
+            let (mut sum_re, mut sum_im) = (re[place], im[place]);
+            for entry in self.row(row) {
+                let z = curve[entry.column];
+                sum_re = entry.slope.mul_add(S::splat(z.re), sum_re);
+                sum_im = entry.slope.mul_add(S::splat(z.im), sum_im);
+            }
+            (re[place], im[place]) = (sum_re, sum_im);
+        }
+    }
+}
+
+impl<S: Slots> Known<S> {
+    /// Those of terms, where these have nothing else.
+    pub fn of(terms: &Terms<Number>) -> Option<Self> {
+        let (tree, structure) = (terms.tree, terms.structure);
+        let acts = [terms.springs.len(), terms.torsions.len(), terms.actions.len(), terms.forces.len()];
+        let is_forced = acts != [0; 4] || !structure.frictions.is_empty();
+        let n = tree.coordinates;
+        if is_forced || tree.off_axis || !tree.is_dense() || n != tree.angles || terms.partition.driven() {
+            return None;
+        }
+        let mut known = Self {
+            coupling: Couplings::of(tree, |entry| entry.value != 0.0),
+            varied: Couplings::of(tree, |entry| entry != Number::constant(entry.value)),
+            diagonal: tree.diagonal.iter().map(|number| S::of(&number.slope)).collect(),
+            weight: tree.weight.iter().map(|w| [S::of(&w.re.slope), S::of(&w.im.slope)]).collect(),
+            gradient: Vec::new(),
+        };
+        for (row, equation) in terms.constraints.iter().enumerate() {
+            known.gradient.extend(gradient(equation)?.iter().map(|&(body, g)| Gradient {
+                row,
+                body,
+                value: Complex::new(g.re.value, g.im.value),
+                slope: [S::of(&g.re.slope), S::of(&g.im.slope)],
+            }));
+        }
+        Some(known)
+    }
+}
