@@ -10,7 +10,7 @@ use driftless::run::{
     Flip, MethodId, Point, PointObserver, Request, Shard, Stabilization, Status, Sweep, SweepError,
     SweepTable, Vary, reference, simulate, sweep,
 };
-use driftless::scene::Template;
+use driftless::scene::{Override, Template};
 use driftless::stepping::Cause;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -100,6 +100,23 @@ fn points_in_lanes_agree_with_single_runs() {
             assert_eq!(point.constraint.is_some(), scene.starts_with("motor"));
         }
     }
+}
+
+/// Without a method named, springs are in lanes unless one of them is so stiff that a method was chosen for it.
+#[test]
+fn stiff_springs_stay_with_the_method_chosen_for_them() {
+    let sets = [&[][..], &["spring.stiffness=1e9", "spring.damping=1e5"]];
+    let request = Request { until: Some(0.1), ..Request::default() };
+    let vary: Vec<Vary> = vec!["bar2.phi=1..2:3".parse().expect("a range")];
+    let chosen = sets.map(|sets| {
+        let sets: Vec<Override> = sets.iter().map(|set| set.parse().expect("a number")).collect();
+        let template =
+            Template::read("examples/scenes/spring.json".as_ref(), &sets).expect("a shipped scene");
+        let plan = Sweep::new(&template, vary.clone(), &request).expect("a sweep");
+        assert!(points(&plan, 1).iter().all(|point| point.status == Status::Done));
+        plan.plan().method
+    });
+    assert!(chosen[0] == MethodId::Taylor && matches!(chosen[1], MethodId::Radau(_)), "{chosen:?}");
 }
 
 /// In lanes and one by one: no point changes, and errors are those against the motion in double-double.

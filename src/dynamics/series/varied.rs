@@ -1,6 +1,6 @@
 //! Series of numbers with derivatives by the numbers of a scene: all that is constant has derivatives too.
 //!
-//! Constants are [`Number`]s in memory, coefficients [`InSlots`]: their derivatives are in the processor's
+//! Constants are [`Number`]s in memory, coefficients `InSlots`: their derivatives are in the processor's
 //! registers, eight in vectors or a single one, so that an order is a chain of instructions and not of loads.
 
 use super::factors::Factored;

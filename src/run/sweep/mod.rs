@@ -162,11 +162,11 @@ impl Sweep {
             && !request.extended
             && request.stabilize.is_none_or(|kind| kind == Stabilization::Elimination)
             && Batch::takes(&mechanism);
-        if in_lanes {
-            request.method = Some(MethodId::Taylor);
-        }
         let mut plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
-        if in_lanes {
+        // Stiff scenes stay with the implicit method that was chosen.
+        if in_lanes && !matches!(plan.method, MethodId::Radau(_)) {
+            request.method = Some(MethodId::Taylor);
+            plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
             let bodies = match (mechanism.springs.is_empty(), mechanism.constraints.is_empty()) {
                 (true, true) => "free bodies",
                 (false, _) => "bodies with springs",
