@@ -310,7 +310,7 @@ fn runs_end_in_the_same_bits_however_sampled() {
 fn what_has_no_meaning_is_refused_with_its_place() {
     // A start behind a wall whose place depends on the start itself.
     let arm = scene(
-        r#"{"name": "arm", "bars": [{"name": "arm", "mass": 1, "length": 1, "centre": [0.5, 0], "inertia": 0.1}],
+        r#"{"name": "arm", "gravity": [0, -9.81], "bars": [{"name": "arm", "mass": 1, "length": 1, "centre": [0.5, 0], "inertia": 0.1}],
         "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]}],
         "walls": [{"name": "stop", "body": "arm", "point": [1, 0], "restitution": 0.5,
             "line": {"through": [-0.3, 0], "normal": [1, 0]}, "law": "0.1*sin(arm.phi)"}],
