@@ -309,26 +309,22 @@ fn striking(mechanism: &Arc<Mechanism>, held: &[usize]) -> Arc<Mechanism> {
 
 /// The rates of a column after an impact.
 fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut Column) -> Result<(), String> {
-    let held = &jump.mechanism.held;
-    strike(&striking(&jump.mechanism, held), &jump.before, contact, late, column, &|mechanism| {
-        striking(mechanism, held)
-    })
+    strike(&striking(&jump.mechanism, &jump.mechanism.held), &jump.before, contact, late, column)
 }
 
-/// The rates of a column after an impact at a motion of a mechanism, whose neighbours strike as `as_struck`.
+/// The rates of a column after an impact at a motion of a mechanism in which nothing sticks or slides.
 fn strike(
     mechanism: &Arc<Mechanism>,
     before: &Motion,
     contact: usize,
     late: f64,
     column: &mut Column,
-    as_struck: &dyn Fn(&Arc<Mechanism>) -> Arc<Mechanism>,
 ) -> Result<(), String> {
     let side = Side::resting(before);
     let rates = |of: &Arc<Mechanism>, motion: &Motion| {
         let [phi, omega] = plain(motion);
-        let own = if Arc::ptr_eq(of, mechanism) { Arc::clone(of) } else { as_struck(of) };
-        own.impact_at(contact, motion.time, &phi, &omega).map(|impact| impact.omega)
+        let impact = striking(of, &mechanism.held).impact_at(contact, motion.time, &phi, &omega);
+        impact.map(|impact| impact.omega)
     };
     // Neighbours must meet the wall as well.
     let approach =
@@ -349,10 +345,8 @@ fn strike(
 fn close_at(jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
     let held = &jump.mechanism.held;
     let closing = striking(&jump.mechanism, held);
-    let rates = |of: &Arc<Mechanism>, motion: &Motion| {
-        let own = if Arc::ptr_eq(of, &closing) { Arc::clone(of) } else { striking(of, held) };
-        plastic(&own, motion).map(|(rates, ..)| rates)
-    };
+    let rates =
+        |of: &Arc<Mechanism>, motion: &Motion| plastic(&striking(of, held), motion).map(|(rates, ..)| rates);
     change(&closing, &Side::resting(&jump.before), [late, f64::INFINITY], column, &rates)
         .ok_or_else(|| "what closes leaves neighbouring motions no rates".into())
 }

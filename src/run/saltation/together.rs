@@ -102,7 +102,7 @@ impl Moment<'_> {
             let next = met.iter().map(late).min_by(|a, b| (sign * a.1).total_cmp(&(sign * b.1)));
             let Some((wall, late)) = next else { return Ok(side.omega) };
             shift(column.entries, late, &side);
-            strike(self.mechanism, &motion, wall, late, column, &|neighbour| Arc::clone(neighbour))?;
+            strike(self.mechanism, &motion, wall, late, column)?;
             let impact = self.mechanism.impact_at(wall, motion.time, &side.phi, &side.omega);
             let rates = impact.ok_or("neighbouring motions have no way back from a wall")?.omega;
             motion.omega = rates.into_iter().map(DoubleDouble::from).collect();

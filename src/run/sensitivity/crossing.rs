@@ -1,7 +1,7 @@
 //! Columns of a variation through impacts, events and the transitions of dry friction: see
 //! [`saltation`](crate::run::saltation).
 
-use super::neighbours::{Neighbours, weighted};
+use super::neighbours::Neighbours;
 use super::variation::{Crossing, Variation};
 use crate::dynamics::Mechanism;
 use crate::run::contact::Jump;
@@ -91,12 +91,12 @@ impl Variation {
             let mut beside = self.neighbours[k].clone().unwrap_or_default();
             let off = off(jumps).unwrap_or_else(|| self.off.clone());
             beside.follow(&jump.mechanism, &off, &self.set.known())?;
-            Ok(weighted(&beside.list))
+            Ok(beside.weighted())
         };
-        let beside = |neighbours: &Option<Neighbours>| {
-            weighted(neighbours.as_ref().map_or(&[][..], |neighbours| &neighbours.list))
+        let column = |(entries, neighbours): (_, &Option<Neighbours>)| {
+            let neighbours = neighbours.as_ref().map_or_else(Vec::new, Neighbours::weighted);
+            Column { entries, neighbours }
         };
-        let column = |(entries, neighbours)| Column { entries, neighbours: beside(neighbours) };
         let entries = columns.iter_mut().map(Vec::as_mut_slice);
         let mut list: Vec<Column> = entries.zip(&self.neighbours).map(column).collect();
         let (mechanism, set) = (&self.mechanism, &self.set.numbers[..]);

@@ -1,7 +1,6 @@
 //! What is derived: outputs at a time, extremes over the run, times of flips, events and impacts.
 
 use super::super::event::SwitchFunction;
-use super::neighbours::weighted;
 use super::variation::{Variation, plain};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
@@ -145,7 +144,7 @@ pub(super) fn event_slopes(variation: &Variation, motion: &Motion, event: usize)
     let side = Side::new(&variation.mechanism, motion);
     let mut entries = variation.columns.clone();
     let column = |(entries, neighbours): (_, &Option<super::Neighbours>)| {
-        let neighbours = weighted(neighbours.as_ref().map_or(&[][..], |neighbours| &neighbours.list));
+        let neighbours = neighbours.as_ref().map_or_else(Vec::new, super::Neighbours::weighted);
         Column { entries, neighbours }
     };
     let entries = entries.iter_mut().map(Vec::as_mut_slice);

@@ -177,6 +177,11 @@ impl Neighbours {
         }
     }
 
+    /// The mechanisms with their weights.
+    pub fn weighted(&self) -> Vec<Weighted> {
+        self.list.iter().map(|neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism))).collect()
+    }
+
     /// Goes on with the parts that act, the contacts held and the branches of a mechanism, and with the values
     /// of the parameters, by number, that events have set.
     ///
@@ -202,11 +207,6 @@ impl Neighbours {
         }
         Ok(())
     }
-}
-
-/// The mechanisms with their weights.
-pub(super) fn weighted(list: &[Neighbour]) -> Vec<Weighted> {
-    list.iter().map(|neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism))).collect()
 }
 
 /// Keeps the better one, by its error and its number.

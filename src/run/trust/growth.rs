@@ -46,10 +46,7 @@ pub(super) struct Growth {
 impl Nature {
     /// Of a mechanism whose flow has begun.
     pub fn new(mechanism: &Mechanism, tangent: &Tangent) -> Self {
-        let moves = mechanism.constraints.iter().any(|row| {
-            row.law.as_ref().is_some_and(|law| !law.is_constant())
-                || row.aim.as_ref().is_some_and(|aim| aim.is_timed)
-        });
+        let moves = mechanism.constraints.iter().any(|row| row.is_motor());
         let pushes = mechanism.actions.iter().any(|action| action.law.is_some());
         // Branches that laws stay on are states as well.
         let remembers = mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.switches());
