@@ -210,3 +210,12 @@ fn what_has_no_period_says_why() {
     let period = found(&both, 0, None).expect("a search").period;
     assert!((period - 4.0 * PI / 5.0).abs() < 1e-12, "{period}");
 }
+
+#[test]
+fn starts_from_which_small_differences_explode_within_a_period_are_left() {
+    // Sixty turns of the motor of a double pendulum that is chaotic: no difference is a derivative.
+    let scene = example("motor");
+    let found = found(&scene, 3, Some(60.0)).expect("a search");
+    println!("{} of {} starts left", found.unstable, found.starts[0]);
+    assert!(found.unstable > 0 && found.unstable + found.starts[1] <= found.starts[0]);
+}

@@ -44,7 +44,7 @@ pub fn object(found: &PeriodicMotions) -> Value {
         "scene": found.scene.name,
         "degrees_of_freedom": found.degrees_of_freedom,
         "period": found.period,
-        "starts": {"tried": found.starts[0], "settled": found.starts[1]},
+        "starts": {"tried": found.starts[0], "settled": found.starts[1], "unstable": found.unstable},
         "periodic_motions": found.motions.iter().map(motion).collect::<Vec<_>>(),
         "left_out": found.left_out,
     })
@@ -113,6 +113,10 @@ pub fn text(found: &PeriodicMotions) -> String {
             "",
             "no periodic motion was found: more --starts, or a multiple of the --period, may find one",
         );
+    }
+    if found.unstable > 0 {
+        let growth = "small differences grow more than ten thousandfold within a period";
+        page.entry("", &format!("{} left: {growth}", counted(found.unstable as u64, "start", "starts")));
     }
     if !found.left_out.is_empty() {
         page.entry("left out", &found.left_out.join(", "));

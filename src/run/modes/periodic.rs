@@ -35,6 +35,9 @@ const SAME: f64 = 1e-9;
 const LOOKED_AT: [f64; 7] = [0.0, 0.13, 0.29, 0.41, 0.57, 0.73, 0.89];
 /// Half lengths of differences: in the search, and for the multipliers \[1\].
 const DIFFERENCES: [f64; 2] = [1e-5, 1e-3];
+/// Where the difference of two such neighbours comes to so much after a period, it is no derivative any more
+/// \[rad, units of length\]: chaotic motions over long periods.
+const LINEAR: f64 = 0.1;
 /// Most iterations of Newton's method from one start, and longest step \[rad, units of length\].
 const ITERATIONS: usize = 40;
 const LONGEST: f64 = 0.5;
@@ -93,6 +96,8 @@ pub struct PeriodicMotions {
     pub motions: Vec<PeriodicMotion>,
     /// How many starts the search had, and how many came to a periodic motion.
     pub starts: [usize; 2],
+    /// How many were left since small differences grow too far within a period.
+    pub unstable: usize,
     /// What of the scene has no part in this.
     pub left_out: Vec<&'static str>,
 }
@@ -127,7 +132,8 @@ pub fn periodic(
         return Err(ModesError::Driven(period));
     }
     let plan = Plan::of_series(mechanism, Tolerance { relative: TOLERANCE, absolute: TOLERANCE }, period);
-    let mut shooting = Shooting { local, whole: mechanism, plan, period, unit_rate: TAU / period };
+    let mut shooting =
+        Shooting { local, whole: mechanism, plan, period, unit_rate: TAU / period, unstable: 0 };
     let mut found: Vec<PeriodicMotion> = Vec::new();
     let mut count = [0, 0];
     let settled = shooting.settled(&first);
@@ -153,6 +159,7 @@ pub fn periodic(
         period,
         motions: found,
         starts: count,
+        unstable: shooting.unstable,
         left_out: if scene.events.is_empty() { Vec::new() } else { vec!["events"] },
     })
 }
@@ -264,6 +271,7 @@ struct Shooting<'a> {
     plan: Plan,
     period: f64,
     unit_rate: f64,
+    unstable: usize,
 }
 
 /// A state and the directions its neighbours lie in.
@@ -316,15 +324,19 @@ impl Shooting<'_> {
         Some(DVector::from_fn(2 * f, |k, _| if k < f { phi[k] } else { omega[k - f] }))
     }
 
-    /// DP at the base by central differences of a half length.
+    /// DP at the base by central differences of a half length; `None` where they are too long for that.
     fn derivative(&mut self, base: &Base, length: f64) -> Option<DMatrix<f64>> {
         let size = 2 * base.tangent.ncols();
         let mut matrix = DMatrix::zeros(size, size);
         for j in 0..size {
             let mut x = DVector::zeros(size);
             x[j] = length;
-            let column = (self.image(base, &x)? - self.image(base, &-x)?) / (2.0 * length);
-            matrix.set_column(j, &column);
+            let apart = (self.image(base, &x)? - self.image(base, &-x)?) / 2.0;
+            if apart.amax() > LINEAR {
+                self.unstable += 1;
+                return None;
+            }
+            matrix.set_column(j, &(apart / length));
         }
         Some(matrix)
     }
