@@ -291,6 +291,7 @@ impl Running {
             let (has_closed_loops, steps_made) =
                 (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
             let moved = begun.take().and_then(|begun| contact_driver.begun_elsewhere(&begun, outcome));
+            let present = Arc::clone(&contact_driver.mechanism);
             let sample = contact_driver.sample();
             // A stop before any progress leaves the state of the row before.
             if self.row == 0 || sample.t > outcome.last.t {
@@ -306,7 +307,7 @@ impl Running {
                 .or(moved)
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
-                .or_else(|| turns.lost(&outcome.plan, sample))
+                .or_else(|| turns.lost(&present, &outcome.plan, sample))
                 .or_else(|| {
                     if has_closed_loops { came_apart(&outcome.plan, &outcome.drift, sample) } else { None }
                 })

@@ -19,15 +19,14 @@ struct Angle {
     name: String,
     body: usize,
     base: Option<usize>,
-    law: Law,
     /// Whole turns off at the start.
     off: f64,
 }
 
 impl Angle {
-    /// Whole turns between the law and an angle at a time \[s\].
-    fn off(&self, t: Time, phi: impl Fn(usize) -> f64) -> f64 {
-        let (angle, _, turns) = self.law.winding(t);
+    /// Whole turns between a law and an angle at a time \[s\].
+    fn off(&self, law: &Law, t: Time, phi: impl Fn(usize) -> f64) -> f64 {
+        let (angle, _, turns) = law.winding(t);
         let given = phi(self.body) - self.base.map_or(0.0, phi);
         ((given - angle.hi) / TAU - turns).round()
     }
@@ -42,17 +41,21 @@ impl Turns {
         let rows = mechanism.constraints.iter().filter(|row| is_kept && !mechanism.may_be_off(&row.name));
         let angles = rows.filter_map(|row| {
             let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
-            let mut angle =
-                Angle { name: row.name().into(), body: *body, base: *base, law: law.clone(), off: 0.0 };
-            angle.off = angle.off(start.time, |k| start.unwrapped(k));
+            let mut angle = Angle { name: row.name().into(), body: *body, base: *base, off: 0.0 };
+            angle.off = angle.off(law, start.time, |k| start.unwrapped(k));
             Some(angle)
         });
         Self(angles.collect())
     }
 
-    /// Why the run is no success where an angle has left its law by whole turns.
-    pub fn lost(&self, plan: &Plan, sample: &Sample) -> Option<StepError> {
-        let lost = |angle: &&Angle| angle.off(Time::from(sample.t), |k| sample.phi[k]) != angle.off;
+    /// Why the run is no success where an angle has left its law by whole turns; the mechanism has its laws on
+    /// the branches that hold at the sample.
+    pub fn lost(&self, mechanism: &Mechanism, plan: &Plan, sample: &Sample) -> Option<StepError> {
+        let lost = |angle: &&Angle| {
+            let row = mechanism.constraints.iter().find(|row| row.name() == angle.name);
+            let law = row.and_then(|row| row.law.as_ref());
+            law.is_some_and(|law| angle.off(law, Time::from(sample.t), |k| sample.phi[k]) != angle.off)
+        };
         self.0.iter().find(lost).map(|angle| StepError {
             cause: Cause::BranchLost,
             method: plan.method.to_string(),
@@ -87,7 +90,7 @@ mod tests {
             let given = scene.motors[0].law.angle(t.into()).hi;
             let cause = |off: f64| {
                 let sample = Sample { t, phi: vec![given + off, 0.3], ..Sample::default() };
-                turns.lost(&plan, &sample).map(|stop| stop.cause)
+                turns.lost(&mechanism, &plan, &sample).map(|stop| stop.cause)
             };
             assert_eq!((cause(0.0), cause(1e-3)), (None, None), "{stabilize}");
             // An eliminated angle is its law.
