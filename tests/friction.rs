@@ -787,19 +787,19 @@ fn twins_stick_at_the_same_moment() {
 }
 
 /// Numbers in [0, 1) of a linear congruential generator (Knuth, MMIX).
-struct Dice(u64);
+pub struct Dice(pub u64);
 
 impl Dice {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.next()
     }
 
-    fn is(&mut self, share: f64) -> bool {
+    pub fn is(&mut self, share: f64) -> bool {
         self.next() < share
     }
 }

@@ -130,3 +130,67 @@ fn forces_that_pass_beside_zero_are_taken_however_near() {
         assert!(off[0].max(off[1]) < 2.0 * CLOSE, "{aside:e}: {off:?}");
     }
 }
+
+/// A crank that turns a slotted rocker, the only friction that of its pin in the slot: at every dead centre of the
+/// travel the pin turns back while the linkage moves on, and no friction could hold it there.  With the crank's
+/// angle q, the distance r of the pin from the rocker's pivot and the rocker's angle p(q):
+///
+/// ```text
+/// N = J_r p'' / r,   J_c q'' + J_r p'' dp/dq + mu |N| |dr/dq| sign(q') = 0,   p'' = p_q q'' + p_qq q'²
+/// ```
+#[test]
+fn a_pin_whose_travel_turns_back_does_not_stick_while_the_linkage_moves_on() {
+    let ([a, d], [crank, rocker], mu) = ([0.2, 0.5], [0.2, 0.1], 0.2);
+    let (start, omega, turns) = (0.3_f64, 9.0, 3.0);
+    let acceleration = |q: f64, square: f64| {
+        let distance = (a * a + d * d - 2.0 * a * d * q.cos()).sqrt();
+        let (p, p_q) = (a * a - a * d * q.cos(), a * d * q.sin());
+        let (square_r, square_r_q) = (distance * distance, 2.0 * a * d * q.sin());
+        let (slope, bend) = (p / square_r, (p_q * square_r - p * square_r_q) / (square_r * square_r));
+        let friction = mu * (a * d * q.sin() / distance).abs() / distance;
+        // The sign of p'' that fits itself.
+        let with = |sign: f64| {
+            let lever = rocker * (slope + sign * friction);
+            let q_2 = -lever * bend * square / (crank + lever * slope);
+            (q_2, slope * q_2 + bend * square)
+        };
+        let (q_2, p_2) = with(1.0);
+        if p_2 >= 0.0 { q_2 } else { with(-1.0).0 }
+    };
+    // d(q'²)/dq and dt/dq by the classical Runge-Kutta method, between the dead centres.
+    let (mut q, mut square, mut t) = (start, omega * omega, 0.0);
+    let end = start + turns * std::f64::consts::TAU;
+    let centres = (1..=6).map(|k| f64::from(k) * std::f64::consts::PI);
+    for to in centres.chain([end]) {
+        let steps = 100_000;
+        let h = (to - q) / f64::from(steps);
+        let from = q;
+        for k in 0..steps {
+            let at = from + f64::from(k) * h;
+            let rate = |q: f64, square: f64| [2.0 * acceleration(q, square), 1.0 / square.sqrt()];
+            let k1 = rate(at, square);
+            let k2 = rate(at + 0.5 * h, square + 0.5 * h * k1[0]);
+            let k3 = rate(at + 0.5 * h, square + 0.5 * h * k2[0]);
+            let k4 = rate(at + h, square + h * k3[0]);
+            square += h / 6.0 * (k1[0] + 2.0 * k2[0] + 2.0 * k3[0] + k4[0]);
+            t += h / 6.0 * (k1[1] + 2.0 * k2[1] + 2.0 * k3[1] + k4[1]);
+        }
+        q = to;
+    }
+    let angle = (a * start.sin()).atan2(a * start.cos() - d);
+    let text = format!(
+        r#"{{"name": "slot", "gravity": [0, 0],
+        "bars": [{{"name": "crank", "mass": 1, "centre": [0, 0], "inertia": {crank}, "length": 0.2}},
+            {{"name": "rocker", "mass": 2, "centre": [0, 0], "inertia": {rocker}, "length": 0.8}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "crank", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "ground", "point": [{d}, 0]}}, {{"body": "rocker", "point": [0, 0]}}]}}],
+        "sliders": [{{"name": "pin", "point": {{"body": "crank", "point": [{a}, 0]}},
+            "rail": {{"body": "rocker", "point": [0, 0], "direction": [1, 0]}}, "friction": {{"kinetic": {mu}}}}}],
+        "start": {{"crank": {{"phi": {start}, "omega": {omega}}}, "rocker": {{"phi": {angle}}}}}, "until": {t}, "every": {t}}}"#
+    );
+    for (name, outcome) in runs(&text) {
+        let off = [outcome.last.phi[0] - end, outcome.last.omega[0] - square.sqrt()];
+        println!("{name}: {} steps, off by {off:?}, rate {}", outcome.statistics.steps, square.sqrt());
+        assert!(off[0].abs().max(off[1].abs()) < 1e-8, "{name}: {off:?}");
+    }
+}

@@ -45,6 +45,7 @@ mod formulas_in_digits;
 mod friction;
 mod friction_impacts;
 mod friction_reversals;
+mod friction_shared;
 mod gauss;
 mod identities;
 mod impact;

@@ -19,6 +19,7 @@
 
 pub mod impact;
 pub mod modes;
+mod shared;
 pub mod simultaneous;
 
 pub use modes::{Moment, Paradox, Transition};
@@ -76,6 +77,9 @@ pub enum Mode {
     Stick(f64),
     /// It slides: the sign of the relative velocity.
     Slip(f64),
+    /// It rests since others hold it: other places, its own friction at the limit `mu0 N` against a velocity of
+    /// this sign, or motors, its own friction zero, as is the sign.
+    Strained(f64),
 }
 
 impl Mode {
@@ -83,14 +87,18 @@ impl Mode {
     pub fn word(self) -> &'static str {
         match self {
             Self::Open => "apart",
-            Self::Stick(_) => "sticks",
+            Self::Stick(_) | Self::Strained(_) => "sticks",
             Self::Slip(_) => "slides",
         }
     }
 
-    /// The sign of the relative velocity of what slides.
-    pub fn sign(self) -> Option<f64> {
-        if let Self::Slip(sign) = self { Some(sign) } else { None }
+    /// tau over N of what has its friction at the limit.
+    fn coefficient(self, friction: &Friction) -> Option<f64> {
+        match self {
+            Self::Open | Self::Stick(_) => None,
+            Self::Slip(sign) => Some(sign * friction.kinetic),
+            Self::Strained(sign) => Some(sign * friction.stiction),
+        }
     }
 }
 
@@ -209,9 +217,10 @@ impl Mechanism {
         self.modes.iter().filter(|mode| matches!(mode, Mode::Stick(_))).count()
     }
 
-    /// The places that slide, with the signs of their velocities.
+    /// The places that slide, or rest with their friction at its limit, with tau over N.
     pub fn sliding(&self) -> impl Iterator<Item = (&Friction, f64)> {
-        self.frictions.iter().zip(&self.modes).filter_map(|(friction, mode)| Some((friction, mode.sign()?)))
+        let all = self.frictions.iter().zip(&self.modes);
+        all.filter_map(|(friction, mode)| Some((friction, mode.coefficient(friction)?)))
     }
 
     /// The row whose multiplier is the normal force of a place, where it is one.
@@ -332,9 +341,8 @@ impl<T: Real> Kernel<T> {
             .collect();
         let responses: Vec<Response<T>> =
             (0..sliding.len()).map(|j| self.response(mechanism, &sliding, j)).collect();
-        let places: Vec<(Normal, T)> = (sliding.iter())
-            .map(|(friction, sign)| (friction.normal, T::of(sign * friction.kinetic)))
-            .collect();
+        let places: Vec<(Normal, T)> =
+            (sliding.iter()).map(|&(friction, coefficient)| (friction.normal, T::of(coefficient))).collect();
         self.regularity = forces(&places, &start, |j, k| responses[k].normal[j], &mut self.friction);
         for (response, &tau) in responses.iter().zip(&self.friction) {
             for (load, &change) in self.load.iter_mut().zip(&response.acceleration) {
@@ -384,7 +392,7 @@ impl<T: Real> Kernel<T> {
                 let tau = match mode {
                     Mode::Open => return [T::ZERO; 2],
                     Mode::Stick(_) => stuck.next(),
-                    Mode::Slip(_) => slid.next(),
+                    Mode::Slip(_) | Mode::Strained(_) => slid.next(),
                 };
                 let force = mechanism.normal_force(friction, &self.multiplier, &carried);
                 [tau.copied().unwrap_or(T::ZERO), size(friction.normal, force).0]

@@ -1,7 +1,7 @@
 //! Dry friction in a run: when places begin and cease to stick, and what is counted of it.
 //!
 //! The event functions of the places are watched beside those of the scene: the relative velocity of what
-//! slides, and `(mu0 N)² - tau²` of what sticks.  Steps end at their zeros, and there the modes of all places
+//! slides, or is held by others, and `(mu0 N)² - tau²` of what sticks.  Steps end at their zeros, and there the modes of all places
 //! are found anew, see [`modes`](crate::dynamics::friction::modes).
 
 use super::contact::ContactDriver;
@@ -19,6 +19,9 @@ use std::sync::Arc;
 
 /// Transitions kept by name; the rest are counted.
 const KEPT: usize = 1000;
+/// Velocity over the sum of the magnitudes of its parts and the mechanism's own up to which what others hold
+/// rests: they may begin to move it.
+const AT_REST: f64 = 1e-11;
 /// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
 const REGULAR: f64 = 0.3;
 
@@ -72,15 +75,27 @@ impl FrictionWatch {
     fn sliding(&self, t: Time, phi: &[f64], omega: &[f64]) -> Vec<f64> {
         let z = self.mechanism.elements(phi);
         let (at, mut row) = (Posture { phi, z: &z, omega }, vec![0.0; phi.len()]);
-        let of_place = |(friction, mode): (&Friction, &Mode)| match mode {
+        let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
             Mode::Slip(sign) => {
                 row.fill(0.0);
                 friction.tangent.differentiate(t, at, &mut row);
                 sign * dot(&row, omega)
             }
+            Mode::Strained(0.0) => {
+                row.fill(0.0);
+                friction.tangent.differentiate(t, at, &mut row);
+                self.rest(number, &row, omega)
+            }
             _ => 1.0,
         };
-        self.mechanism.frictions.iter().zip(&self.mechanism.modes).map(of_place).collect()
+        self.mechanism.frictions.iter().zip(&self.mechanism.modes).enumerate().map(of_place).collect()
+    }
+
+    /// Positive as long as a place that motors hold rests.
+    fn rest(&self, place: usize, row: &[f64], omega: &[f64]) -> f64 {
+        let parts: f64 = row.iter().zip(omega).map(|(d, omega)| (d * omega).abs()).sum();
+        AT_REST * parts.max(self.mechanism.displacement_unit(place) / self.mechanism.units.time)
+            - dot(row, omega).abs()
     }
 
     /// Their values at a motion: positive as long as the modes hold.
@@ -110,6 +125,10 @@ impl FrictionWatch {
         let mut rows = kernel.friction_rows.chunks_exact(n);
         let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
             Mode::Open => 1.0,
+            Mode::Strained(strain) => {
+                let row = rows.next().filter(|_| *strain == 0.0);
+                row.map_or(1.0, |row| self.rest(number, row, &omega))
+            }
             Mode::Slip(sign) => sign * rows.next().map_or(0.0, |row| dot(row, &omega)),
             Mode::Stick(_) => {
                 let [tau, pressing] = forces[number];
@@ -136,6 +155,8 @@ impl FrictionWatch {
                 let sign = if forces[function][0] < 0.0 { -1.0 } else { 1.0 };
                 Transition { arrived: None, breaks: Some((function, sign)) }
             }
+            // It moves already.
+            Mode::Strained(_) => Transition::default(),
             _ => Transition { arrived: Some(function), breaks: None },
         })
     }

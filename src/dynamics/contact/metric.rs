@@ -52,7 +52,7 @@ impl Metric {
         let lower = mass.cholesky()?.unpack();
         let at = Posture { phi, z: &kernel.z, omega };
         let rows: Vec<Gradient> = mechanism.constraints.iter().map(|row| Gradient::of(row, t, at)).collect();
-        let counting = new_rows(mechanism, &rows);
+        let counting = new_rows(mechanism, &mechanism.constraints.iter().zip(&rows).collect::<Vec<_>>());
         let mut metric = Self { lower, scale, load: kernel.load, rows, counting, basis: Basis::new(n) };
         let counting = std::mem::take(&mut metric.counting);
         metric.counting = counting
@@ -86,6 +86,15 @@ impl Metric {
         &self.counting
     }
 
+    /// True where the constraints of the mechanism leave nothing of a row, by their geometry alone.
+    pub fn has(&self, mechanism: &Mechanism, row: &ConstraintEquation, gradient: &Gradient) -> bool {
+        let mut rows: Vec<(&ConstraintEquation, &Gradient)> =
+            mechanism.constraints.iter().zip(&self.rows).collect();
+        let before = new_rows(mechanism, &rows).len();
+        rows.push((row, gradient));
+        new_rows(mechanism, &rows).len() == before
+    }
+
     /// What the constraints leave of a column.
     pub fn free(&self, column: &DVector<f64>) -> DVector<f64> {
         self.basis.rest(column)
@@ -96,9 +105,14 @@ impl Metric {
         self.nearest(v, |row| row.drive)
     }
 
+    /// The acceleration that forces alone would cause.
+    pub fn unconstrained(&self) -> DVector<f64> {
+        self.column(&self.load)
+    }
+
     /// The acceleration that forces and constraints cause.
     pub fn acceleration(&self) -> DVector<f64> {
-        self.nearest(&self.column(&self.load), |row| row.convective)
+        self.nearest(&self.unconstrained(), |row| row.convective)
     }
 
     fn nearest(&self, v: &DVector<f64>, given: impl Fn(&Linearised<f64>) -> f64) -> DVector<f64> {
@@ -126,16 +140,16 @@ impl Gradient {
 
 /// The rows that say something new, those that say most first: angles in rad, lengths in sizes of the
 /// mechanism, each row over the most it could say.
-fn new_rows(mechanism: &Mechanism, rows: &[Gradient]) -> Vec<usize> {
+fn new_rows(mechanism: &Mechanism, rows: &[(&ConstraintEquation, &Gradient)]) -> Vec<usize> {
     let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
-    let scaled = |(row, gradient): (&ConstraintEquation, &Gradient)| {
+    let scaled = |(row, gradient): &(&ConstraintEquation, &Gradient)| {
         let along = DVector::from_fn(gradient.along.len(), |k, _| {
             gradient.along[k] * if k < angles { 1.0 } else { size }
         });
         let most = along.norm().max(reach(&row.measure, size));
         along / most
     };
-    let mut left: Vec<DVector<f64>> = mechanism.constraints.iter().zip(rows).map(scaled).collect();
+    let mut left: Vec<DVector<f64>> = rows.iter().map(scaled).collect();
     let (mut found, mut basis) = (Vec::new(), Basis::new(mechanism.coordinates()));
     while found.len() < left.len() {
         let most = (0..left.len())

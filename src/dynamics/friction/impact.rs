@@ -96,10 +96,10 @@ impl Mechanism {
         let (before, z) = (metric.velocity(omega), self.elements(phi));
         let columns: Vec<DVector<f64>> = metric.rows.iter().map(|row| metric.column(&row.along)).collect();
         let mut pushes = columns.clone();
-        for (friction, sign) in self.sliding() {
+        for (friction, coefficient) in self.sliding() {
             let Normal::Contact(_) = friction.normal else { continue };
             let along = Gradient::of(&friction.tangent, t, Posture { phi, z: &z, omega }).along;
-            pushes[self.normal_row(friction)?].axpy(-sign * friction.kinetic, &metric.column(&along), 1.0);
+            pushes[self.normal_row(friction)?].axpy(-coefficient, &metric.column(&along), 1.0);
         }
         let counting = metric.counting();
         let mut impulses: Vec<f64> =

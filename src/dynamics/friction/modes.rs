@@ -3,6 +3,7 @@
 //! ```text
 //! s_j' != 0:   slides as it does
 //! s_j' = 0:    sticks,  |tau_j| <= mu0_j N_j,  or slides,  sign(s_j'') = sign(tau_j),  |tau_j| = mu_j N_j
+//!              or rests since others that stick hold it,  s_j'' = 0,  |tau_j| = mu0_j N_j
 //! wall:        open,  a_n >= 0,  or closed,  N >= 0
 //! ```
 //!
@@ -10,6 +11,7 @@
 //! that of the places that touch and do not slide, which is small, and nothing else tells a problem without a
 //! solution, or with several, from one whose solution was not found.  Among combinations that fit, those that
 //! stick most come first: with a static coefficient above the kinetic one a place at rest stays so.
+//! Places that share a degree of freedom may also be at their limits, see [`shared`](super::shared).
 //!
 //! Source: D. Stewart, *Rigid-body dynamics with friction and impact*, SIAM Review 42 (2000); of the paradox
 //! F. Génot, B. Brogliato, *New results on Painlevé paradoxes*, Eur. J. Mech. A 18 (1999).
@@ -67,6 +69,14 @@ pub struct Moment<'a> {
     pub omega: &'a [f64],
 }
 
+/// What is known of all places: their velocities, where they are pushed, and which one has just come to rest.
+#[derive(Clone, Copy)]
+struct Known<'a> {
+    rates: &'a [f64],
+    pushed: &'a [Option<f64>],
+    arrived: Option<usize>,
+}
+
 impl Mechanism {
     /// The modes at a moment, of a mechanism that is in those of `before`; `staying` are the contacts that
     /// would be held without friction, `touching` all that touch and do not move along their normals.
@@ -81,18 +91,28 @@ impl Mechanism {
         transition: Transition,
     ) -> Result<Modes, Paradox> {
         let rates = self.sliding_rates(at);
+        let pushed = self.pushed(at, before, staying, transition);
         let mut found: Option<(Modes, Vec<f64>)> = None;
         let mut looked_at = 0;
         for closed in subsets(staying, touching) {
-            let options = self.options(at, before, &rates, &closed, transition);
-            let count = options.iter().map(Vec::len).try_fold(1_usize, |all, of| all.checked_mul(of));
+            let mut options = self.options(at, before, &rates, &closed, (&pushed, transition));
             let resting = options.iter().filter(|of| of.len() > 1).count();
+            let count = |options: &[Vec<Mode>]| {
+                options.iter().map(Vec::len).try_fold(1_usize, |all, of| all.checked_mul(of))
+            };
+            let simple = options.clone();
+            self.strain(at, &closed, &pushed, &mut options);
+            if count(&options).is_none_or(|count| looked_at + count > MOST) {
+                options = simple;
+            }
+            let count = count(&options);
             looked_at += count.unwrap_or(MOST);
             if looked_at > MOST {
                 return Err(Paradox::TooMany(resting));
             }
+            let known = Known { rates: &rates, pushed: &pushed, arrived: transition.arrived };
             let fit = combinations(&options).into_iter().find_map(|modes| {
-                let load = self.fits(at, &closed, &modes, touching, (&rates, transition))?;
+                let load = self.fits(at, &closed, &modes, touching, known)?;
                 Some(((closed.clone(), modes), load))
             });
             found = match (fit, found) {
@@ -138,14 +158,13 @@ impl Mechanism {
     fn sliding_rates(&self, at: Moment) -> Vec<f64> {
         let mut row = vec![0.0; at.phi.len()];
         let posture = Posture { phi: at.phi, z: at.z, omega: at.omega };
-        (self.frictions.iter())
-            .map(|friction| {
+        (self.frictions.iter().enumerate())
+            .map(|(number, friction)| {
                 row.fill(0.0);
                 let here = friction.tangent.differentiate(at.t, posture, &mut row);
                 let rate = dot(&row, at.omega) + here.drive;
                 let parts: f64 = row.iter().zip(at.omega).map(|(d, omega)| (d * omega).abs()).sum();
-                let unit = if friction.tangent.is_angle() { 1.0 } else { self.size_of_parts() };
-                let size = parts.max(unit / self.units.time);
+                let size = parts.max(self.displacement_unit(number) / self.units.time);
                 if rate.abs() <= NO_SPEED * size { 0.0 } else { rate }
             })
             .collect()
@@ -158,7 +177,7 @@ impl Mechanism {
         before: &[Mode],
         rates: &[f64],
         closed: &[usize],
-        Transition { arrived, breaks }: Transition,
+        (pushed, Transition { arrived, .. }): (&[Option<f64>], Transition),
     ) -> Vec<Vec<Mode>> {
         let of = |(number, friction): (usize, &super::Friction)| {
             if let Normal::Contact(contact) = friction.normal
@@ -172,7 +191,7 @@ impl Mechanism {
             {
                 return vec![Mode::Open];
             }
-            if let Some((_, sign)) = breaks.filter(|(place, _)| *place == number) {
+            if let Some(sign) = pushed[number] {
                 return vec![Mode::Slip(sign)];
             }
             let rate = if arrived == Some(number) { 0.0 } else { rates[number] };
@@ -195,7 +214,7 @@ impl Mechanism {
         closed: &[usize],
         modes: &[Mode],
         touching: &[usize],
-        (rates, Transition { arrived, breaks }): (&[f64], Transition),
+        Known { rates, pushed, arrived }: Known,
     ) -> Option<Vec<f64>> {
         let mechanism = self.moving(closed, modes);
         let mut kernel = Kernel::<f64>::new(&mechanism);
@@ -230,21 +249,33 @@ impl Mechanism {
         if !touching.iter().all(leaves) {
             return None;
         }
+        let beside = |number: usize| self.room_beside(at, closed, modes, number);
         let fit = (self.frictions.iter().zip(modes).zip(forces).enumerate()).all(
             |(number, ((friction, mode), [tau, pressing]))| match mode {
                 Mode::Open => true,
                 Mode::Stick(_) => {
                     let rounding =
                         f64::EPSILON * kernel.multiplier.iter().fold(pressing, |most, x| most.max(x.abs()));
-                    tau.abs()
-                        <= friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding
+                    let is_enough = tau.abs()
+                        <= friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding;
+                    // Where the travel of a moving linkage turns back, the linkage moves it on, and no force of
+                    // friction holds it.
+                    let is_moved_on = || {
+                        let room = beside(number);
+                        room.is_held(number) && !room.is_still(number, false)
+                    };
+                    is_enough && !is_moved_on()
                 }
                 Mode::Slip(sign) => {
                     let slides = rates[number] != 0.0 && arrived != Some(number);
                     // What breaks begins with what the coefficients leave, which may be nothing.
-                    let is_pushed = breaks.is_some_and(|(place, _)| place == number);
+                    let is_pushed = pushed[number].is_some() && !beside(number).is_held(number);
                     let (speeding, size) = acceleration(&friction.tangent);
                     slides || is_pushed || sign * speeding > ROUNDING * size
+                }
+                Mode::Strained(strain) => {
+                    let room = beside(number);
+                    room.is_held(number) && room.is_still(number, *strain == 0.0)
                 }
             },
         );

@@ -93,9 +93,9 @@ impl<T: SeriesNumber> Sliding<T> {
 impl<T: SeriesNumber> FrictionSeries<T> {
     /// Room for the series of what slides; `None` where nothing does.
     pub fn new(mechanism: &Mechanism, order: usize) -> Option<Self> {
-        let place = |(friction, sign): (&Friction, f64)| Sliding {
+        let place = |(friction, coefficient): (&Friction, f64)| Sliding {
             friction: friction.clone(),
-            coefficient: T::of(sign * friction.kinetic),
+            coefficient: T::of(coefficient),
             force: Vec::with_capacity(order),
             speed: Vec::with_capacity(order),
             normal: Vec::with_capacity(order),

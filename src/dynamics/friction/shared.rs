@@ -1,0 +1,157 @@
+//! Places with friction that rest together where fewer would be enough, as those of all joints of a linkage.
+//!
+//! Rigid bodies do not tell how such places share a load: many forces tau fit.  They rest where any do, and where
+//! any do there are some at a vertex of `|tau_j| <= mu0_j N_j`: as many places stick as there are degrees of
+//! freedom to hold, and each other one is at its limit, `tau_j = ±mu0_j N_j`, a law of force like that of what
+//! slides.  As loads change, one that sticks comes to its limit.  Then it stays there and one that was at the
+//! opposite limit sticks in its place, or all slide.  What motors and locks hold needs no friction to rest, and
+//! is given none.
+//!
+//! Source: G. Strang, *Linear Algebra and Its Applications*, 3rd ed. (1988), section 8.2 (vertices).
+
+use super::super::Mechanism;
+use super::super::constraint::Posture;
+use super::super::contact::metric::{Gradient, Metric};
+use super::{Mode, Moment, Transition};
+
+/// Acceleration, over that without constraints, up to which the rest leaves a place still.
+const STILL: f64 = 1e-10;
+/// Acceleration, in the mechanism's own, below which what motors hold is as good as still: they may stop it
+/// smoothly.
+const SMOOTH: f64 = 1e-6;
+
+/// What constraints, contacts and places that stick leave to the displacements of places with friction.
+pub(super) struct Room<'a> {
+    mechanism: &'a Mechanism,
+    at: Moment<'a>,
+    rest: Mechanism,
+    metric: Option<Metric>,
+}
+
+impl<'a> Room<'a> {
+    /// With these contacts held and the places in these modes.
+    pub fn new(mechanism: &'a Mechanism, at: Moment<'a>, contacts: &[usize], modes: &[Mode]) -> Self {
+        let rest = mechanism.moving(contacts, modes);
+        let metric = Metric::at(&rest, at.t, at.phi, at.omega);
+        Self { mechanism, at, rest, metric }
+    }
+
+    /// The displacement of a place.
+    fn gradient(&self, place: usize) -> Gradient {
+        let Moment { t, phi, z, omega } = self.at;
+        Gradient::of(&self.mechanism.frictions[place].tangent, t, Posture { phi, z, omega })
+    }
+
+    /// True where nothing is left of the displacement of a place.
+    pub fn is_held(&self, place: usize) -> bool {
+        self.metric.as_ref().is_some_and(|metric| {
+            metric.has(&self.rest, &self.mechanism.frictions[place].tangent, &self.gradient(place))
+        })
+    }
+
+    /// True where a place that is held has no acceleration; of what motors hold less is asked.
+    pub fn is_still(&self, place: usize, is_driven: bool) -> bool {
+        self.metric.as_ref().is_some_and(|metric| {
+            let Gradient { row, along } = self.gradient(place);
+            let column = metric.column(&along);
+            let leaving = (column.dot(&metric.acceleration()) + row.convective).abs();
+            let size = column.norm() * metric.unconstrained().norm() + row.convective.abs();
+            let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time.powi(2);
+            leaving <= STILL * size || is_driven && leaving <= SMOOTH * own
+        })
+    }
+
+    /// How far a push at one place moves another one: positive where both move alike.
+    fn moved(&self, places: [usize; 2]) -> f64 {
+        self.metric.as_ref().map_or(0.0, |metric| {
+            let [push, moved] = places.map(|place| metric.free(&metric.column(&self.gradient(place).along)));
+            push.dot(&moved)
+        })
+    }
+}
+
+impl Mechanism {
+    /// The mechanism's own size of a relative displacement \[rad, m\].
+    pub(crate) fn displacement_unit(&self, place: usize) -> f64 {
+        if self.frictions[place].tangent.is_angle() { 1.0 } else { self.size_of_parts() }
+    }
+
+    /// What the rest leaves of a place in these modes.
+    pub(super) fn room_beside<'a>(
+        &'a self,
+        at: Moment<'a>,
+        contacts: &[usize],
+        modes: &[Mode],
+        place: usize,
+    ) -> Room<'a> {
+        let mut others = modes.to_vec();
+        others[place] = Mode::Open;
+        Room::new(self, at, contacts, &others)
+    }
+
+    /// The signs in which places are pushed to slide: the one that cannot stick any more, and those at their
+    /// limits that move on with it.
+    pub(super) fn pushed(
+        &self,
+        at: Moment,
+        before: &[Mode],
+        staying: &[usize],
+        Transition { breaks, .. }: Transition,
+    ) -> Vec<Option<f64>> {
+        let mut pushed = vec![None; self.frictions.len()];
+        let Some((place, sign)) = breaks else { return pushed };
+        pushed[place] = Some(sign);
+        let strained = before.iter().enumerate().filter_map(|(number, mode)| match mode {
+            Mode::Strained(strain) if number != place => Some((number, *strain)),
+            _ => None,
+        });
+        let strained: Vec<(usize, f64)> = strained.collect();
+        if !strained.is_empty() {
+            let room = Room::new(self, at, staying, &vec![Mode::Open; before.len()]);
+            for (number, strain) in strained {
+                if strain * sign * room.moved([place, number]) > 0.0 {
+                    pushed[number] = Some(strain);
+                }
+            }
+        }
+        pushed
+    }
+
+    /// Adds to the modes of places that rest, and that others at rest hold, those in which they are at their
+    /// limits, or without friction where motors hold them.
+    pub(super) fn strain(
+        &self,
+        at: Moment,
+        closed: &[usize],
+        pushed: &[Option<f64>],
+        options: &mut [Vec<Mode>],
+    ) {
+        let rests = |number: &usize| options[*number].len() > 1 || pushed[*number].is_some();
+        let resting: Vec<usize> = (0..options.len()).filter(rests).collect();
+        let stuck = |number: usize| Mode::Stick(self.frictions[number].displacement(at.phi, at.z));
+        let driven =
+            (!resting.is_empty()).then(|| Room::new(self, at, &[], &vec![Mode::Open; options.len()]));
+        for &place in &resting {
+            if driven.as_ref().is_some_and(|room| room.is_held(place)) {
+                options[place] = vec![Mode::Strained(0.0), Mode::Slip(1.0), Mode::Slip(-1.0)];
+            }
+        }
+        let resting: Vec<usize> =
+            resting.into_iter().filter(|&place| options[place][0] != Mode::Strained(0.0)).collect();
+        for &place in resting.iter().filter(|_| resting.len() > 1) {
+            let is_other = |number: usize| number != place && resting.contains(&number);
+            let others: Vec<Mode> = (0..options.len())
+                .map(|number| if is_other(number) { stuck(number) } else { Mode::Open })
+                .collect();
+            if !Room::new(self, at, closed, &others).is_held(place) {
+                continue;
+            }
+            let strained = match pushed[place] {
+                Some(sign) => vec![Mode::Strained(sign)],
+                None => vec![Mode::Strained(1.0), Mode::Strained(-1.0)],
+            };
+            let first = usize::from(pushed[place].is_none());
+            options[place].splice(first..first, strained);
+        }
+    }
+}
