@@ -19,6 +19,7 @@ mod known;
 mod pair;
 mod products;
 mod tree;
+mod values;
 
 use self::known::{Gradient, Known};
 use self::products::{Sums, minus_product};
@@ -54,9 +55,10 @@ pub struct Tangent<S> {
     /// z and D from the last power to the first, with zeros at both ends, body by body.
     z: [Vec<f64>; 2],
     along: Vec<f64>,
-    /// z'' and R, body by body.
+    /// z'' and R, body by body, and the loads of an order of the motion.
     curve: [Vec<f64>; 2],
     force: [Vec<f64>; 2],
+    load: Vec<f64>,
     /// Derivatives of angles, rates and R, body by body; of R first what the constants do to it.
     angle: Vec<S>,
     rate: Vec<S>,
@@ -106,6 +108,7 @@ impl<S: Slots> Tangent<S> {
             along: padded(),
             curve: [series(), series()],
             force: [series(), series()],
+            load: zeros(n),
             angle: slots(n * room),
             rate: slots(n * room),
             rest: [slots(n * room), slots(n * room)],
@@ -156,41 +159,6 @@ impl<S: Slots> Tangent<S> {
         S::UNROLLED && (self.bodies, self.rows) == (2, 0)
     }
 
-    /// Those powers of a motion that are as many as this expands.
-    #[inline(always)]
-    fn fitting<'a>(&self, known: Option<&'a MotionPowers>) -> Option<&'a MotionPowers> {
-        let n = self.bodies;
-        known.filter(|known| {
-            self.rows == 0 && known.order >= self.order() && known.z.len() == (known.order + 2) * n
-        })
-    }
-
-    /// Expands the motion where its powers are not known, but for that of a pair.
-    pub fn expand_values(
-        &mut self,
-        terms: &Terms<Number>,
-        (t, u, rest, rate): Begin,
-        known: Option<&MotionPowers>,
-    ) {
-        if let Some(known) = self.fitting(known) {
-            let (n, order) = (self.bodies, self.order());
-            let (z, rates) = ((order + 2) * n, (order + 1) * n);
-            self.values.z[..z].copy_from_slice(&known.z[..z]);
-            self.values.omega[..rates].copy_from_slice(&known.omega[..rates]);
-            self.values.rate[..rates].copy_from_slice(&known.omega[..rates]);
-            return;
-        }
-        let is_pair = self.is_pair();
-        let [own_u, own_rest, own_rate] = &mut self.begin;
-        for c in 0..self.bodies {
-            (own_u[c], own_rest[c], own_rate[c]) = (u[c].value, rest[c].value, rate[c].value);
-        }
-        let plain = terms.structure.terms();
-        if !is_pair {
-            self.values.expand_terms(&plain, t, own_u, own_rest, own_rate);
-        }
-    }
-
     /// Expands the derivatives.
     #[inline(always)]
     pub fn expand(&mut self, terms: &Terms<Number>, (t, u, _, rate): Begin, known: Option<&MotionPowers>) {
@@ -199,10 +167,15 @@ impl<S: Slots> Tangent<S> {
             self.values.begin(t, own_u, own_rest, own_rate);
             self.values.orders_here::<2>(&terms.structure.terms(), 0);
         }
-        self.turn_over();
-        self.find_force(terms);
-        self.find_along();
+        let order = self.order();
+        let first = self.fitting(known).map_or(order, |known| known.order.min(order));
+        self.turn_over(first);
+        self.find_force(terms, first);
         self.find_response(terms);
+        for m in first..order {
+            self.extend(m);
+        }
+        self.find_along();
         self.begin_rest();
         for k in 0..self.bodies {
             let (first, rate) = (k * self.room, S::of(&rate[k].slope));
@@ -238,57 +211,6 @@ impl<S: Slots> Tangent<S> {
     #[inline(always)]
     fn place(&self, k: usize) -> usize {
         (k + 1) * (self.room + 2 * BLOCK) - BLOCK - 1
-    }
-
-    /// The powers of z, from the last to the first, and those of z''.
-    #[inline(always)]
-    fn turn_over(&mut self) {
-        let (n, room, order) = (self.bodies, self.room, self.order());
-        let times = &self.times[..order];
-        for k in 0..n {
-            let last = self.place(k);
-            let [re, im] = &mut self.z;
-            let (re, im) = (&mut re[last - order - 1..=last], &mut im[last - order - 1..=last]);
-            let powers = self.values.z[k..].iter().step_by(n);
-            for ((z, re), im) in powers.zip(re.iter_mut().rev()).zip(im.iter_mut().rev()) {
-                (*re, *im) = (z.re, z.im);
-            }
-            let [curve_re, curve_im] = &mut self.curve;
-            let (curve_re, curve_im) =
-                (&mut curve_re[k * room..][..order], &mut curve_im[k * room..][..order]);
-            let (re, im) = (&re[..order], &im[..order]);
-            for m in 0..order {
-                curve_re[m] = re[order - 1 - m] * times[m];
-                curve_im[m] = im[order - 1 - m] * times[m];
-            }
-        }
-    }
-
-    /// R of the motion.
-    #[inline(always)]
-    fn find_force(&mut self, terms: &Terms<Number>) {
-        let (n, room, order) = (self.bodies, self.room, self.order());
-        let [force_re, force_im] = &mut self.force;
-        if self.rows > 0 {
-            for (m, rest) in self.values.rest[..order * n].chunks_exact(n).enumerate() {
-                for (k, rest) in rest.iter().enumerate() {
-                    (force_re[k * room + m], force_im[k * room + m]) = (rest.re, rest.im);
-                }
-            }
-            return;
-        }
-        let [curve_re, curve_im] = &self.curve;
-        for k in 0..n {
-            let (re, im) = (&mut force_re[k * room..][..order], &mut force_im[k * room..][..order]);
-            (re.fill(0.0), im.fill(0.0));
-            for entry in self.known.coupling.row(k) {
-                let first = entry.column * room;
-                add_product(re, &curve_re[first..][..order], entry.value);
-                add_product(im, &curve_im[first..][..order], entry.value);
-            }
-            let weight = terms.structure.tree.weight[k];
-            (re[0], im[0]) = (re[0] - weight.re, im[0] - weight.im);
-        }
     }
 
     /// D, from the last power to the first.

@@ -69,8 +69,10 @@ impl Both<'_> {
             [u, rest, rate].map(|all| all.iter().map(|number| number.value).collect::<Vec<_>>());
         series.expand_terms(&plain, t, &u, &rest, &rate);
         let (n, mut powers) = (series.coordinates(), MotionPowers::default());
-        powers.take((n, ORDER), |m, k| series.omega[m * n + k], |m, k| series.z[m * n + k]);
-        let (last, expected) = (powers.z.iter().rev(), series.z[..(ORDER + 2) * n].iter().rev());
+        // Two orders are left to be found.
+        let order = ORDER - 2;
+        powers.take((n, order), |m, k| series.omega[m * n + k], |m, k| series.z[m * n + k]);
+        let (last, expected) = (powers.z.iter().rev(), series.z[..(order + 2) * n].iter().rev());
         for (z, expected) in last.zip(expected).take(n) {
             assert!(
                 (z.re - expected.re).abs().max((z.im - expected.im).abs())
