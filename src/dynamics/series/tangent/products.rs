@@ -44,7 +44,7 @@ impl<S: Slots> Tangent<S> {
     /// are known leave of the equation of a body.
     #[inline(always)]
     pub fn products(&mut self, k: usize, m: usize) -> (S, S, S) {
-        let sums = if m % 2 == 0 { self.two_orders(k, m) } else { self.completed(k, m) };
+        let sums = if m.is_multiple_of(2) { self.two_orders(k, m) } else { self.completed(k, m) };
         let times = self.times[m];
         let bend = (sums.turn_im.mul(S::splat(-times)), sums.turn_re.mul(S::splat(times)));
         (bend.0, bend.1, sums.cross_re.sub(sums.cross_im).sub(sums.pull))

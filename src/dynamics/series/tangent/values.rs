@@ -79,7 +79,8 @@ impl<S: Slots> Tangent<S> {
         let [curve_re, curve_im] = &self.curve;
         for k in 0..n {
             let (re, im) = (&mut force_re[k * room..][..order], &mut force_im[k * room..][..order]);
-            (re.fill(0.0), im.fill(0.0));
+            re.fill(0.0);
+            im.fill(0.0);
             for entry in self.known.coupling.row(k) {
                 let first = entry.column * room;
                 add_product(re, &curve_re[first..][..order], entry.value);
