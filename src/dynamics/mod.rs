@@ -108,6 +108,7 @@ pub mod units;
 pub use compile::{CompileError, Mechanism};
 pub use configuration::Configuration;
 pub use points::Points;
+pub use series::columns::MotionPowers;
 pub use stiffness::Stiffness;
 pub use units::Units;
 

@@ -9,7 +9,7 @@ use super::monitor::Monitor;
 use super::shrink::SpringGuard;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
-use crate::dynamics::{BodyAngles, Form, Motion, State, Time};
+use crate::dynamics::{BodyAngles, Form, Motion, MotionPowers, State, Time};
 use crate::stepping::{Integrator, Statistics, StepError};
 
 /// Turns that a state may have at most: all that doubles count.
@@ -268,19 +268,16 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
     }
 }
 
-/// How a method writes the state inside its last step.
-type Interpolate<P, M> = fn(&mut M, &mut P, &State, Time, &mut State);
-
 impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
-    /// The motion at a time in the last step.
-    fn observe(&mut self, time: Time, interpolate: Interpolate<P, M>) -> &Motion {
+    /// The motion at a time in the last step, as a method writes it.
+    fn observe(&mut self, time: Time, write: fn(&mut M, &mut P, &State, Time, &mut State)) -> &Motion {
         let Self { problem, method, state, from, inside, observed, .. } = self;
         if time >= state.time {
             problem.read(state, observed);
         } else if time <= from.time {
             problem.read(from, observed);
         } else {
-            interpolate(method, problem, from, time, inside);
+            write(method, problem, from, time, inside);
             problem.read(inside, observed);
         }
         observed
@@ -413,6 +410,10 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
         problem.read(inside, observed);
         Some(&self.observed)
     }
+
+    fn powers(&self, powers: &mut MotionPowers) -> bool {
+        self.method.powers(powers)
+    }
 }
 
 /// The loop for a problem in some form and a method, from a motion on.
@@ -422,8 +423,7 @@ pub(super) fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send 
     start: &Motion,
 ) -> Box<dyn Driver> {
     let (state, is_dense) = (problem.state(start), method.is_dense());
-    let springs = SpringGuard::new(problem.mechanism());
-    let idle = State::default;
+    let (springs, idle) = (SpringGuard::new(problem.mechanism()), State::default);
     Box::new(StepLoop {
         problem,
         method,

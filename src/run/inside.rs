@@ -3,7 +3,7 @@
 use super::event::EventDetector;
 use super::extremes::ExtremesDetector;
 use super::sample::Sample;
-use crate::dynamics::{Motion, Time};
+use crate::dynamics::{Motion, MotionPowers, Time};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 
@@ -21,6 +21,11 @@ pub(super) trait Inside {
     /// The same to the accuracy of the end of a step, where [`at`](Inside::at) is less accurate than that.
     fn landed(&mut self, _time: Time) -> Option<&Motion> {
         None
+    }
+
+    /// Writes the powers of the motion about the beginning, where the method has them.
+    fn powers(&self, _powers: &mut MotionPowers) -> bool {
+        false
     }
 }
 
@@ -48,6 +53,11 @@ impl Step<'_> {
     /// methods and `ode_solvers`.
     pub fn at(&mut self, time: f64) -> &Motion {
         self.0.at(Time::from(time))
+    }
+
+    /// Writes the powers of the motion about its beginning, where the method has them.
+    pub(super) fn powers(&self, powers: &mut MotionPowers) -> bool {
+        self.0.powers(powers)
     }
 }
 
@@ -165,6 +175,10 @@ impl Inside for Shortened<'_> {
 
     fn roughly_at(&mut self, time: Time) -> &Motion {
         self.inside.roughly_at(if time > self.end { self.end } else { time })
+    }
+
+    fn powers(&self, powers: &mut MotionPowers) -> bool {
+        self.inside.powers(powers)
     }
 }
 

@@ -35,7 +35,7 @@ pub use radau::Radau;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
-use crate::dynamics::{OdeSystem, State, Time};
+use crate::dynamics::{MotionPowers, OdeSystem, State, Time};
 
 /// Counts of one run, and the effort it is allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -238,6 +238,13 @@ pub trait Integrator<P: ?Sized> {
     /// Writes the same to the accuracy of the *end* of a step, by a step that ends there; false, and nothing
     /// written, where [`interpolate`](Integrator::interpolate) is as accurate, or no such step can be made.
     fn land(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) -> bool {
+        false
+    }
+
+    /// Writes the powers of the motion about the beginning of the last step; false, and nothing written, where
+    /// the method has none of a hinge tree.
+    #[doc(hidden)]
+    fn powers(&self, _powers: &mut MotionPowers) -> bool {
         false
     }
 

@@ -54,7 +54,7 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
 use crate::dynamics::impact::Contact;
 use crate::dynamics::series::{Coefficient, Series, powers};
-use crate::dynamics::{Coordinates, Form, Mechanism, OdeSystem, State, Time};
+use crate::dynamics::{Coordinates, Form, Mechanism, MotionPowers, OdeSystem, State, Time};
 
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
@@ -233,6 +233,10 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         }
         inside.time = time;
         inside.wrap();
+    }
+
+    fn powers(&self, powers: &mut MotionPowers) -> bool {
+        !self.by_series && self.fast.as_ref().is_some_and(|fast| fast.powers(powers))
     }
 }
 

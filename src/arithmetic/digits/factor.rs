@@ -106,8 +106,9 @@ impl<const W: usize> Factor<W> {
         let limbs = scale.limbs(0);
         self.stride = limbs + 1;
         self.limbs.resize(limbs * self.room, 0);
-        self.sums.clear();
+        // Every sum is written before it is read, but for the first.
         self.sums.resize(self.stride * (self.room + 1), 0);
+        self.sums[..self.stride].fill(0);
     }
 
     /// Takes the next power.

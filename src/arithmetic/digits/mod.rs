@@ -231,15 +231,20 @@ impl<const W: usize> Digits<W> {
         let count = limbs + 1;
         let top = count.min(W);
         found[1..=top].copy_from_slice(&large.limb[..top]);
-        if apart < count {
+        let is_sum = a.is_negative() == b_negative;
+        if ROOM <= FEW {
+            // All limbs, with no branch that depends on where the smaller one begins.
+            let mut below = [0; ROOM];
+            for (i, limb) in below[1..].iter_mut().enumerate() {
+                *limb = i.checked_sub(apart).and_then(|i| small.limb.get(i)).copied().unwrap_or(0);
+            }
+            let _ = if is_sum { plus(&mut found, &below) } else { minus(&mut found, &below) };
+        } else if apart < count {
             let (place, digits) = (&mut found[1 + apart..=count], &small.limb[..(count - apart).min(W)]);
-            let carry = if a.is_negative() == b_negative {
-                plus(&mut place[..digits.len()], digits)
-            } else {
-                minus(&mut place[..digits.len()], digits)
-            };
+            let place = &mut place[..digits.len()];
+            let carry = if is_sum { plus(place, digits) } else { minus(place, digits) };
             if carry {
-                match a.is_negative() == b_negative {
+                match is_sum {
                     true => ripple_up(&mut found[..=apart]),
                     false => ripple_down(&mut found[..=apart]),
                 }

@@ -6,9 +6,9 @@ use super::slots::InSlots;
 use super::tangent::Tangent;
 use super::varied::Number;
 use super::{Series, Terms};
-use crate::arithmetic::Scalar;
 use crate::arithmetic::eight::LANES;
 use crate::arithmetic::lanes::wide::{EightLanes, Single, Slots, Task, Vectors, WideCode};
+use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Coordinates, Time};
 use std::fmt::Debug;
@@ -19,6 +19,49 @@ pub const LEADING: usize = 4;
 
 /// Where a motion begins: the time, coordinates (leading part and rest) and rates.
 pub type Begin<'a> = (Time, &'a [Number], &'a [Number], &'a [Number]);
+
+/// Powers of the motion of a hinge tree, as its own step found them.
+#[derive(Clone, Debug, Default)]
+pub struct MotionPowers {
+    /// Highest power P of the rates.
+    pub order: usize,
+    /// Unit vectors: powers 0…P+1, body by body ((P+2) × n) \[1/s^m\].
+    pub z: Vec<Complex<f64>>,
+    /// Rates: powers 0…P, body by body ((P+1) × n) \[rad/s^(m+1)\].
+    pub omega: Vec<f64>,
+}
+
+impl MotionPowers {
+    /// Takes the powers of `n` bodies up to `order`: rates, and unit vectors, whose last power follows from
+    /// those before.
+    pub fn take(
+        &mut self,
+        (n, order): (usize, usize),
+        rate: impl Fn(usize, usize) -> f64,
+        unit: impl Fn(usize, usize) -> Complex<f64>,
+    ) {
+        self.order = order;
+        self.omega.resize((order + 1) * n, 0.0);
+        self.z.resize((order + 2) * n, Complex::ZERO);
+        let (z, last) = self.z.split_at_mut((order + 1) * n);
+        let powers = z.chunks_exact_mut(n.max(1)).zip(self.omega.chunks_exact_mut(n.max(1)));
+        for (m, (z, rates)) in powers.enumerate() {
+            for (k, (z, own)) in z.iter_mut().zip(rates).enumerate() {
+                (*z, *own) = (unit(m, k), rate(m, k));
+            }
+        }
+        last.fill(Complex::ZERO);
+        let rates = self.omega.chunks_exact(n.max(1));
+        for (z, rates) in z.chunks_exact(n.max(1)).rev().zip(rates) {
+            for ((sum, z), rate) in last.iter_mut().zip(z).zip(rates) {
+                *sum += z.times(*rate);
+            }
+        }
+        for z in last {
+            *z = z.left().times(1.0 / (order + 1) as f64);
+        }
+    }
+}
 
 /// Powers of the rates with their derivatives.
 pub trait Columns: Debug + Send {
@@ -31,8 +74,9 @@ pub trait Columns: Debug + Send {
     /// Expands up to another power from here on, at most the one there is room for.
     fn expand_up_to(&mut self, order: usize);
 
-    /// Expands a motion; returns the row nearest to being left out at its start.
-    fn expand(&mut self, terms: &Terms<Number>, begin: Begin) -> Weakest;
+    /// Expands a motion, whose own powers may be known; returns the row nearest to being left out at its
+    /// start.
+    fn expand(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>) -> Weakest;
 
     /// Power `m` of the rate of a coordinate.
     fn rate(&self, m: usize, coordinate: usize) -> Number;
@@ -90,8 +134,8 @@ trait Expansion<S: Slots>: Debug + Send {
     fn order(&self) -> usize;
     fn expand_up_to(&mut self, order: usize);
     /// What of it is not compiled for the slots.
-    fn prepare(&mut self, terms: &Terms<Number>, begin: Begin);
-    fn expand(&mut self, terms: &Terms<Number>, begin: Begin);
+    fn prepare(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>);
+    fn expand(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>);
     fn weakest(&self) -> Weakest;
     /// Power `m` of a rate, and its derivatives.
     fn value(&self, m: usize, coordinate: usize) -> f64;
@@ -119,10 +163,15 @@ impl<S: Slots + Send> Expansion<S> for Whole<S> {
         self.series.expand_up_to(order);
     }
 
-    fn prepare(&mut self, _terms: &Terms<Number>, _begin: Begin) {}
+    fn prepare(&mut self, _terms: &Terms<Number>, _begin: Begin, _known: Option<&MotionPowers>) {}
 
     #[inline(always)]
-    fn expand(&mut self, terms: &Terms<Number>, (t, from_u, from_rest, from_rate): Begin) {
+    fn expand(
+        &mut self,
+        terms: &Terms<Number>,
+        (t, from_u, from_rest, from_rate): Begin,
+        _known: Option<&MotionPowers>,
+    ) {
         let Self { series, begin: [u, rest, rate] } = self;
         for c in 0..u.len() {
             u[c] = InSlots::load(&from_u[c]);
@@ -159,13 +208,13 @@ impl<S: Slots + Send> Expansion<S> for Tangent<S> {
         self.expand_up_to(order);
     }
 
-    fn prepare(&mut self, terms: &Terms<Number>, begin: Begin) {
-        self.expand_values(terms, begin);
+    fn prepare(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>) {
+        self.expand_values(terms, begin, known);
     }
 
     #[inline(always)]
-    fn expand(&mut self, terms: &Terms<Number>, begin: Begin) {
-        self.expand(terms, begin);
+    fn expand(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>) {
+        self.expand(terms, begin, known);
     }
 
     fn weakest(&self) -> Weakest {
@@ -194,6 +243,7 @@ struct Expand<'a, 'b, S, E> {
     columns: &'a mut InColumns<S, E>,
     terms: &'a Terms<'b, Number>,
     begin: Begin<'a>,
+    known: Option<&'a MotionPowers>,
 }
 
 impl<S: Slots, E: Expansion<S>> Task for Expand<'_, '_, S, E> {
@@ -201,7 +251,7 @@ impl<S: Slots, E: Expansion<S>> Task for Expand<'_, '_, S, E> {
 
     #[inline(always)]
     fn perform(self) {
-        self.columns.expansion.expand(self.terms, self.begin);
+        self.columns.expansion.expand(self.terms, self.begin, self.known);
     }
 }
 
@@ -304,9 +354,9 @@ impl<S: Slots + Send, E: Expansion<S>> Columns for InColumns<S, E> {
         self.expansion.expand_up_to(order);
     }
 
-    fn expand(&mut self, terms: &Terms<Number>, begin: Begin) -> Weakest {
-        self.expansion.prepare(terms, begin);
-        S::perform(Expand { columns: self, terms, begin });
+    fn expand(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>) -> Weakest {
+        self.expansion.prepare(terms, begin, known);
+        S::perform(Expand { columns: self, terms, begin, known });
         self.expansion.weakest()
     }
 

@@ -9,16 +9,21 @@
 //! Re(conj(g) z'') = 0:   Re(conj(g) dz''_m) + Re(conj(dg) z''_m) = 0
 //! ```
 //!
-//! The motion is expanded first, in plain doubles; what is left for the derivatives are five products with
-//! known numbers where a recurrence on [numbers with derivatives](super::slots) has eight, and four of
-//! numbers.  Everything new of an order is found at once, by one matrix of M_0 and the constraints.  Mechanisms
-//! with anything else in them are expanded on such numbers.
+//! The motion is expanded first, in plain doubles, or its powers are those of its own step; what is left for
+//! the derivatives are five products with known numbers where a recurrence on
+//! [numbers with derivatives](super::slots) has eight, and four of numbers.  Two orders are summed at once, so
+//! that a coefficient is loaded for both.  Everything new of an order is found at once, by one matrix of M_0
+//! and the constraints.  Mechanisms with anything else in them are expanded on such numbers.
 
 mod known;
 mod pair;
+mod products;
+mod tree;
+mod values;
 
 use self::known::{Gradient, Known};
-use super::columns::Begin;
+use self::products::{Sums, minus_product};
+use super::columns::{Begin, MotionPowers};
 use super::varied::Number;
 use super::{Series, Terms, zeros};
 use crate::arithmetic::Complex;
@@ -26,7 +31,10 @@ use crate::arithmetic::lanes::wide::Slots;
 use crate::dynamics::Coordinates;
 use crate::dynamics::partition::DependentAngle;
 use crate::dynamics::schur::Weakest;
-use crate::dynamics::tree;
+use crate::dynamics::tree as hinge_tree;
+
+/// Powers that are summed at once, and room for zeros before the first and after the last.
+const BLOCK: usize = 8;
 
 /// Derivatives of the powers of a motion.
 #[derive(Debug)]
@@ -42,20 +50,30 @@ pub struct Tangent<S> {
     mass: Vec<f64>,
     pivot: Vec<f64>,
     response: Vec<f64>,
-    /// z and D from the last power to the first, body by body.
+    /// The matrix of an order of a tree: of what is left, and of both components of z'' so far.
+    whole_response: Vec<f64>,
+    /// z and D from the last power to the first, with zeros at both ends, body by body.
     z: [Vec<f64>; 2],
     along: Vec<f64>,
-    /// Derivatives of angles, rates and R, body by body.
+    /// z'' and R, body by body, and the loads of an order of the motion.
+    curve: [Vec<f64>; 2],
+    force: [Vec<f64>; 2],
+    load: Vec<f64>,
+    /// Derivatives of angles, rates and R, body by body; of R first what the constants do to it.
     angle: Vec<S>,
     rate: Vec<S>,
     rest: [Vec<S>; 2],
-    /// Of one order: z'' and its derivatives so far, what is left of the equations, and what is new.
-    curve: Vec<Complex<f64>>,
-    bend: [Vec<S>; 2],
+    /// Sums of the next order on their way.
+    ahead: Vec<Sums<S>>,
+    /// Of one order: what is left of the equations, the derivatives of z'' so far, and what is new.
     left: Vec<S>,
+    bend: [Vec<S>; 2],
     new: Vec<S>,
-    /// 1/m.
+    /// What is left and z'', one after the other.
+    input: Vec<S>,
+    /// 1/m, and (m+1)(m+2).
     fractions: Vec<f64>,
+    times: Vec<f64>,
 }
 
 impl<S: Slots> Tangent<S> {
@@ -69,8 +87,12 @@ impl<S: Slots> Tangent<S> {
         if !is_plain || (r > 0 && values.bodywise.is_some()) {
             return None;
         }
-        let (room, size) = (order + 3, n + r);
+        // Blocks of four powers may end beyond the last.
+        let (room, size) = (order + 4, n + r);
         let slots = |count: usize| vec![S::ZERO; count];
+        let series = || zeros(n * room);
+        let padded = || zeros(n * (room + 2 * BLOCK));
+        let is_dense = r == 0 && known.coupling.is_dense();
         Some(Self {
             values,
             begin: [zeros(n), zeros(n), zeros(n)],
@@ -81,16 +103,22 @@ impl<S: Slots> Tangent<S> {
             mass: zeros(n * n),
             pivot: zeros(n),
             response: zeros(size * size),
-            z: [zeros(n * room), zeros(n * room)],
-            along: zeros(n * room),
+            whole_response: zeros(if is_dense { 3 * n * n } else { 0 }),
+            z: [padded(), padded()],
+            along: padded(),
+            curve: [series(), series()],
+            force: [series(), series()],
+            load: zeros(n),
             angle: slots(n * room),
             rate: slots(n * room),
             rest: [slots(n * room), slots(n * room)],
-            curve: vec![Complex::ZERO; n],
-            bend: [slots(n), slots(n)],
+            ahead: vec![Sums::ZERO; n],
             left: slots(size),
+            bend: [slots(n), slots(n)],
             new: slots(size),
+            input: slots(if is_dense { 3 * n } else { 0 }),
             fractions: (0..room).map(|m| 1.0 / m.max(1) as f64).collect(),
+            times: (0..room).map(|m| ((m + 1) * (m + 2)) as f64).collect(),
         })
     }
 
@@ -131,30 +159,24 @@ impl<S: Slots> Tangent<S> {
         S::UNROLLED && (self.bodies, self.rows) == (2, 0)
     }
 
-    /// Expands the motion, but for that of a pair.
-    pub fn expand_values(&mut self, terms: &Terms<Number>, (t, u, rest, rate): Begin) {
-        let is_pair = self.is_pair();
-        let [own_u, own_rest, own_rate] = &mut self.begin;
-        for c in 0..self.bodies {
-            (own_u[c], own_rest[c], own_rate[c]) = (u[c].value, rest[c].value, rate[c].value);
-        }
-        let plain = terms.structure.terms();
-        if !is_pair {
-            self.values.expand_terms(&plain, t, own_u, own_rest, own_rate);
-        }
-    }
-
     /// Expands the derivatives.
     #[inline(always)]
-    pub fn expand(&mut self, terms: &Terms<Number>, (t, u, _, rate): Begin) {
-        if self.is_pair() {
+    pub fn expand(&mut self, terms: &Terms<Number>, (t, u, _, rate): Begin, known: Option<&MotionPowers>) {
+        if self.is_pair() && self.fitting(known).is_none() {
             let [own_u, own_rest, own_rate] = &mut self.begin;
             self.values.begin(t, own_u, own_rest, own_rate);
             self.values.orders_here::<2>(&terms.structure.terms(), 0);
         }
-        self.turn_over();
-        self.find_along();
+        let order = self.order();
+        let first = self.fitting(known).map_or(order, |known| known.order.min(order));
+        self.turn_over(first);
+        self.find_force(terms, first);
         self.find_response(terms);
+        for m in first..order {
+            self.extend(m);
+        }
+        self.find_along();
+        self.begin_rest();
         for k in 0..self.bodies {
             let (first, rate) = (k * self.room, S::of(&rate[k].slope));
             self.angle[first] = S::of(&u[k].slope);
@@ -167,28 +189,28 @@ impl<S: Slots> Tangent<S> {
             }
             return;
         }
+        let is_tree = !self.whole_response.is_empty();
+        if is_tree {
+            self.find_whole_response();
+        }
         for m in 0..self.order() {
+            if is_tree {
+                self.advance_tree(m);
+                continue;
+            }
             for k in 0..self.bodies {
-                let products = self.products(k, m);
-                (self.bend[0][k], self.bend[1][k], self.left[k]) = products;
-                self.curve[k] = self.curve(k, m);
+                (self.bend[0][k], self.bend[1][k], self.left[k]) = self.products(k, m);
             }
             self.balance(m);
-            self.solve();
+            minus_product(&self.response, &self.left, &mut self.new);
             self.push(m);
         }
     }
 
-    /// The powers of z, from the last to the first.
+    /// Where power 0 of z and D of a body is; the next ones come before it.
     #[inline(always)]
-    fn turn_over(&mut self) {
-        let (n, room, powers) = (self.bodies, self.room, self.order() + 2);
-        let [re, im] = &mut self.z;
-        for (m, z) in self.values.z[..powers * n].chunks_exact(n).enumerate() {
-            for (k, z) in z.iter().enumerate() {
-                (re[(k + 1) * room - 1 - m], im[(k + 1) * room - 1 - m]) = (z.re, z.im);
-            }
-        }
+    fn place(&self, k: usize) -> usize {
+        (k + 1) * (self.room + 2 * BLOCK) - BLOCK - 1
     }
 
     /// D, from the last power to the first.
@@ -196,18 +218,27 @@ impl<S: Slots> Tangent<S> {
     fn find_along(&mut self) {
         let (n, room, order) = (self.bodies, self.room, self.order());
         for k in 0..n {
-            let (re, im) = (&self.z[0][k * room..(k + 1) * room], &self.z[1][k * room..(k + 1) * room]);
-            let along = &mut self.along[k * room..(k + 1) * room];
-            along.fill(0.0);
-            for l in 0..order {
-                let rest = self.values.rest[l * n + k];
-                // Power m = p + l is at room - 1 - m, power p of z at room - 1 - p.
-                let count = order - l;
-                let (re, im) = (&re[room - count..], &im[room - count..]);
-                let along = &mut along[room - order..room - l];
-                for ((along, re), im) in along.iter_mut().zip(re).zip(im) {
-                    *along += re * rest.re + im * rest.im;
+            let own = k * room..k * room + order;
+            let (force_re, force_im) = (&self.force[0][own.clone()], &self.force[1][own]);
+            let last = self.place(k);
+            let mut high = BLOCK;
+            while high - BLOCK < order {
+                // D_m of powers below `high`: z_{m-l} is l places behind z_m, and zeros are behind z_0.
+                let first = last + 1 - high;
+                let (mut sum, mut other) = ([0.0; BLOCK], [0.0; BLOCK]);
+                for l in 0..high.min(order) {
+                    let re = &self.z[0][first + l..first + l + BLOCK];
+                    let im = &self.z[1][first + l..first + l + BLOCK];
+                    for i in 0..BLOCK {
+                        sum[i] += re[i] * force_re[l];
+                        other[i] += im[i] * force_im[l];
+                    }
                 }
+                let along = &mut self.along[first..first + BLOCK];
+                for i in 0..BLOCK {
+                    along[i] = sum[i] + other[i];
+                }
+                high += BLOCK;
             }
         }
     }
@@ -219,74 +250,47 @@ impl<S: Slots> Tangent<S> {
         let (n, size) = (self.bodies, self.bodies + self.rows);
         let tree = &terms.structure.tree;
         tree.mass_matrix::<f64, 0>(&self.values.z[..n], &mut self.mass, &mut self.response[..n * n]);
-        tree::factor::<f64, 0>(n, &mut self.mass, &mut self.pivot);
+        hinge_tree::factor::<f64, 0>(n, &mut self.mass, &mut self.pivot);
         self.response.fill(0.0);
         for (c, row) in self.response.chunks_exact_mut(size).enumerate().take(n) {
             row[c] = 1.0;
-            tree::solve::<f64, 0>(n, &self.mass, &self.pivot, &mut row[..n]);
+            hinge_tree::solve::<f64, 0>(n, &self.mass, &self.pivot, &mut row[..n]);
         }
         if self.rows > 0 {
             self.values.rows.border(&mut self.response);
         }
     }
 
-    /// z'' of order m.
+    /// What the derivatives of the constants alone do to R.
     #[inline(always)]
-    fn curve(&self, k: usize, m: usize) -> Complex<f64> {
-        let (place, times) = ((k + 1) * self.room - 3 - m, ((m + 1) * (m + 2)) as f64);
-        Complex::new(self.z[0][place] * times, self.z[1][place] * times)
+    fn begin_rest(&mut self) {
+        let (n, room, order) = (self.bodies, self.room, self.order());
+        let [rest_re, rest_im] = &mut self.rest;
+        for k in 0..n {
+            let own = k * room..(k + 1) * room;
+            let (re, im) = (&mut rest_re[own.clone()], &mut rest_im[own]);
+            self.known.varied.products(k, &self.curve, room, order, (&mut *re, &mut *im));
+            let [weight_re, weight_im] = self.known.weight[k];
+            (re[0], im[0]) = (re[0].sub(weight_re), im[0].sub(weight_im));
+        }
     }
 
-    /// Derivatives of z'' of order m without those of the new accelerations, and what products of powers that
-    /// are known leave of the equation of a body.
+    /// An acceleration of order m.
     #[inline(always)]
-    fn products(&self, k: usize, m: usize) -> (S, S, S) {
-        let (room, times) = (self.room, ((m + 1) * (m + 2)) as f64);
-        let (first, last) = (k * room, (k + 1) * room);
-        let (re, im) = (&self.z[0][first..last], &self.z[1][first..last]);
-        // Powers m+2, m+1, … of z, powers m, m-1, … of it, and those of D.
-        let start = room - 3 - m;
-        let (high_re, high_im) = (&re[start..][..m + 2], &im[start..][..m + 2]);
-        let (low_re, low_im) = (&re[start + 2..][..m], &im[start + 2..][..m]);
-        let along = &self.along[first..last][start + 2..][..m + 1];
-        let angle = &self.angle[first..][..m + 2];
-        let (rest_re, rest_im) = (&self.rest[0][first..][..m], &self.rest[1][first..][..m]);
-        let (mut turn_re, mut turn_im) = (S::ZERO, S::ZERO);
-        let (mut pull, mut cross_re, mut cross_im) = (S::ZERO, S::ZERO, S::ZERO);
-        let mut j = 0;
-        while j < m {
-            turn_re = angle[j].mul_add(S::splat(high_re[j]), turn_re);
-            turn_im = angle[j].mul_add(S::splat(high_im[j]), turn_im);
-            pull = angle[j].mul_add(S::splat(along[j]), pull);
-            cross_re = rest_im[j].mul_add(S::splat(low_re[j]), cross_re);
-            cross_im = rest_re[j].mul_add(S::splat(low_im[j]), cross_im);
-            j += 1;
-        }
-        pull = angle[m].mul_add(S::splat(along[m]), pull);
-        turn_re = angle[m].mul_add(S::splat(high_re[m]), turn_re);
-        turn_im = angle[m].mul_add(S::splat(high_im[m]), turn_im);
-        turn_re = angle[m + 1].mul_add(S::splat(high_re[m + 1]), turn_re);
-        turn_im = angle[m + 1].mul_add(S::splat(high_im[m + 1]), turn_im);
-        let (bend_re, bend_im) = (turn_im.mul(S::splat(-times)), turn_re.mul(S::splat(times)));
-        (bend_re, bend_im, cross_re.sub(cross_im).sub(pull))
+    fn acceleration(&self, k: usize, m: usize) -> f64 {
+        self.values.omega[(m + 1) * self.bodies + k] * (m + 1) as f64
     }
 
     /// R without what is new, and what is left of the equations.
     #[inline(always)]
     fn balance(&mut self, m: usize) {
         let (n, room) = (self.bodies, self.room);
-        let [rest_re, rest_im] = &mut self.rest;
-        for k in 0..n {
-            let [re, im] = if m == 0 { self.known.weight[k] } else { [S::ZERO; 2] };
-            rest_re[k * room + m] = S::ZERO.sub(re);
-            rest_im[k * room + m] = S::ZERO.sub(im);
-        }
         self.left[n..].fill(S::ZERO);
-        self.known.varied.add_varied(&self.curve, &mut self.rest, room, m);
         let [rest_re, rest_im] = &mut self.rest;
-        let multipliers = self.values.multipliers(m);
+        let multipliers = if self.rows > 0 { self.values.multipliers(m) } else { &[] };
         for &Gradient { row, body, value, slope: [re, im] } in &self.known.gradient {
-            let (place, z) = (body * room + m, self.curve[body]);
+            let place = body * room + m;
+            let z = Complex::new(self.curve[0][place], self.curve[1][place]);
             let multiplier = S::splat(multipliers[row]);
             rest_re[place] = re.mul_add(multiplier, rest_re[place]);
             rest_im[place] = im.mul_add(multiplier, rest_im[place]);
@@ -301,39 +305,28 @@ impl<S: Slots> Tangent<S> {
             let (z, place) = (self.values.z[k], k * room + m);
             let mut left = rest_im[place].mul_add(S::splat(z.re), self.left[k]);
             left = rest_re[place].neg_mul_add(S::splat(z.im), left);
-            let acceleration = self.values.omega[(m + 1) * n + k] * (m + 1) as f64;
-            self.left[k] = self.known.diagonal[k].mul_add(S::splat(acceleration), left);
+            self.left[k] = self.known.diagonal[k].mul_add(S::splat(self.acceleration(k, m)), left);
         }
     }
 
-    /// New accelerations and multipliers.
+    /// The next powers of an angle and its rate.
     #[inline(always)]
-    fn solve(&mut self) {
-        let size = self.left.len();
-        let (left, new) = (&self.left[..size], &mut self.new[..size]);
-        for (row, response) in self.response.chunks_exact(size).enumerate() {
-            let mut sum = S::ZERO;
-            let mut c = 0;
-            while c < size {
-                sum = left[c].neg_mul_add(S::splat(response[c]), sum);
-                c += 1;
-            }
-            new[row] = sum;
-        }
+    fn push_rate(&mut self, k: usize, m: usize, new: S) {
+        let first = k * self.room;
+        let rate = new.mul(S::splat(self.fractions[m + 1]));
+        self.rate[first + m + 1] = rate;
+        self.angle[first + m + 2] = rate.mul(S::splat(self.fractions[m + 2]));
     }
 
     /// The next powers of angles and rates, and R completed.
     #[inline(always)]
     fn push(&mut self, m: usize) {
         let (n, room) = (self.bodies, self.room);
-        let [bend_re, bend_im] = &mut self.bend;
         for k in 0..n {
-            let (z, new, first) = (self.values.z[k], self.new[k], k * room);
-            let rate = new.mul(S::splat(self.fractions[m + 1]));
-            self.rate[first + m + 1] = rate;
-            self.angle[first + m + 2] = rate.mul(S::splat(self.fractions[m + 2]));
-            bend_re[k] = new.mul(S::splat(-z.im));
-            bend_im[k] = new.mul(S::splat(z.re));
+            let (z, new) = (self.values.z[k], self.new[k]);
+            self.push_rate(k, m, new);
+            self.bend[0][k] = new.mul(S::splat(-z.im));
+            self.bend[1][k] = new.mul(S::splat(z.re));
         }
         self.known.coupling.add(&self.bend, &mut self.rest, room, m);
         let [rest_re, rest_im] = &mut self.rest;
@@ -342,6 +335,14 @@ impl<S: Slots> Tangent<S> {
             rest_re[place] = multiplier.mul_add(S::splat(value.re), rest_re[place]);
             rest_im[place] = multiplier.mul_add(S::splat(value.im), rest_im[place]);
         }
+    }
+}
+
+/// Adds a multiple of a series to another.
+#[inline(always)]
+fn add_product(sum: &mut [f64], series: &[f64], factor: f64) {
+    for (sum, power) in sum.iter_mut().zip(series) {
+        *sum += power * factor;
     }
 }
 

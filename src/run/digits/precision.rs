@@ -8,6 +8,8 @@ pub const DIGITS: std::ops::RangeInclusive<usize> = 20..=2000;
 pub(super) const BITS: f64 = std::f64::consts::LOG2_10;
 /// Bits beyond the digits, for rounding and for the size of what is computed.
 const SPARE: usize = 28;
+/// The same where it saves a limb: five digits below the last.
+const LEAST_SPARE: usize = 18;
 /// Highest power of the rates a digit: it makes the work least where an order costs its square.
 const ORDER: f64 = 1.15;
 /// Powers beyond that, as part of what one costs does not grow with their number: with 20 instead of 4 runs
@@ -31,7 +33,13 @@ impl Precision {
     /// Of so many digits; `has_loops`: with as many digits more as passages near singular positions lose.
     pub fn new(digits: usize, has_loops: bool) -> Self {
         let order = (ORDER * digits as f64) as usize + LEAST_ORDER;
-        let spare = if has_loops { (0.5 * BITS * digits as f64) as usize + 96 } else { SPARE };
+        let spare = if has_loops {
+            (0.5 * BITS * digits as f64) as usize + 96
+        } else if limbs_for(digits, LEAST_SPARE) < limbs_for(digits, SPARE) {
+            LEAST_SPARE
+        } else {
+            SPARE
+        };
         let bits = libm::ceil(BITS * digits as f64) as usize + spare;
         let limbs = limbs_for(digits, spare).min(MOST - 1);
         Self { digits, order, limbs, bits: bits.min(64 * (limbs - 1)) }

@@ -21,7 +21,7 @@ use crate::arithmetic::eight::LANES;
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Constants;
-use crate::dynamics::series::columns::{Columns, LEADING, columns};
+use crate::dynamics::series::columns::{Columns, LEADING, MotionPowers, columns};
 use crate::dynamics::series::varied::Number;
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
 use crate::scene::exact::Watched;
@@ -50,7 +50,11 @@ const ROUNDING: f64 = 1e-9;
 const REST: f64 = 1e-6;
 
 /// Columns of numbers of a scene, in blocks of lanes.
-pub(super) struct Expanded(Vec<(usize, Block)>);
+pub(super) struct Expanded {
+    blocks: Vec<(usize, Block)>,
+    /// The powers of the motion's own step.
+    powers: MotionPowers,
+}
 
 impl Expanded {
     /// Of numbers at some paths of a scene, whose mechanism and derivatives of the start are these.
@@ -73,14 +77,14 @@ impl Expanded {
             blocks.push((count, Block::new(template, scene, mechanism, numbers, starts)?));
             first += count;
         }
-        Ok(Self(blocks))
+        Ok(Self { blocks, powers: MotionPowers::default() })
     }
 
     /// True where what the numbers do to the accelerations of a motion is what their neighbours say.
     pub fn agrees(&mut self, motion: &Motion, neighbours: &mut [Option<Neighbours>]) -> bool {
         let (t, phi, omega) = plain(motion);
         let mut forcing: Vec<Vec<f64>> = Vec::new();
-        let unit = self.0.first().map_or(1.0, |(_, block)| block.mechanism.structure.units.time);
+        let unit = self.blocks.first().map_or(1.0, |(_, block)| block.mechanism.structure.units.time);
         let least = REST / (unit * unit);
         let mut sizes = Vec::new();
         for neighbours in neighbours.iter_mut() {
@@ -97,7 +101,7 @@ impl Expanded {
             sizes.push(size);
         }
         let mut first = 0;
-        self.0.iter_mut().all(|(count, block)| {
+        self.blocks.iter_mut().all(|(count, block)| {
             let own = first..first + *count;
             first += *count;
             block.forcing(motion).iter().all(|(body, value, slopes)| {
@@ -113,7 +117,7 @@ impl Expanded {
     /// that do nothing have no entries.
     pub fn force(&mut self, motion: &Motion, forcing: &mut [Vec<f64>], first: usize) {
         let mut columns = forcing;
-        for (count, block) in &mut self.0 {
+        for (count, block) in &mut self.blocks {
             let (own, rest) = columns.split_at_mut(*count);
             block.force(motion);
             for (lane, forcing) in own.iter_mut().enumerate().filter(|(_, forcing)| !forcing.is_empty()) {
@@ -127,7 +131,7 @@ impl Expanded {
 
     /// Calls `each` with all blocks and their columns.
     fn each(&mut self, mut columns: &mut [Vec<f64>], mut each: impl FnMut(&mut Block, &mut [Vec<f64>])) {
-        for (count, block) in &mut self.0 {
+        for (count, block) in &mut self.blocks {
             let (own, rest) = columns.split_at_mut(*count);
             each(block, own);
             columns = rest;
@@ -137,9 +141,12 @@ impl Expanded {
     /// Takes columns from a time inside a step on by `h` \[s\]; returns the last powers over what is
     /// integrated, and leaves the columns alone where that is above [`LIMIT`].
     pub fn advance(&mut self, step: &mut Step, from: f64, h: f64, columns: &mut [Vec<f64>]) -> f64 {
+        let mut powers = std::mem::take(&mut self.powers);
+        let is_known = from == step.begin() && step.powers(&mut powers);
         let motion = step.at(from);
-        let mut most = 0.0_f64;
-        self.each(columns, |block, columns| most = larger(most, block.expand(motion, h, columns)));
+        let (mut most, known) = (0.0_f64, is_known.then_some(&powers));
+        self.each(columns, |block, columns| most = larger(most, block.expand((motion, known), h, columns)));
+        self.powers = powers;
         if most <= LIMIT {
             self.each(columns, |block, columns| block.advance(motion, h, columns));
         }
@@ -294,7 +301,7 @@ impl Block {
         self.series.expand_up_to(1);
         self.take(motion, &[]);
         let [u, rate] = &self.own;
-        self.series.expand(&self.mechanism.terms(), (motion.time, u, &self.rest, rate));
+        self.series.expand(&self.mechanism.terms(), (motion.time, u, &self.rest, rate), None);
         self.series.expand_up_to(order);
     }
 
@@ -310,10 +317,17 @@ impl Block {
     }
 
     /// Expands them beside a motion; returns the last powers in a step of `h` \[s\] over what is integrated.
-    fn expand(&mut self, motion: &Motion, h: f64, columns: &[Vec<f64>]) -> f64 {
+    /// Powers of the motion itself may be known.
+    fn expand(
+        &mut self,
+        (motion, known): (&Motion, Option<&MotionPowers>),
+        h: f64,
+        columns: &[Vec<f64>],
+    ) -> f64 {
         self.take(motion, columns);
         let [u, rate] = &self.own;
-        let weakest = self.series.expand(&self.mechanism.terms(), (motion.time, u, &self.rest, rate));
+        let begin = (motion.time, &u[..], &self.rest[..], &rate[..]);
+        let weakest = self.series.expand(&self.mechanism.terms(), begin, known);
         if weakest.share < NEAR {
             return NEAR_SINGULAR;
         }
@@ -321,7 +335,7 @@ impl Block {
         let (tail, enough) = self.tail(h);
         if tail > LIMIT && self.order < ORDER {
             self.series.expand_up_to(ORDER);
-            return self.expand(motion, h, columns);
+            return self.expand((motion, known), h, columns);
         }
         self.series.expand_up_to(enough);
         tail

@@ -24,10 +24,10 @@ use self::start::begin;
 use super::springs::Springs;
 use super::step_size::{self, StepSize};
 use super::terms::over;
-use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
-use crate::arithmetic::lanes::row::{Row, load, room, store};
-use crate::dynamics::{Mechanism, State};
+use crate::arithmetic::lanes::row::{Row, at, load, room, store};
+use crate::arithmetic::{Complex, DoubleDouble};
+use crate::dynamics::{Mechanism, MotionPowers, State};
 
 /// Largest order there is room for.
 pub const MOST: usize = 24;
@@ -135,6 +135,13 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
             columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
             scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
+    }
+
+    /// Writes the powers of the last step.
+    pub fn powers(&self, powers: &mut MotionPowers) {
+        let Scratch { e, v } = &*self.scratch;
+        let unit = |m: usize, k: usize| Complex::new(at(&e[m][0], k), at(&e[m][1], k));
+        powers.take((self.count, self.order), |m, k| at(&v[m][0], k), unit);
     }
 }
 

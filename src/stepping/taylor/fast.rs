@@ -8,7 +8,7 @@ use super::pair::{self, Pair};
 use super::step_size::StepSize;
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::dynamics::natural::Reduced;
-use crate::dynamics::{Mechanism, State};
+use crate::dynamics::{Mechanism, MotionPowers, State};
 
 /// The least order mechanisms with loops are expanded to: each costs little beside the matrices of the step.
 const LOOPED: usize = 20;
@@ -294,5 +294,16 @@ impl Fast {
     /// Takes a state that stands where the last step began on by `h` \[s\], as the step would have.
     pub fn go(&mut self, state: &mut State, h: f64) {
         (self.go)(&mut self.form, state, h, self.settings.is_portable);
+    }
+
+    /// Writes the powers of the last step; false where the form keeps none of unit vectors and rates alone.
+    pub fn powers(&self, powers: &mut MotionPowers) -> bool {
+        match &self.form {
+            Form::Pair(pair, _, scratch) => pair.powers(scratch, self.settings.order, powers),
+            Form::Few(bodies) => bodies.powers(powers),
+            Form::Several(bodies) => bodies.powers(powers),
+            _ => return false,
+        }
+        true
     }
 }

@@ -31,7 +31,7 @@ use super::terms::{LEFT, add_to, left_over, less_over, over, over_first, pair_su
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::two_product;
-use crate::dynamics::{Mechanism, State};
+use crate::dynamics::{Mechanism, MotionPowers, State};
 
 /// Largest order there is room for.
 pub const MOST: usize = 24;
@@ -136,6 +136,13 @@ impl Pair {
     /// fastest oscillation \[s\].
     pub fn longest(&self, order: usize) -> f64 {
         order as f64 / 3.0 / self.rate
+    }
+
+    /// Writes the powers of a step of some order.
+    pub fn powers(&self, scratch: &Scratch, order: usize, powers: &mut MotionPowers) {
+        let n = if self.is_single { 1 } else { 2 };
+        let unit = |m: usize, k: usize| Complex::new(scratch.e[m][2 * k], scratch.e[m][2 * k + 1]);
+        powers.take((n, order), |m, k| scratch.v[m][2 * k], unit);
     }
 }
 

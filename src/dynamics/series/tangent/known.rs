@@ -39,8 +39,9 @@ pub struct Gradient<S> {
 /// The constants and their derivatives.
 #[derive(Debug)]
 pub struct Known<S> {
-    /// H beside the diagonal.
+    /// H beside the diagonal, and as a matrix.
     pub coupling: Couplings<S>,
+    pub matrix: Vec<f64>,
     /// Those entries that have derivatives.
     pub varied: Couplings<S>,
     /// Derivatives of d_k and of gravity, body by body.
@@ -77,8 +78,15 @@ impl<S: Slots> Couplings<S> {
         Self { entries, rows }
     }
 
+    /// True where there are most of them.
+    pub fn is_dense(&self) -> bool {
+        let n = self.rows.len() - 1;
+        n > 2 && 2 * self.entries.len() >= n * (n - 1)
+    }
+
+    /// Those of a row.
     #[inline(always)]
-    fn row(&self, row: usize) -> &[Coupling<S>] {
+    pub fn row(&self, row: usize) -> &[Coupling<S>] {
         &self.entries[self.rows[row]..self.rows[row + 1]]
     }
 
@@ -97,21 +105,39 @@ impl<S: Slots> Couplings<S> {
         }
     }
 
-    /// Adds dH z'' likewise.
+    /// Products of the derivatives of a row with powers of z'', body by body, into those of R.
     #[inline(always)]
-    pub fn add_varied(&self, curve: &[Complex<f64>], [re, im]: &mut [Vec<S>; 2], room: usize, m: usize) {
-        if self.entries.is_empty() {
-            return;
-        }
-        for row in 0..curve.len() {
-            let place = row * room + m;
-            let (mut sum_re, mut sum_im) = (re[place], im[place]);
-            for entry in self.row(row) {
-                let z = curve[entry.column];
-                sum_re = entry.slope.mul_add(S::splat(z.re), sum_re);
-                sum_im = entry.slope.mul_add(S::splat(z.im), sum_im);
+    pub fn products(
+        &self,
+        row: usize,
+        [curve_re, curve_im]: &[Vec<f64>; 2],
+        room: usize,
+        order: usize,
+        (re, im): (&mut [S], &mut [S]),
+    ) {
+        let entries = self.row(row);
+        let mut m = 0;
+        // Four powers at a time, up to three of them beyond the last.
+        while m < order {
+            let (mut a, mut b, mut c, mut d) = (S::ZERO, S::ZERO, S::ZERO, S::ZERO);
+            let (mut p, mut q, mut s, mut t) = (S::ZERO, S::ZERO, S::ZERO, S::ZERO);
+            let mut e = 0;
+            while e < entries.len() {
+                let Coupling { column, slope, .. } = entries[e];
+                let (x, y) = (&curve_re[column * room + m..][..4], &curve_im[column * room + m..][..4]);
+                a = slope.mul_add(S::splat(x[0]), a);
+                b = slope.mul_add(S::splat(x[1]), b);
+                c = slope.mul_add(S::splat(x[2]), c);
+                d = slope.mul_add(S::splat(x[3]), d);
+                p = slope.mul_add(S::splat(y[0]), p);
+                q = slope.mul_add(S::splat(y[1]), q);
+                s = slope.mul_add(S::splat(y[2]), s);
+                t = slope.mul_add(S::splat(y[3]), t);
+                e += 1;
             }
-            (re[place], im[place]) = (sum_re, sum_im);
+            (re[m], re[m + 1], re[m + 2], re[m + 3]) = (a, b, c, d);
+            (im[m], im[m + 1], im[m + 2], im[m + 3]) = (p, q, s, t);
+            m += 4;
         }
     }
 }
@@ -126,8 +152,14 @@ impl<S: Slots> Known<S> {
         if is_forced || tree.off_axis || !tree.is_dense() || n != tree.angles || terms.partition.driven() {
             return None;
         }
+        let coupling = Couplings::of(tree, |entry| entry.value != 0.0);
+        let mut matrix = vec![0.0; n * n];
+        for (k, row) in matrix.chunks_exact_mut(n.max(1)).enumerate() {
+            coupling.row(k).iter().for_each(|entry| row[entry.column] = entry.value);
+        }
         let mut known = Self {
-            coupling: Couplings::of(tree, |entry| entry.value != 0.0),
+            coupling,
+            matrix,
             varied: Couplings::of(tree, |entry| entry != Number::constant(entry.value)),
             diagonal: tree.diagonal.iter().map(|number| S::of(&number.slope)).collect(),
             weight: tree.weight.iter().map(|w| [S::of(&w.re.slope), S::of(&w.im.slope)]).collect(),

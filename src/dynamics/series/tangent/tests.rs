@@ -39,24 +39,55 @@ struct Both<'a> {
     coordinates: Coordinates,
     begin: Begin<'a>,
     is_single: bool,
+    /// Whether the powers of the motion are known beforehand.
+    is_known: bool,
 }
 
-struct Expanded<'a, 'b, S: Slots>(&'a mut Tangent<S>, &'a Terms<'b, Number>, Begin<'a>);
+struct Expanded<'a, 'b, S: Slots>(
+    &'a mut Tangent<S>,
+    &'a Terms<'b, Number>,
+    Begin<'a>,
+    Option<&'a MotionPowers>,
+);
 
 impl<S: Slots> Task for Expanded<'_, '_, S> {
     type Output = ();
 
     #[inline(always)]
     fn perform(self) {
-        self.0.expand(self.1, self.2);
+        self.0.expand(self.1, self.2, self.3);
     }
 }
 
 impl Both<'_> {
+    /// The powers of the motion by themselves.
+    fn powers(&self) -> MotionPowers {
+        let plain = self.terms.structure.terms();
+        let mut series = Series::<f64>::of_terms(&plain, self.coordinates, ORDER);
+        let (t, u, rest, rate) = self.begin;
+        let [u, rest, rate] =
+            [u, rest, rate].map(|all| all.iter().map(|number| number.value).collect::<Vec<_>>());
+        series.expand_terms(&plain, t, &u, &rest, &rate);
+        let (n, mut powers) = (series.coordinates(), MotionPowers::default());
+        // Two orders are left to be found.
+        let order = ORDER - 2;
+        powers.take((n, order), |m, k| series.omega[m * n + k], |m, k| series.z[m * n + k]);
+        let (last, expected) = (powers.z.iter().rev(), series.z[..(order + 2) * n].iter().rev());
+        for (z, expected) in last.zip(expected).take(n) {
+            assert!(
+                (z.re - expected.re).abs().max((z.im - expected.im).abs())
+                    <= 1e-11 * expected.re.hypot(expected.im)
+            );
+        }
+        powers
+    }
+
     fn of<S: Slots>(&self) -> [Vec<Number>; 2] {
         let mut tangent = Tangent::<S>::new(&self.terms, self.coordinates, ORDER).expect("such a mechanism");
-        tangent.expand_values(&self.terms, self.begin);
-        S::perform(Expanded(&mut tangent, &self.terms, self.begin));
+        let powers = self.is_known.then(|| self.powers());
+        assert_eq!(tangent.fitting(powers.as_ref()).is_some(), self.is_known);
+        tangent.expand_values(&self.terms, self.begin, powers.as_ref());
+        S::perform(Expanded(&mut tangent, &self.terms, self.begin, powers.as_ref()));
         let f = tangent.coordinates();
         let found = (0..(ORDER + 1) * f).map(|i| {
             let (m, c) = (i / f, i % f);
@@ -91,12 +122,16 @@ fn derivatives_are_those_of_numbers_that_have_them() {
     ] {
         let (mechanism, phi, omega) = mechanism(name, &numbers);
         let rest = vec![Number::ZERO; phi.len()];
-        for is_single in [false, true] {
+        for (is_single, is_known) in [(false, false), (true, false), (false, true), (true, true)] {
+            if is_known && coordinates == Coordinates::All {
+                continue;
+            }
             let both = Both {
                 terms: mechanism.terms(),
                 coordinates,
                 begin: (Time::default(), &phi, &rest, &omega),
                 is_single,
+                is_known,
             };
             let [found, expected] = Vectors::default().run(both);
             let f = phi.len();
