@@ -188,8 +188,11 @@ trait Team {
     /// Expands all lanes to an order.
     fn expand<W: EightLanes>(&mut self, order: usize);
 
-    /// The largest coefficients of a lane, of this order and those before it; `None` where one is not finite.
-    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]>;
+    /// The largest coefficients of every lane, of this order and those before it.
+    fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES];
+
+    /// True where a lane's coefficients of this order are finite.
+    fn is_finite(&self, lane: usize, order: usize) -> bool;
 
     /// Every lane's state at the end of its step \[s\].
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
@@ -243,7 +246,7 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
             }
             self.crew.team.begin::<W>(&self.crew.slots);
             self.crew.team.expand::<W>(order);
-            let taken = self.crew.choose_steps(order);
+            let taken = self.crew.choose_steps::<W>(order);
             self.crew.team.finish::<W>(order, &taken);
             self.crew.arrive(order, self.members, self.until, self.watch);
         }
@@ -341,12 +344,16 @@ impl<T: Team> Crew<T> {
 
     /// The steps \[s\] that the series just expanded allow.
     #[inline(always)]
-    fn choose_steps(&mut self, order: usize) -> Octet {
-        let mut taken = Octet::splat(0.0);
+    fn choose_steps<W: EightLanes>(&mut self, order: usize) -> Octet {
+        let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
         for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
             (slot.wanted, slot.taken) = (f64::NAN, 0.0);
-            if let Some(sizes) = self.team.sizes(lane, order) {
-                slot.wanted = slot.step_size.step_of(order, &sizes);
+            if self.team.is_finite(lane, order) {
+                let mut own = [0.0; JUDGES];
+                for back in 0..JUDGES {
+                    own[back] = sizes[back].0[lane];
+                }
+                slot.wanted = slot.step_size.step_of(order, &own);
                 slot.taken = step_size::taken(slot.wanted, slot.left);
             }
             *taken = slot.taken;
