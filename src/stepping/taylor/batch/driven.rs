@@ -199,7 +199,8 @@ impl Team for DrivenTeam {
     fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES] {
         // The work is made of the unit vectors, whose powers may fall more slowly than those of the rate.
         let steady = load::<W>(&self.share[0]);
-        let share = load::<W>(&self.powers[0].v).larger(W::ZERO).mul_add(load(&self.share[1]), steady);
+        let swing = load::<W>(&self.powers[0].v).larger(W::ZERO).mul(load(&self.share[1]));
+        let share = steady.add(swing);
         let mut sizes = [Octet::splat(0.0); JUDGES];
         let mut back = 0;
         while back < JUDGES {

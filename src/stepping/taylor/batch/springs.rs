@@ -25,8 +25,8 @@ pub(super) struct Springs<const N: usize> {
     /// The dampers' power \[W/s^m\], and their work \[J\] in two terms.
     power: [Octet; MOST + 1],
     work: [Octet; 2],
-    /// One over the energy scale times the unit of time \[1/(J s)\].
-    share: Octet,
+    /// The energy scale times the unit of time \[J s\].
+    energy: Octet,
 }
 
 /// One spring of each lane.
@@ -106,13 +106,13 @@ impl<const N: usize> Springs<N> {
             units: [[ZERO; 4]; N],
             power: [ZERO; MOST + 1],
             work: [ZERO; 2],
-            share: ZERO,
+            energy: Octet([1.0; LANES]),
         }
     }
 
     /// The springs of a lane.
     pub fn take_in(&mut self, lane: usize, mechanism: &Mechanism, state: &State) {
-        self.share.0[lane] = 1.0 / (mechanism.energy_scale * mechanism.units.time);
+        self.energy.0[lane] = mechanism.energy_scale * mechanism.units.time;
         if let (Some(work), Some(low)) = (state.y.get(2 * N), state.low.get(2 * N)) {
             (self.work[0].0[lane], self.work[1].0[lane]) = (*work, *low);
         }
@@ -228,7 +228,7 @@ impl<const N: usize> Springs<N> {
     /// Power k of the dampers' work over the energy scale, which counts as the rates do.
     #[inline(always)]
     pub fn judged<W: EightLanes>(&self, k: usize) -> W {
-        over(load::<W>(&self.power[k - 1]), k).mul(load(&self.share))
+        load::<W>(&self.power[k - 1]).div(W::splat(k as f64).mul(load(&self.energy)))
     }
 
     /// Adds the dampers' work in the step.
