@@ -102,6 +102,30 @@ fn points_in_lanes_agree_with_single_runs() {
     }
 }
 
+/// Any tree where only starts differ: branches off their axes, long chains.
+#[test]
+fn points_of_one_tree_agree_with_single_runs() {
+    let request = Request { rtol: Some(1e-12), every: Some(0.5), ..request("taylor", 1.0) };
+    for (scene, vary) in [
+        ("branch", ["bar1.phi=-3..3:5", "plate.omega=-1..1:3"]),
+        ("chain8", ["bar1.phi=1.2..1.5:3", "bar8.omega=-1..1:3"]),
+    ] {
+        let plan = prepared(scene, &vary, &request);
+        for point in points(&plan, 1) {
+            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+            assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
+            for (found, exact) in
+                point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
+            {
+                assert!((found - exact).abs() < 1e-9, "{scene}: {point:?} {outcome:?}");
+            }
+            assert!(point.energy < 1e-12, "{scene}: {point:?}");
+            assert_eq!(plan.point(point.index).as_ref(), Some(&point));
+        }
+    }
+}
+
 /// Without a method named, springs are in lanes unless one of them is so stiff that a method was chosen for it.
 #[test]
 fn stiff_springs_stay_with_the_method_chosen_for_them() {

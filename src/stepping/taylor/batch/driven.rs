@@ -14,7 +14,7 @@ use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Lanes;
-use crate::arithmetic::lanes::wide::EightLanes;
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
 
@@ -119,7 +119,7 @@ impl DrivenTeam {
 }
 
 impl Team for DrivenTeam {
-    fn new(_: usize) -> Self {
+    fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         let zero = Octet::splat(0.0);
         Self {
             laws: Laws::new(),
@@ -137,7 +137,7 @@ impl Team for DrivenTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, _: usize) -> bool {
+    fn fits(mechanism: &Mechanism, _: &Mechanism) -> bool {
         Driven::of(mechanism).is_some() && mechanism.contacts.is_empty()
     }
 

@@ -3,10 +3,10 @@
 
 use super::series::{expand, finish};
 use super::springs::Springs;
-use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, load, store};
+use super::{BatchMember, JUDGES, LaneSlot, MOST, SPRINGS, Team, load, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::wide::EightLanes;
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::{Mechanism, State};
 
 /// Constants, states and coefficients of the trajectories in the lanes.
@@ -50,7 +50,7 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 }
 
 impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
-    fn new(springs: usize) -> Self {
+    fn new(like: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         let zero = [Octet::splat(0.0); N];
         let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
         Self {
@@ -62,14 +62,15 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
             low: [zero; 2],
             before: zero,
             powers: [power; MOST + 1],
-            springs: Springs::new(springs),
+            springs: Springs::new(like.springs.len()),
         }
     }
 
-    fn fits(mechanism: &Mechanism, springs: usize) -> bool {
+    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
         mechanism.tree.coordinates == N
             && SPRUNG != mechanism.springs.is_empty()
-            && mechanism.springs.len() == springs
+            && mechanism.springs.len() <= SPRINGS
+            && mechanism.springs.len() == like.springs.len()
             && fits(mechanism)
     }
 

@@ -16,7 +16,7 @@ use super::super::terms::over;
 use super::laws::{Laws, RATES};
 use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::wide::EightLanes;
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{DoubleDouble, angle};
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
@@ -135,7 +135,7 @@ impl SwingingTeam {
 }
 
 impl Team for SwingingTeam {
-    fn new(_: usize) -> Self {
+    fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         Self {
             laws: Laws::new(),
             driven: [0; LANES],
@@ -153,7 +153,7 @@ impl Team for SwingingTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, _: usize) -> bool {
+    fn fits(mechanism: &Mechanism, _: &Mechanism) -> bool {
         let fits = |(_, law): (usize, &Law)| law.profile.is_none() && !law.is_steady();
         Driven::pattern(mechanism).is_some_and(fits) && mechanism.contacts.is_empty()
     }
