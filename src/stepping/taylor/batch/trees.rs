@@ -1,5 +1,5 @@
-//! Any hinge tree, with springs, torsion springs, applied forces and motors, all lanes of one and the same
-//! mechanism: the series of [`dynamics`](crate::dynamics::series) on numbers with a lane for each trajectory.
+//! Hinge trees with springs, torsion springs, applied forces and motors, all lanes of equal mechanisms: the
+//! series of [`dynamics`](crate::dynamics::series) on numbers with a lane for each trajectory.
 
 use super::super::terms::over;
 use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
@@ -23,6 +23,8 @@ pub(super) struct TreeTeam {
     order: usize,
     /// Number of coordinates f.
     coordinates: usize,
+    /// The energy scale times the unit of time \[J s\].
+    energy: Octet,
     /// Leading parts of angles, rates and work (2f + 1), and what they leave out.
     high: Vec<Octet>,
     low: Vec<Octet>,
@@ -32,9 +34,12 @@ pub(super) struct TreeTeam {
     times: [Time; LANES],
 }
 
-/// True for hinge trees whose motors are all eliminated, with a motion left, and laws that are no formulas.
+/// True for hinge trees whose motors are all eliminated, with a motion left, and laws that are no formulas;
+/// not for bodies on their axes under gravity and springs alone: more of them than have lanes of their own
+/// are faster one by one.
 pub(super) fn fits(mechanism: &Mechanism) -> bool {
     (1..=BODIES).contains(&mechanism.bodies.len())
+        && !super::free::fits(mechanism)
         && mechanism.coordinates() == mechanism.bodies.len()
         && mechanism.partition.count() > 0
         && mechanism.tree.is_dense()
@@ -90,6 +95,7 @@ impl Team for TreeTeam {
             mechanism: like.clone(),
             order,
             coordinates: f,
+            energy: Octet::splat(1.0),
             high: vec![ZERO; 2 * f + 1],
             low: vec![ZERO; 2 * f + 1],
             before: vec![ZERO; f],
@@ -99,7 +105,13 @@ impl Team for TreeTeam {
     }
 
     fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
-        std::ptr::eq(mechanism, like) && fits(mechanism)
+        // What starts and energies are measured by may differ: it is not in the series.
+        let is_equal = || {
+            (&mechanism.tree, &mechanism.partition, &mechanism.springs)
+                == (&like.tree, &like.partition, &like.springs)
+                && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
+        };
+        fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && is_equal())
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
@@ -108,6 +120,7 @@ impl Team for TreeTeam {
                 number.0[lane] = *unknown;
             }
         }
+        self.energy.0[lane] = member.mechanism.energy_scale * member.mechanism.units.time;
         let tied = if self.mechanism.partition.driven() { 8.0 } else { 3.0 };
         order as f64 / tied / fastest_rate(&self.mechanism, member.state.time.hi)
     }
@@ -133,13 +146,13 @@ impl Team for TreeTeam {
     #[inline(always)]
     fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES] {
         let (f, rates, power) = (self.coordinates, self.series.rates(), self.series.power());
-        let energy = self.mechanism.energy_scale * self.mechanism.units.time;
+        let energy = load::<W>(&self.energy);
         let mut sizes = [ZERO; JUDGES];
         let mut back = 0;
         while back < JUDGES {
             let k = order - back;
             // The work over the energy scale counts as the rates do.
-            let mut most = load::<W>(&power[k - 1]).mul(W::splat(1.0 / (k as f64 * energy))).larger(W::ZERO);
+            let mut most = load::<W>(&power[k - 1]).div(energy.mul(W::splat(k as f64))).larger(W::ZERO);
             for c in 0..f {
                 most = load::<W>(&rates[k * f + c]).larger(most);
             }
