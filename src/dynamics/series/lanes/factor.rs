@@ -84,6 +84,17 @@ impl<W: EightLanes> CauchyFactor<InLanes<W>> for FactorInLanes<W> {
     }
 
     #[inline(always)]
+    fn products(
+        [a, b]: [&Self; 2],
+        other: &Self,
+        scale: &(),
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> [InLanes<W>; 2] {
+        [a.product(other, scale, total, of.clone()), b.product(other, scale, total, of)]
+    }
+
+    #[inline(always)]
     fn sum_of_products(
         [[a, b], [c, d]]: [[&Self; 2]; 2],
         sign: f64,
