@@ -178,7 +178,7 @@ impl Team for TreeTeam {
             let mut k = order;
             while k > 0 {
                 let v = load::<W>(&rates[k * f + c]);
-                if k % 2 == 0 {
+                if k.is_multiple_of(2) {
                     (angle[0], rate[0]) =
                         (angle[0].mul_add(square, over(v, k + 1)), rate[0].mul_add(square, v));
                 } else {
@@ -197,7 +197,7 @@ impl Team for TreeTeam {
         let mut k = order;
         while k > 0 {
             let part = over(load::<W>(&power[k - 1]), k);
-            if k % 2 == 0 {
+            if k.is_multiple_of(2) {
                 work[0] = work[0].mul_add(square, part);
             } else {
                 work[1] = work[1].mul_add(square, part);
