@@ -227,6 +227,85 @@ fn bodies_with_springs_agree_with_double_double_whoever_is_beside_them() {
     agree_with_double_double_whoever_is_beside(&all, 1.0, 1e-12);
 }
 
+/// Trees of one mechanism each: three bars with a motor on the first one, a motor between two bars beside a
+/// spring with a damper, torsion springs beside a torque, and a tree off its axes.
+fn trees() -> Vec<Scene> {
+    let text =
+        |bars: usize| -> serde_json::Value { serde_json::from_str(&chain_text(bars, 0.0)).expect("JSON") };
+    let end = |name: &str, x: f64, y: f64| serde_json::json!({"body": name, "point": [x, y]});
+    let sines = serde_json::json!([{"amplitude": 0.4, "frequency": 3, "phase": 0.3}]);
+    let (mut driven, mut between, mut coiled) = (text(3), text(4), text(3));
+    driven["motors"] = serde_json::json!([
+        {"name": "m", "body": "b0", "law": {"start": 0.2, "rate": 1.5, "acceleration": -0.3, "sines": sines}}]);
+    driven["start"] = serde_json::json!({"b1": {"phi": 1.2, "omega": 0.2}, "b2": {"phi": 0.9, "omega": 0.4}});
+    between["motors"] = serde_json::json!([
+        {"name": "m", "body": "b1", "relative_to": "b0", "law": {"start": -0.3, "rate": 2}}]);
+    between["start"] = serde_json::json!({
+        "b0": {"phi": 1.5, "omega": 0}, "b2": {"phi": 0.9, "omega": 0.4}, "b3": {"phi": 0.6, "omega": 0.6}});
+    between["springs"] = serde_json::json!([{
+        "name": "s", "between": [end("ground", -0.3, 0.2), end("b2", 0.3, 0.02)],
+        "stiffness": 7, "free_length": 0.4, "damping": 0.3}]);
+    coiled["torsion_springs"] = serde_json::json!([
+        {"name": "t", "body": "b1", "relative_to": "b0", "stiffness": 0.3, "free_angle": 0.2, "damping": 0.01},
+        {"name": "u", "body": "b0", "stiffness": 0.5, "free_angle": 0, "damping": 0}]);
+    coiled["torques"] = serde_json::json!([
+        {"name": "p", "body": "b2", "torque": 0.2, "law": {"start": 1, "rate": 0, "sines": sines}}]);
+    let read = |text: serde_json::Value| parse_scene(&text.to_string(), "tree", &[]).expect("a scene");
+    vec![read(driven), read(between), read(coiled), shipped("branch", &[])]
+}
+
+#[test]
+fn trees_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
+    for scene in trees() {
+        let mechanism = compile(&scene);
+        assert!(Batch::takes_alike(&mechanism) && !Batch::takes(&mechanism));
+        let coordinates = mechanism.partition.count();
+        let all: Vec<_> = (0..11)
+            .map(|i| {
+                let mut state = start(&mechanism, &scene);
+                for k in 0..coordinates {
+                    state.y[k] -= 0.02 * (i * (k + 1)) as f64;
+                }
+                (Arc::clone(&mechanism), state)
+            })
+            .collect();
+        agree_with_double_double_whoever_is_beside(&all, 1.0, 2e-12);
+    }
+}
+
+/// Bodies with coordinates of their own, driven ones and such as ride on a driven one.
+#[test]
+fn trees_are_seen_inside_their_steps() {
+    for scene in trees() {
+        let mechanism = compile(&scene);
+        let bodies = mechanism.bodies.len();
+        let mut members = [BatchMember::new(&mechanism, start(&mechanism, &scene))];
+        let mut last: Vec<Option<f64>> = vec![None; bodies];
+        Batch::new(tight()).integrate(&mut members, Time::from(2.0), &mut |_, passage| {
+            for (body, last) in last.iter_mut().enumerate() {
+                let [(begin, _), (end, rate)] = [0.0, passage.step].map(|after| passage.at(body, after));
+                assert!(begin.abs() <= std::f64::consts::PI * (1.0 + 1e-15));
+                if let Some(last) = last {
+                    let turns = (begin - *last) / std::f64::consts::TAU;
+                    assert!((turns - turns.round()).abs() < 1e-13, "{body}: {begin} {last}");
+                }
+                let ends = passage.ends(body);
+                assert!((ends[0][0] - begin).abs() < 1e-14 && (ends[1][0] - end).abs() < 1e-13);
+                assert!((ends[1][1] - rate).abs() < 1e-12 * (1.0 + rate.abs()));
+                *last = Some(end);
+            }
+            Going::On
+        });
+        assert!(members[0].stopped.is_none());
+        let mut motion = Default::default();
+        Elimination::<0>::new(Arc::clone(&mechanism)).read(&members[0].state, &mut motion);
+        for (body, last) in last.iter().enumerate() {
+            let turns = (motion.phi[body].hi - last.expect("a step")) / std::f64::consts::TAU;
+            assert!((turns - turns.round()).abs() < 1e-12, "{body}");
+        }
+    }
+}
+
 #[test]
 fn driven_bodies_are_seen_inside_their_steps() {
     let all = driven(4);

@@ -102,6 +102,30 @@ fn points_in_lanes_agree_with_single_runs() {
     }
 }
 
+/// Any tree where starts differ, all points or those that follow one another.
+#[test]
+fn points_of_one_tree_agree_with_single_runs() {
+    let request = Request { rtol: Some(1e-12), every: Some(0.5), ..request("taylor", 1.0) };
+    for (scene, vary) in [
+        ("branch", ["bar1.phi=-3..3:5", "plate.omega=-1..1:3"]),
+        ("branch", ["gravity[0]=8..9.81:2", "bar1.phi=1..2:9"]),
+    ] {
+        let plan = prepared(scene, &vary, &request);
+        for point in points(&plan, 1) {
+            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+            assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
+            for (found, exact) in
+                point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
+            {
+                assert!((found - exact).abs() < 1e-9, "{scene}: {point:?} {outcome:?}");
+            }
+            assert!(point.energy < 1e-12, "{scene}: {point:?}");
+            assert_eq!(plan.point(point.index).as_ref(), Some(&point));
+        }
+    }
+}
+
 /// Without a method named, springs are in lanes unless one of them is so stiff that a method was chosen for it.
 #[test]
 fn stiff_springs_stay_with_the_method_chosen_for_them() {
@@ -552,7 +576,8 @@ mod command {
         program
             .run(&format!("sweep free.json {GRID} --no-charts --force"))
             .exits(0)
-            .shows(&["36 done", "points a second"]);
+            // Fast ones are so many that the line breaks.
+            .shows(&["36 done", "points a"]);
         assert_eq!(program.files()[1..], expected[1..]);
     }
 

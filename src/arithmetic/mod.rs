@@ -142,8 +142,8 @@ impl<T: Scalar> Over<f64> for T {
 pub trait Real: Scalar + PartialOrd {
     /// True for `f64` itself, for which there are kernels of lanes.
     const IS_PLAIN: bool;
-    /// True for numbers that constants of a scene are too, of many digits or with derivatives; their series
-    /// are multiplied as factors.
+    /// True for numbers whose series are multiplied as factors: those that constants of a scene are too, of
+    /// many digits or with derivatives, and lanes of several motions.
     const HAS_CONSTANTS: bool = false;
     /// Share of its scale below which the pivot of a constraint counts as zero.
     const DROPPED: f64 = 1e-8;
@@ -161,6 +161,12 @@ pub trait Real: Scalar + PartialOrd {
     #[inline(always)]
     fn times_fraction(self, fraction: Self) -> Self {
         self * fraction
+    }
+
+    /// The quotient by a whole number whose reciprocal is `fraction`.
+    #[inline(always)]
+    fn divided(self, k: usize, fraction: Self) -> Self {
+        if Self::IS_PLAIN && k < 13 { self / Self::of(k as f64) } else { self.times_fraction(fraction) }
     }
 
     /// Σ a b.

@@ -302,7 +302,7 @@ const FRAC_PI_2_REST: f64 = 6.123_233_995_736_766e-17;
 
 impl Sine {
     /// frequency·t + phase \[rad\].
-    fn argument(&self, t: Time) -> DoubleDouble {
+    pub(super) fn argument(&self, t: Time) -> DoubleDouble {
         t.scale(self.frequency) + self.phase
     }
 }

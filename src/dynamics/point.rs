@@ -123,8 +123,14 @@ impl<C: Real> Point<C> {
 
     #[inline(always)]
     fn sum<T: Over<C>>(&self, start: Complex<T>, z: &[Complex<T>]) -> Complex<T> {
-        let turned = self.terms.iter().fold(start, |sum, &(k, gamma)| sum + z[k].turn(gamma));
-        self.shifts.iter().fold(turned, |sum, &(x, share)| sum + z[x].times(T::of(share)))
+        let mut sum = start;
+        for &(k, gamma) in &self.terms {
+            sum += z[k].turn(gamma);
+        }
+        for &(x, share) in &self.shifts {
+            sum += z[x].times(T::of(share));
+        }
+        sum
     }
 
     /// Adds the generalized forces \[N m\] of a force \[N\] that acts here.

@@ -33,6 +33,7 @@ mod doubles;
 mod drive;
 mod factors;
 mod friction;
+pub mod lanes;
 #[cfg(feature = "digits")]
 mod long;
 mod order;
@@ -169,8 +170,8 @@ impl<T: SeriesNumber> Series<T> {
             reduced: matrix(f * f),
             pivot: matrix(f.max(n)),
             solution: zeros(f),
-            inverse: zeros(if T::HAS_COUPLINGS { f * f } else { 0 }),
-            right: zeros(if T::HAS_COUPLINGS { f } else { 0 }),
+            inverse: zeros(if T::HAS_INVERSE { f * f } else { 0 }),
+            right: zeros(if T::HAS_INVERSE { f } else { 0 }),
             bodywise,
             factors,
             limbs: Vec::new(),

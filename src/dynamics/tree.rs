@@ -52,20 +52,7 @@ impl Tree {
     /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the
     /// square of its fastest rate, and that of M⁻¹ K at most k (Σ |gamma_i| (M⁻¹)_ii^(1/2))² for each spring.
     pub fn fastest_rate(&self, springs: &[Spring]) -> f64 {
-        let n = self.coordinates;
-        let mut mass: Vec<f64> = self.coupling.iter().map(|h| h.re).collect();
-        for i in 0..n {
-            mass[i * n + i] = self.diagonal[i];
-        }
-        let mut pivot = vec![0.0; n];
-        factor::<f64, 0>(n, &mut mass, &mut pivot);
-        let mobility = |i: usize| {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            solve::<f64, 0>(n, &mass, &pivot, &mut unit);
-            unit[i]
-        };
-        let mobility: Vec<f64> = (0..n).map(mobility).collect();
+        let mobility = self.mobility();
         let gravity: f64 = self.weight[..self.angles]
             .iter()
             .zip(&mobility)
@@ -81,6 +68,24 @@ impl Tree {
         };
         let pulled: f64 = springs.iter().map(|spring| spring.stiffness * moved(spring).powi(2)).sum();
         (gravity + pulled).sqrt()
+    }
+
+    /// The diagonal of M⁻¹ of the stretched chain \[1/(kg·m²)\].
+    pub fn mobility(&self) -> Vec<f64> {
+        let n = self.coordinates;
+        let mut mass: Vec<f64> = self.coupling.iter().map(|h| h.re).collect();
+        for i in 0..n {
+            mass[i * n + i] = self.diagonal[i];
+        }
+        let mut pivot = vec![0.0; n];
+        factor::<f64, 0>(n, &mut mass, &mut pivot);
+        let mobility = |i: usize| {
+            let mut unit = vec![0.0; n];
+            unit[i] = 1.0;
+            solve::<f64, 0>(n, &mass, &pivot, &mut unit);
+            unit[i]
+        };
+        (0..n).map(mobility).collect()
     }
 }
 

@@ -307,6 +307,11 @@ impl EightLanes for Avx512 {
     const VECTORS: usize = 1;
 
     #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        instruction!(Self(_mm512_max_pd(_mm512_abs_pd(self.0), other.0)))
+    }
+
+    #[inline(always)]
     fn halves(self) -> [Avx; 2] {
         instruction!([Avx(_mm512_castpd512_pd256(self.0)), Avx(_mm512_extractf64x4_pd::<1>(self.0))])
     }

@@ -40,6 +40,8 @@ pub trait EightLanes: Slots {
     /// How many vectors they are in, 1 or 2.
     const VECTORS: usize;
 
+    /// Magnitudes, or `other` where that is larger or the magnitude not a number.
+    fn larger(self, other: Self) -> Self;
     /// The first four, and the others.
     fn halves(self) -> [Self::Half; 2];
     /// Of these.
@@ -111,6 +113,11 @@ impl<L: Lanes> EightLanes for [L; 2] {
     type Half = L;
 
     const VECTORS: usize = 2;
+
+    #[inline(always)]
+    fn larger(self, other: Self) -> Self {
+        [self[0].abs().max(other[0]), self[1].abs().max(other[1])]
+    }
 
     #[inline(always)]
     fn halves(self) -> [L; 2] {
@@ -267,6 +274,7 @@ mod tests {
                 x.div(y),
                 x.neg_mul_add(y, z),
                 x.mul_add(y, z),
+                x.larger(y),
                 W::join([y.halves()[1], x.halves()[0]]),
                 W::splat(self.0[0][0]),
                 W::ZERO,

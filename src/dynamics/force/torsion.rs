@@ -29,7 +29,10 @@ impl<C: Real> Torsion<C> {
     /// What the body has more than its base.
     #[inline(always)]
     pub fn between<T: Scalar>(&self, values: &[T]) -> T {
-        self.base.map_or(values[self.body], |base| values[self.body] - values[base])
+        match self.base {
+            Some(base) => values[self.body] - values[base],
+            None => values[self.body],
+        }
     }
 
     /// Torque \[N·m\] on body a at winding angles `phi` \[rad\] and rates `omega` \[rad/s\].

@@ -132,6 +132,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
     }
 
     /// Power m of its power \[W/s^m\], from power m of all rates.
+    #[inline(always)]
     pub fn power(&mut self, action: &Action<T::Constant>, m: usize, omega: &[T], scale: &Scale<T>) -> T {
         match &action.kind {
             Kind::Force { .. } => match &mut self.factors {
@@ -181,7 +182,15 @@ pub fn twist<T: SeriesNumber>(
 }
 
 /// Power m of the power of its damper \[W/s^m\].
+#[inline(always)]
 pub fn loss<T: SeriesNumber>(torsion: &Torsion<T::Constant>, m: usize, omega: &[T], n: usize) -> T {
-    let rate = |m: usize| torsion.between(&omega[m * n..(m + 1) * n]);
-    (0..=m).fold(T::ZERO, |sum, j| sum - (rate(j) * rate(m - j)).by(torsion.damping))
+    let mut sum = T::ZERO;
+    let mut j = 0;
+    while j <= m {
+        let rate = torsion.between(&omega[j * n..(j + 1) * n]);
+        let other = torsion.between(&omega[(m - j) * n..(m - j + 1) * n]);
+        sum -= (rate * other).by(torsion.damping);
+        j += 1;
+    }
+    sum
 }

@@ -81,6 +81,11 @@ pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constan
     const HAS_WORK: bool = true;
     /// True where couplings between bodies are kept in the form in which they are multiplied.
     const HAS_COUPLINGS: bool = false;
+    /// True where accelerations come from the inverse of M_0: an order then waits for one sum, not for passes
+    /// there and back.
+    const HAS_INVERSE: bool = Self::HAS_COUPLINGS;
+    /// True where products with couplings are summed row by row.
+    const HAS_ROWS: bool = false;
 
     /// Power zero, and the laws' series.
     fn begin(series: &mut Series<Self>, t: Self::Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);
@@ -98,6 +103,12 @@ pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constan
     #[inline(always)]
     fn with_product(self, factor: Self, constant: Self, _is_varied: bool) -> Self {
         self + factor * constant
+    }
+
+    /// The sum with the product of a number and a constant.
+    #[inline(always)]
+    fn with_constant(self, factor: Self, constant: Self::Constant) -> Self {
+        self + factor.by(constant)
     }
 
     /// The number kept to so many limbs, where it has limbs.

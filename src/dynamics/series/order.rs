@@ -57,7 +57,7 @@ impl<T: SeriesNumber> Series<T> {
             self.reduced.copy_from_slice(&self.mass);
             tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
         }
-        if T::HAS_COUPLINGS {
+        if T::HAS_INVERSE {
             self.invert();
         }
         if !self.rows.is_empty() {
@@ -260,7 +260,7 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             self.solution[..n].copy_from_slice(&self.load[..n]);
         }
-        if T::HAS_COUPLINGS {
+        if T::HAS_INVERSE {
             self.by_inverse::<N>();
         } else if self.is_tied {
             tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
@@ -336,6 +336,9 @@ fn mass_terms<T: SeriesNumber, const N: usize>(
         return;
     }
     let (coupling, x, rest) = (&tree.coupling[..n * n], &x[..n], &mut rest[..n]);
+    if T::HAS_ROWS {
+        return mass_rows(coupling, tree.off_axis, x, rest);
+    }
     for i in 0..n {
         for j in i + 1..n {
             let h = coupling[i * n + j];
@@ -347,5 +350,33 @@ fn mass_terms<T: SeriesNumber, const N: usize>(
                 rest[j] += Complex::new(x[i].re.by(h.re), x[i].im.by(h.re));
             }
         }
+    }
+}
+
+/// The same row by row, whose sums stay in registers.
+#[inline(always)]
+fn mass_rows<T: SeriesNumber>(
+    coupling: &[Complex<T::Constant>],
+    off_axis: bool,
+    x: &[Complex<T>],
+    rest: &mut [Complex<T>],
+) {
+    let n = x.len();
+    for i in 0..n {
+        let mut sum = rest[i];
+        for j in 0..n {
+            let h = coupling[i.min(j) * n + i.max(j)];
+            if j == i {
+                continue;
+            }
+            sum.re = sum.re.with_constant(x[j].re, h.re);
+            sum.im = sum.im.with_constant(x[j].im, h.re);
+            if off_axis {
+                let across = if j > i { h.im } else { -h.im };
+                sum.re = sum.re.with_constant(x[j].im, -across);
+                sum.im = sum.im.with_constant(x[j].re, across);
+            }
+        }
+        rest[i] = sum;
     }
 }

@@ -77,7 +77,7 @@ impl<T: Real> Fractions<T> {
     /// which carry the weight, are divided.
     #[inline(always)]
     pub fn over(&self, x: T, k: usize) -> T {
-        if T::IS_PLAIN && k < 13 { x / T::of(k as f64) } else { x.times_fraction(self.0[k]) }
+        x.divided(k, self.0[k])
     }
 
     /// The same for a vector.

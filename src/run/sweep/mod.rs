@@ -46,6 +46,7 @@ use super::drift::Limits;
 use super::methods::{MethodId, Stabilization};
 use super::plan::{MAX_ROWS, Plan, Refusal, Request};
 use super::trust::Level;
+use crate::arithmetic::eight::LANES;
 use crate::dynamics::{CompileError, Mechanism};
 use crate::scene::{Scene, SceneError, Template, Variable};
 use crate::stepping::taylor::batch::Batch;
@@ -81,6 +82,8 @@ pub struct Sweep {
     stop: Option<Arc<AtomicBool>>,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
+    /// True where points come in rows with equal mechanisms: in lanes these are beside each other.
+    is_alike: bool,
 }
 
 /// Why a sweep cannot begin, or did not come to its end.
@@ -177,6 +180,7 @@ impl Sweep {
         // What one point gets unasked, all get.
         request.method = Some(plan.method);
         let shares = variables.iter().all(|variable| variable.start.is_some());
+        let is_alike = grid.starts_in_a_row(&variables) >= LANES as u64;
         let template = template.clone();
         let limits = Limits::default();
         Ok(Self {
@@ -196,6 +200,7 @@ impl Sweep {
             within: None,
             stop: None,
             shares,
+            is_alike,
         })
     }
 
@@ -315,9 +320,20 @@ impl Sweep {
         &self.variables
     }
 
+    /// True where a mechanism of the points can be in lanes.
+    fn has_lanes_for(&self, mechanism: &Mechanism) -> bool {
+        Batch::takes(mechanism) || self.is_alike && Batch::takes_alike(mechanism)
+    }
+
     /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.
     fn chunk(&self, threads: usize) -> u64 {
-        (self.count() / (16 * threads as u64)).clamp(1, CHUNK)
+        let (count, threads) = (self.count(), threads as u64);
+        let lanes = if self.plan.method == MethodId::Taylor && self.has_lanes_for(&self.mechanism) {
+            LANES as u64
+        } else {
+            1
+        };
+        (count / (16 * threads)).max(lanes.min(count / (2 * threads))).clamp(1, CHUNK)
     }
 }
 

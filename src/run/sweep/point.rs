@@ -137,7 +137,7 @@ impl Sweep {
             && !ready.plan.extended
             && matches!(ready.plan.stabilization, Stabilization::None | Stabilization::Elimination)
             && ready.mechanism.outputs.is_none()
-            && Batch::takes(&ready.mechanism)
+            && self.has_lanes_for(&ready.mechanism)
     }
 
     /// Puts the values in; a point that cannot run is finished.

@@ -1,5 +1,5 @@
-//! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs
-//! or without, or of two of which one is driven.
+//! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs or without, or of
+//! two of which one is driven; and ensembles of one mechanism, any hinge tree.
 //!
 //! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
@@ -11,16 +11,18 @@ mod laws;
 mod series;
 mod springs;
 mod swinging;
+mod trees;
+mod vectors;
 
 use self::driven::DrivenTeam;
 use self::free::FreeTeam;
 use self::swinging::SwingingTeam;
+use self::trees::TreeTeam;
+use self::vectors::{added, load, moved, store, unit};
 use super::step_size::{self, StepSize};
-use super::terms::add_to;
 use super::{JUDGES, Kernel, stop};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
-use crate::arithmetic::sincos;
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 
@@ -85,7 +87,7 @@ impl Passage<'_> {
     }
 }
 
-/// Integrates many trajectories of free mechanisms, and of such with springs or with a motor.
+/// Integrates many trajectories of hinge trees.
 ///
 /// Source of the method: see [`Taylor`](super::Taylor), whose tolerance and orders these are.
 #[derive(Clone, Debug)]
@@ -118,62 +120,74 @@ impl Batch {
     pub fn takes(mechanism: &Mechanism) -> bool {
         let springs = mechanism.springs.len();
         (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS && free::fits(mechanism)
-            || DrivenTeam::fits(mechanism, springs)
-            || SwingingTeam::fits(mechanism, springs)
+            || DrivenTeam::fits(mechanism, mechanism)
+            || SwingingTeam::fits(mechanism, mechanism)
+    }
+
+    /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
+    /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
+    /// motors on angles, springs beside them, that are no formulas, without walls and friction.
+    pub fn takes_alike(mechanism: &Mechanism) -> bool {
+        trees::fits(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
     /// may end that one.
     ///
-    /// Mechanisms that it does not [take](Batch::takes) are stopped as unsuited.  The result of each does not
-    /// depend on the others.
+    /// Mechanisms of neither [these](Batch::takes) nor [those](Batch::takes_alike) kinds are stopped as
+    /// unsuited.  The result of each does not depend on the others.
     pub fn integrate(
         &self,
         members: &mut [BatchMember],
         until: Time,
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
-        self.integrate_those::<FreeTeam<1, false>>(0, members, until, watch);
-        self.integrate_those::<FreeTeam<2, false>>(0, members, until, watch);
-        self.integrate_those::<FreeTeam<3, false>>(0, members, until, watch);
-        self.integrate_those::<FreeTeam<4, false>>(0, members, until, watch);
-        for springs in 1..=SPRINGS {
-            self.integrate_those::<FreeTeam<1, true>>(springs, members, until, watch);
-            self.integrate_those::<FreeTeam<2, true>>(springs, members, until, watch);
-            self.integrate_those::<FreeTeam<3, true>>(springs, members, until, watch);
-            self.integrate_those::<FreeTeam<4, true>>(springs, members, until, watch);
-        }
-        self.integrate_those::<DrivenTeam>(0, members, until, watch);
-        self.integrate_those::<SwingingTeam>(0, members, until, watch);
-        for member in members.iter_mut().filter(|member| !Self::takes(member.mechanism)) {
-            let what = "lanes take free bodies, with springs, or two of which one is driven".into();
-            member.stopped =
-                Some(stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`"));
+        let mut is_done = vec![false; members.len()];
+        while let Some(next) = is_done.iter().position(|is_done| !is_done) {
+            let like = members[next].mechanism;
+            macro_rules! try_teams {
+                ($($team:ty),*) => {$(
+                    if <$team>::fits(like, like) {
+                        let fits: Vec<bool> =
+                            members.iter().map(|member| <$team>::fits(member.mechanism, like)).collect();
+                        is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
+                        self.integrate_those::<$team>(like, &fits, members, until, watch);
+                        continue;
+                    }
+                )*};
+            }
+            try_teams!(FreeTeam<1, false>, FreeTeam<2, false>, FreeTeam<3, false>, FreeTeam<4, false>);
+            try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
+            try_teams!(DrivenTeam, SwingingTeam, TreeTeam);
+            let (member, hint) = (&mut members[next], "integrate it by `taylor`");
+            let what = "lanes take hinge trees, whose motors and springs are no formulas".into();
+            member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));
+            is_done[next] = true;
         }
     }
 
-    /// Integrates those of one kind with so many springs.
+    /// Integrates those that fit beside a mechanism.
     fn integrate_those<T: Team>(
         &self,
-        springs: usize,
+        like: &Mechanism,
+        fits: &[bool],
         members: &mut [BatchMember],
         until: Time,
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
-        if members.iter().any(|member| T::fits(member.mechanism, springs)) {
-            let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
-            vectors.run(Integration::<T>::new(self, springs, members, until, watch));
-        }
+        let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
+        let crew = Crew::new(T::new(like, self.order, vectors), self.order, until);
+        vectors.run(Integration::<T> { crew, fits, batch: self, members, until, watch });
     }
 }
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
 trait Team {
-    /// Empty lanes for mechanisms with so many springs.
-    fn new(springs: usize) -> Self;
+    /// Empty lanes for mechanisms that fit beside this one, for series up to an order.
+    fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self;
 
-    /// True for a mechanism of this kind with so many springs.
-    fn fits(mechanism: &Mechanism, springs: usize) -> bool;
+    /// True for a mechanism of this kind that can be beside another one of this kind.
+    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool;
 
     /// Puts a trajectory into a lane; returns the longest step of an order in which the terms left out still
     /// fall \[s\].
@@ -188,8 +202,11 @@ trait Team {
     /// Expands all lanes to an order.
     fn expand<W: EightLanes>(&mut self, order: usize);
 
-    /// The largest coefficients of a lane, of this order and those before it; `None` where one is not finite.
-    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]>;
+    /// The largest coefficients of every lane, of this order and those before it.
+    fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES];
+
+    /// True where a lane's coefficients of this order are finite.
+    fn is_finite(&self, lane: usize, order: usize) -> bool;
 
     /// Every lane's state at the end of its step \[s\].
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
@@ -211,23 +228,12 @@ trait Team {
 
 struct Integration<'a, 'b, T> {
     crew: Crew<T>,
-    springs: usize,
+    /// Which of the members these are.
+    fits: &'a [bool],
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
     watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
-}
-
-impl<'a, 'b, T: Team> Integration<'a, 'b, T> {
-    fn new(
-        batch: &'a Batch,
-        springs: usize,
-        members: &'a mut [BatchMember<'b>],
-        until: Time,
-        watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
-    ) -> Self {
-        Self { crew: Crew::new(batch.order, springs, until), springs, batch, members, until, watch }
-    }
 }
 
 impl<T: Team> WideCode for Integration<'_, '_, T> {
@@ -237,13 +243,13 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
     fn run<W: EightLanes>(mut self) {
         let (order, mut waiting) = (self.batch.order, 0);
         loop {
-            self.crew.fill(self.batch, self.springs, self.members, &mut waiting, self.until);
+            self.crew.fill(self.batch, self.fits, self.members, &mut waiting, self.until);
             if self.crew.is_idle() {
                 return;
             }
             self.crew.team.begin::<W>(&self.crew.slots);
             self.crew.team.expand::<W>(order);
-            let taken = self.crew.choose_steps(order);
+            let taken = self.crew.choose_steps::<W>(order);
             self.crew.team.finish::<W>(order, &taken);
             self.crew.arrive(order, self.members, self.until, self.watch);
         }
@@ -290,7 +296,7 @@ struct Crew<T> {
 
 impl<T: Team> Crew<T> {
     /// Empty lanes.
-    fn new(order: usize, springs: usize, until: Time) -> Self {
+    fn new(team: T, order: usize, until: Time) -> Self {
         let empty = || LaneSlot {
             member: None,
             step_size: StepSize::new(1.0, order, 0.0),
@@ -300,21 +306,21 @@ impl<T: Team> Crew<T> {
             wanted: 0.0,
             taken: 0.0,
         };
-        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(T::new(springs)) }
+        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(team) }
     }
 
     /// Puts trajectories that wait into the free lanes.
     fn fill(
         &mut self,
         batch: &Batch,
-        springs: usize,
+        fits: &[bool],
         members: &[BatchMember],
         waiting: &mut usize,
         until: Time,
     ) {
         for lane in 0..LANES {
             if self.slots[lane].member.is_none() {
-                let next = next::<T>(springs, members, waiting, until);
+                let next = next(fits, members, waiting, until);
                 self.slots[lane].member = next;
                 match next {
                     Some(index) => self.take_in(lane, batch, &members[index]),
@@ -341,12 +347,16 @@ impl<T: Team> Crew<T> {
 
     /// The steps \[s\] that the series just expanded allow.
     #[inline(always)]
-    fn choose_steps(&mut self, order: usize) -> Octet {
-        let mut taken = Octet::splat(0.0);
+    fn choose_steps<W: EightLanes>(&mut self, order: usize) -> Octet {
+        let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
         for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
             (slot.wanted, slot.taken) = (f64::NAN, 0.0);
-            if let Some(sizes) = self.team.sizes(lane, order) {
-                slot.wanted = slot.step_size.step_of(order, &sizes);
+            if self.team.is_finite(lane, order) {
+                let mut own = [0.0; JUDGES];
+                for back in 0..JUDGES {
+                    own[back] = sizes[back].0[lane];
+                }
+                slot.wanted = slot.step_size.step_of(order, &own);
                 slot.taken = step_size::taken(slot.wanted, slot.left);
             }
             *taken = slot.taken;
@@ -391,47 +401,12 @@ impl<T: Team> Crew<T> {
     }
 }
 
-// Closures and `map` are compiled apart, without the processor's vectors, and arrays that loops go over stay
-// in memory: what follows, and all that uses it, is written out.
-
-#[inline(always)]
-fn load<W: EightLanes>(octet: &Octet) -> W {
-    W::of(&octet.0)
-}
-
-#[inline(always)]
-fn store<W: EightLanes>(lanes: W) -> Octet {
-    Octet(lanes.array())
-}
-
-/// What even and odd powers from the first on, each summed in squares of h, come to.
-#[inline(always)]
-fn moved<W: EightLanes>([even, odd]: [W; 2], h: W) -> W {
-    even.mul_add(h, odd).mul(h)
-}
-
-/// A number in two terms, and more.
-#[inline(always)]
-fn added<W: EightLanes>([high, low]: [&Octet; 2], increment: W, rest: W) -> (Octet, Octet) {
-    let [high, low] = add_to([load::<W>(high), load::<W>(low)], increment, rest);
-    (store(high), store(low))
-}
-
-/// Cosine and sine of angles in two terms.
-#[inline(always)]
-fn unit<W: EightLanes>(high: &Octet, low: &Octet) -> [Octet; 2] {
-    let ([high, other_high], [low, other_low]) = (load::<W>(high).halves(), load::<W>(low).halves());
-    let (s, c) = sincos::sin_cos::<W::Half>(high, low);
-    let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
-    [store(W::join([c, other_c])), store(W::join([s, other_s]))]
-}
-
 /// The next trajectory of this kind that has a way to go.
-fn next<T: Team>(springs: usize, members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
+fn next(fits: &[bool], members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
     while *waiting < members.len() {
         let (index, member) = (*waiting, &members[*waiting]);
         *waiting += 1;
-        if member.state.time < until && T::fits(member.mechanism, springs) {
+        if fits[index] && member.state.time < until {
             return Some(index);
         }
     }

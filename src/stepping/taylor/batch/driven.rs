@@ -14,7 +14,7 @@ use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Lanes;
-use crate::arithmetic::lanes::wide::EightLanes;
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
 
@@ -28,7 +28,7 @@ pub(super) struct DrivenTeam {
     /// The body that is driven.
     driven: [usize; LANES],
     /// What an error of the unit vectors comes to in the work: a part, and a part times the free body's rate.
-    share: [[f64; 2]; LANES],
+    share: [Octet; 2],
     /// A \[kg·m²\], W of the driven body \[N·m\].
     coupling: Octet,
     weight: [Octet; 2],
@@ -119,12 +119,12 @@ impl DrivenTeam {
 }
 
 impl Team for DrivenTeam {
-    fn new(_: usize) -> Self {
+    fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         let zero = Octet::splat(0.0);
         Self {
             laws: Laws::new(),
             driven: [0; LANES],
-            share: [[0.0; 2]; LANES],
+            share: [zero; 2],
             coupling: zero,
             weight: [zero; 2],
             load: [[zero; 3]; 2],
@@ -137,13 +137,14 @@ impl Team for DrivenTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, _: usize) -> bool {
+    fn fits(mechanism: &Mechanism, _: &Mechanism) -> bool {
         Driven::of(mechanism).is_some() && mechanism.contacts.is_empty()
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         let Some(driven) = Driven::new(member.mechanism) else { return 0.0 };
-        (self.driven[lane], self.share[lane]) = (driven.body, driven.share);
+        self.driven[lane] = driven.body;
+        (self.share[0].0[lane], self.share[1].0[lane]) = (driven.share[0], driven.share[1]);
         self.coupling.0[lane] = driven.coupling;
         (self.weight[0].0[lane], self.weight[1].0[lane]) = (driven.weight.re, driven.weight.im);
         for (terms, load) in self.load.iter_mut().zip(driven.loads()) {
@@ -194,16 +195,27 @@ impl Team for DrivenTeam {
         }
     }
 
-    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]> {
+    #[inline(always)]
+    fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES] {
         // The work is made of the unit vectors, whose powers may fall more slowly than those of the rate.
-        let share = self.share[lane][0] + self.share[lane][1] * self.powers[0].v.0[lane].abs();
-        let mut sizes = [0.0; JUDGES];
-        for (back, size) in sizes.iter_mut().enumerate() {
-            let Power { c, s, x, y, v } = &self.powers[order - back];
-            let most = [c, s, x, y].into_iter().fold(0.0, |most: f64, part| most.max(part.0[lane].abs()));
-            *size = (share * most).max(v.0[lane].abs());
+        let steady = load::<W>(&self.share[0]);
+        let swing = load::<W>(&self.powers[0].v).larger(W::ZERO).mul(load(&self.share[1]));
+        let share = steady.add(swing);
+        let mut sizes = [Octet::splat(0.0); JUDGES];
+        let mut back = 0;
+        while back < JUDGES {
+            let power = &self.powers[order - back];
+            let most = load::<W>(&power.c).larger(load::<W>(&power.s).larger(W::ZERO));
+            let most = load::<W>(&power.x).larger(load::<W>(&power.y).larger(most));
+            sizes[back] = store(load::<W>(&power.v).larger(share.mul(most)));
+            back += 1;
         }
-        self.powers[order].v.0[lane].is_finite().then_some(sizes)
+        sizes
+    }
+
+    #[inline(always)]
+    fn is_finite(&self, lane: usize, order: usize) -> bool {
+        self.powers[order].v.0[lane].is_finite()
     }
 
     #[inline(always)]
@@ -259,6 +271,7 @@ impl Team for DrivenTeam {
         (self.high[2], self.low[2]) = added([&self.high[2], &self.low[2]], work, zero);
     }
 
+    #[inline]
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
         if body == self.driven[lane] {
             let (start, rate) = (self.before[1].0[lane], self.laws.rate.0[lane]);
@@ -268,6 +281,7 @@ impl Team for DrivenTeam {
         [start, [self.high[0].0[lane], self.high[1].0[lane]]]
     }
 
+    #[inline]
     fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
         if let Some(turns) = turns.first_mut() {
             *turns += angle::wrap(&mut self.high[0].0[lane], &mut self.low[0].0[lane]);

@@ -3,10 +3,10 @@
 
 use super::series::{expand, finish};
 use super::springs::Springs;
-use super::{BatchMember, JUDGES, LaneSlot, MOST, Team};
+use super::{BatchMember, JUDGES, LaneSlot, MOST, SPRINGS, Team, load, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::wide::EightLanes;
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::{Mechanism, State};
 
 /// Constants, states and coefficients of the trajectories in the lanes.
@@ -50,7 +50,7 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 }
 
 impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
-    fn new(springs: usize) -> Self {
+    fn new(like: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         let zero = [Octet::splat(0.0); N];
         let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
         Self {
@@ -62,14 +62,15 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
             low: [zero; 2],
             before: zero,
             powers: [power; MOST + 1],
-            springs: Springs::new(springs),
+            springs: Springs::new(like.springs.len()),
         }
     }
 
-    fn fits(mechanism: &Mechanism, springs: usize) -> bool {
+    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
         mechanism.tree.coordinates == N
             && SPRUNG != mechanism.springs.is_empty()
-            && mechanism.springs.len() == springs
+            && mechanism.springs.len() <= SPRINGS
+            && mechanism.springs.len() == like.springs.len()
             && fits(mechanism)
     }
 
@@ -114,16 +115,28 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
         expand::<W, N, SPRUNG>(self, order);
     }
 
-    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]> {
-        let coefficient = |k: usize, i: usize| self.powers[k].v[i].0[lane];
-        let mut sizes = [0.0; JUDGES];
-        for (back, size) in sizes.iter_mut().enumerate() {
-            *size = (0..N).fold(0.0, |largest: f64, i| largest.max(coefficient(order - back, i).abs()));
+    #[inline(always)]
+    fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES] {
+        let mut sizes = [Octet::splat(0.0); JUDGES];
+        let mut back = 0;
+        while back < JUDGES {
+            let power = &self.powers[order - back];
+            let mut most = W::ZERO;
+            for i in 0..N {
+                most = load::<W>(&power.v[i]).larger(most);
+            }
+            if SPRUNG {
+                most = self.springs.judged::<W>(order - back).larger(most);
+            }
+            sizes[back] = store(most);
+            back += 1;
         }
-        if SPRUNG {
-            self.springs.judge(lane, order, &mut sizes);
-        }
-        (0..N).all(|i| coefficient(order, i).is_finite()).then_some(sizes)
+        sizes
+    }
+
+    #[inline(always)]
+    fn is_finite(&self, lane: usize, order: usize) -> bool {
+        self.powers[order].v.iter().all(|v| v.0[lane].is_finite())
     }
 
     #[inline(always)]
@@ -131,11 +144,13 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
         finish::<W, N, SPRUNG>(self, order, taken);
     }
 
+    #[inline]
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
         let start = [self.before[body].0[lane], self.powers[0].v[body].0[lane]];
         [start, [self.high[0][body].0[lane], self.high[1][body].0[lane]]]
     }
 
+    #[inline]
     fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
         for i in 0..N {
             turns[i] += angle::wrap(&mut self.high[0][i].0[lane], &mut self.low[0][i].0[lane]);

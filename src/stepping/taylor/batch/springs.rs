@@ -26,7 +26,7 @@ pub(super) struct Springs<const N: usize> {
     power: [Octet; MOST + 1],
     work: [Octet; 2],
     /// The energy scale times the unit of time \[J s\].
-    energy: [f64; LANES],
+    energy: Octet,
 }
 
 /// One spring of each lane.
@@ -106,13 +106,13 @@ impl<const N: usize> Springs<N> {
             units: [[ZERO; 4]; N],
             power: [ZERO; MOST + 1],
             work: [ZERO; 2],
-            energy: [1.0; LANES],
+            energy: Octet([1.0; LANES]),
         }
     }
 
     /// The springs of a lane.
     pub fn take_in(&mut self, lane: usize, mechanism: &Mechanism, state: &State) {
-        self.energy[lane] = mechanism.energy_scale * mechanism.units.time;
+        self.energy.0[lane] = mechanism.energy_scale * mechanism.units.time;
         if let (Some(work), Some(low)) = (state.y.get(2 * N), state.low.get(2 * N)) {
             (self.work[0].0[lane], self.work[1].0[lane]) = (*work, *low);
         }
@@ -225,12 +225,10 @@ impl<const N: usize> Springs<N> {
         [px, py]
     }
 
-    /// Adds to what judges a step, the dampers' work over the energy scale counting as the rates do.
-    pub fn judge(&self, lane: usize, order: usize, sizes: &mut [f64]) {
-        for (back, size) in sizes.iter_mut().enumerate() {
-            let power = self.power[order - 1 - back].0[lane];
-            *size = size.max((power / ((order - back) as f64 * self.energy[lane])).abs());
-        }
+    /// Power k of the dampers' work over the energy scale, which counts as the rates do.
+    #[inline(always)]
+    pub fn judged<W: EightLanes>(&self, k: usize) -> W {
+        load::<W>(&self.power[k - 1]).div(W::splat(k as f64).mul(load(&self.energy)))
     }
 
     /// Adds the dampers' work in the step.

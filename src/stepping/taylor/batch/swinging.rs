@@ -16,7 +16,7 @@ use super::super::terms::over;
 use super::laws::{Laws, RATES};
 use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::wide::EightLanes;
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{DoubleDouble, angle};
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
@@ -30,7 +30,7 @@ pub(super) struct SwingingTeam {
     /// The body that is driven.
     driven: [usize; LANES],
     /// What an error of the unit vectors comes to in the work: a part, and a part times the free body's rate.
-    share: [[f64; 2]; LANES],
+    share: [Octet; 2],
     /// A and D \[kg·m²\], W_1 \[N·m\].
     coupling: Octet,
     inertia: Octet,
@@ -135,11 +135,11 @@ impl SwingingTeam {
 }
 
 impl Team for SwingingTeam {
-    fn new(_: usize) -> Self {
+    fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         Self {
             laws: Laws::new(),
             driven: [0; LANES],
-            share: [[0.0; 2]; LANES],
+            share: [ZERO; 2],
             coupling: ZERO,
             inertia: ZERO,
             weight: [ZERO; 2],
@@ -153,7 +153,7 @@ impl Team for SwingingTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, _: usize) -> bool {
+    fn fits(mechanism: &Mechanism, _: &Mechanism) -> bool {
         let fits = |(_, law): (usize, &Law)| law.profile.is_none() && !law.is_steady();
         Driven::pattern(mechanism).is_some_and(fits) && mechanism.contacts.is_empty()
     }
@@ -168,7 +168,9 @@ impl Team for SwingingTeam {
         self.laws.take_in(lane, law);
         let swing = (fastest * a).abs() / mechanism.energy_scale;
         let share = [swing * fastest + weight.norm_squared().sqrt() / mechanism.energy_scale, swing];
-        self.share[lane] = share.map(|share| share / mechanism.units.time);
+        for (own, share) in self.share.iter_mut().zip(share) {
+            own.0[lane] = share / mechanism.units.time;
+        }
         (self.coupling.0[lane], self.inertia.0[lane]) = (a, tree.diagonal[driven]);
         (self.weight[0].0[lane], self.weight[1].0[lane]) = (weight.re, weight.im);
         for (i, number) in [pull.im, -pull.re, -a].into_iter().enumerate() {
@@ -206,17 +208,27 @@ impl Team for SwingingTeam {
         }
     }
 
-    fn sizes(&self, lane: usize, order: usize) -> Option<[f64; JUDGES]> {
+    #[inline(always)]
+    fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES] {
         // The work is made of the unit vectors, whose powers may fall more slowly than those of the rate.
-        let share = self.share[lane][0] + self.share[lane][1] * self.powers[0].v.0[lane].abs();
-        let mut sizes = [0.0; JUDGES];
-        for (back, size) in sizes.iter_mut().enumerate() {
+        let steady = load::<W>(&self.share[0]);
+        let swing = load::<W>(&self.powers[0].v).larger(W::ZERO).mul(load(&self.share[1]));
+        let share = steady.add(swing);
+        let mut sizes = [Octet::splat(0.0); JUDGES];
+        let mut back = 0;
+        while back < JUDGES {
             let (power, given) = (&self.powers[order - back], &self.given[order - back]);
-            let vectors = [&power.c, &power.s, &given.c, &given.s];
-            let most = vectors.into_iter().fold(0.0, |most: f64, part| most.max(part.0[lane].abs()));
-            *size = (share * most).max(power.v.0[lane].abs());
+            let most = load::<W>(&power.c).larger(load::<W>(&power.s).larger(W::ZERO));
+            let most = load::<W>(&given.c).larger(load::<W>(&given.s).larger(most));
+            sizes[back] = store(load::<W>(&power.v).larger(share.mul(most)));
+            back += 1;
         }
-        self.powers[order].v.0[lane].is_finite().then_some(sizes)
+        sizes
+    }
+
+    #[inline(always)]
+    fn is_finite(&self, lane: usize, order: usize) -> bool {
+        self.powers[order].v.0[lane].is_finite()
     }
 
     #[inline(always)]
@@ -281,6 +293,7 @@ impl Team for SwingingTeam {
         (self.high[2], self.low[2]) = added([&self.high[2], &self.low[2]], work, zero);
     }
 
+    #[inline]
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
         if body == self.driven[lane] {
             let start = [self.laws.angle[0].0[lane], self.laws.rates[0].0[lane]];
@@ -290,6 +303,7 @@ impl Team for SwingingTeam {
         [start, [self.high[0].0[lane], self.high[1].0[lane]]]
     }
 
+    #[inline]
     fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
         if let Some(turns) = turns.first_mut() {
             *turns += angle::wrap(&mut self.high[0].0[lane], &mut self.low[0].0[lane]);

@@ -40,7 +40,10 @@ fn ends(vectors: Vectors) -> Vec<State> {
         true => Going::Enough,
         false => Going::On,
     };
-    vectors.run(Integration::<FreeTeam<2, false>>::new(&batch, 0, &mut members, until, &mut watch));
+    let team = FreeTeam::<2, false>::new(&mechanism, batch.order, vectors);
+    let crew = Crew::new(team, batch.order, until);
+    let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
+    vectors.run(Integration { crew, fits, batch, members: members_here, until, watch: &mut watch });
     members.into_iter().map(|member| member.state).collect()
 }
 

@@ -1,0 +1,125 @@
+//! Eight motions of one mechanism as one series: numbers with a lane for each.
+//!
+//! No operation mixes lanes, so that a motion has the bits it would have beside any others; the vectors of
+//! the processor and plain code give the same ones.
+
+mod factor;
+mod number;
+
+use self::number::InLanes;
+use super::{Series, Terms};
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::wide::{EightLanes, Task, Vectors, WideCode};
+use crate::arithmetic::{Complex, Scalar};
+use crate::dynamics::{Coordinates, Mechanism, Time};
+use std::fmt::Debug;
+
+/// The time of each lane.
+pub type Times = [Time; LANES];
+
+/// Powers of eight motions.
+pub trait SeriesInLanes: Debug {
+    /// Expands the motions of a mechanism from their times, angles (leading parts and rests) and rates.
+    fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]);
+
+    /// Powers 0 … P of the coordinates' rates \[rad/s^(m+1)\], coordinate by coordinate ((P+1) × f).
+    fn rates(&self) -> &[Octet];
+
+    /// Powers 0 … P-1 of the power of motors, dampers and applied forces \[W/s^m\].
+    fn power(&self) -> &[Octet];
+
+    /// Power `m` of a body's rate in a lane \[rad/s^(m+1)\].
+    fn rate_of(&self, m: usize, body: usize, lane: usize) -> f64;
+
+    /// The angle of a body at the start in a lane, in [-π, π] \[rad\].
+    fn angle_of(&self, body: usize, lane: usize) -> f64;
+}
+
+/// Room for the series of eight motions of a mechanism whose motors are eliminated.
+pub fn in_lanes(mechanism: &Mechanism, order: usize, vectors: Vectors) -> Box<dyn SeriesInLanes> {
+    vectors.run(Room { mechanism, order })
+}
+
+struct Room<'a> {
+    mechanism: &'a Mechanism,
+    order: usize,
+}
+
+impl WideCode for Room<'_> {
+    type Output = Box<dyn SeriesInLanes>;
+
+    #[inline(always)]
+    fn run<W: EightLanes>(self) -> Box<dyn SeriesInLanes> {
+        let terms = self.mechanism.terms();
+        let series = Series::<InLanes<W>>::of_terms(&terms, Coordinates::Independent, self.order);
+        let f = series.coordinates();
+        let room = || vec![InLanes::ZERO; f];
+        Box::new(Whole {
+            begin: [room(), room(), room()],
+            rates: vec![Octet::default(); (self.order + 1) * f],
+            power: vec![Octet::default(); self.order],
+            series,
+        })
+    }
+}
+
+/// Series, where they begin, and what is asked of them.
+#[derive(Debug)]
+struct Whole<W: EightLanes> {
+    series: Series<InLanes<W>>,
+    begin: [Vec<InLanes<W>>; 3],
+    rates: Vec<Octet>,
+    power: Vec<Octet>,
+}
+
+struct Expand<'a, 'b, W: EightLanes> {
+    whole: &'a mut Whole<W>,
+    terms: &'a Terms<'b, f64>,
+    times: Times,
+    begin: [&'a [Octet]; 3],
+}
+
+impl<W: EightLanes> Task for Expand<'_, '_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn perform(self) {
+        let Whole { series, begin: [u, rest, rate], rates, power } = self.whole;
+        let [from_u, from_rest, from_rate] = self.begin;
+        for c in 0..u.len() {
+            u[c] = InLanes(W::of(&from_u[c].0));
+            rest[c] = InLanes(W::of(&from_rest[c].0));
+            rate[c] = InLanes(W::of(&from_rate[c].0));
+        }
+        series.expand_terms(self.terms, self.times, u, rest, rate);
+        for i in 0..rates.len() {
+            rates[i] = Octet(series.rate[i].0.array());
+        }
+        for m in 0..power.len() {
+            power[m] = Octet(series.power[m].0.array());
+        }
+    }
+}
+
+impl<W: EightLanes> SeriesInLanes for Whole<W> {
+    fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]) {
+        W::perform(Expand { whole: self, terms: &mechanism.terms(), times, begin });
+    }
+
+    fn rates(&self) -> &[Octet] {
+        &self.rates
+    }
+
+    fn power(&self) -> &[Octet] {
+        &self.power
+    }
+
+    fn rate_of(&self, m: usize, body: usize, lane: usize) -> f64 {
+        self.series.omega[m * self.series.elements + body].0.array()[lane]
+    }
+
+    fn angle_of(&self, body: usize, lane: usize) -> f64 {
+        let Complex { re, im } = self.series.z[body];
+        Scalar::atan2(im.0.array()[lane], re.0.array()[lane])
+    }
+}

@@ -1,0 +1,289 @@
+//! A number of each of eight motions.
+
+use super::super::factors::Factored;
+use super::super::{Constants, Series, SeriesNumber, Terms, bodywise, drive};
+use super::Times;
+use super::factor::FactorInLanes;
+use crate::arithmetic::eight::LANES;
+use crate::arithmetic::lanes::wide::{EightLanes, Task};
+use crate::arithmetic::lanes::{Arithmetic, Lanes};
+use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, sincos};
+use crate::dynamics::Time;
+use crate::dynamics::law::{Law, Phase, Sine};
+use crate::scene::Profile;
+use std::cmp::Ordering;
+use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+
+/// A number of each motion.
+#[derive(Clone, Copy, Debug)]
+pub struct InLanes<W>(pub W);
+
+impl<W: EightLanes> InLanes<W> {
+    /// A function of every lane by itself, that is seldom asked for.
+    #[inline(never)]
+    fn seldom(self, f: impl Fn(usize, f64) -> f64) -> Self {
+        let lanes = self.0.array();
+        Self(W::of(&std::array::from_fn(|lane| f(lane, lanes[lane]))))
+    }
+
+    /// What a function makes of every lane's time.
+    #[inline]
+    fn of_times(times: &Times, f: impl Fn(Time) -> f64) -> Self {
+        Self(W::of(&std::array::from_fn(|lane| f(times[lane]))))
+    }
+
+    /// Sines and cosines where an angle is far off or not a number: that lane by itself.
+    #[cold]
+    #[inline(never)]
+    fn far_sin_cos(self) -> (Self, Self) {
+        let angles = self.0.array();
+        let is_near = |angle: f64| angle.abs() <= sincos::RANGE;
+        let near = angles.map(|angle| if is_near(angle) { angle } else { 0.0 });
+        let (sin, cos) = Self(W::of(&near)).near_sin_cos();
+        let (mut sin, mut cos) = (sin.0.array(), cos.0.array());
+        for (lane, &angle) in angles.iter().enumerate().filter(|(_, angle)| !is_near(**angle)) {
+            (sin[lane], cos[lane]) = libm::sincos(angle);
+        }
+        (Self(W::of(&sin)), Self(W::of(&cos)))
+    }
+
+    #[inline(always)]
+    fn near_sin_cos(self) -> (Self, Self) {
+        let [first, second] = self.0.halves();
+        let (s, c) = sincos::sin_cos(first, <W::Half as Arithmetic>::ZERO);
+        let (other_s, other_c) = sincos::sin_cos(second, <W::Half as Arithmetic>::ZERO);
+        (Self(W::join([s, other_s])), Self(W::join([c, other_c])))
+    }
+}
+
+impl<W: EightLanes> Default for InLanes<W> {
+    #[inline(always)]
+    fn default() -> Self {
+        Self::ZERO
+    }
+}
+
+impl<W: EightLanes> Scalar for InLanes<W> {
+    const ZERO: Self = Self(W::ZERO);
+    const ONE: Self = Self(W::ONE);
+
+    #[inline(always)]
+    fn of(value: f64) -> Self {
+        Self(W::splat(value))
+    }
+
+    #[inline(always)]
+    fn scale(self, factor: f64) -> Self {
+        Self(self.0.mul(W::splat(factor)))
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        let [first, second] = self.0.halves();
+        Self(W::join([first.sqrt(), second.sqrt()]))
+    }
+
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        let [first, second] = self.0.halves();
+        if first.are_within(sincos::RANGE) && second.are_within(sincos::RANGE) {
+            self.near_sin_cos()
+        } else {
+            self.far_sin_cos()
+        }
+    }
+
+    fn exp(self) -> Self {
+        self.seldom(|_, x| Scalar::exp(x))
+    }
+
+    fn ln(self) -> Self {
+        self.seldom(|_, x| Scalar::ln(x))
+    }
+
+    fn tanh(self) -> Self {
+        self.seldom(|_, x| Scalar::tanh(x))
+    }
+
+    fn atan2(self, x: Self) -> Self {
+        let x = x.0.array();
+        self.seldom(|lane, y| Scalar::atan2(y, x[lane]))
+    }
+}
+
+impl<W: EightLanes> Real for InLanes<W> {
+    const IS_PLAIN: bool = false;
+    const HAS_CONSTANTS: bool = true;
+
+    /// Of the first lane: nothing of what lanes are expanded for asks for it.
+    #[inline(always)]
+    fn value(self) -> f64 {
+        self.0.array()[0]
+    }
+
+    /// The product with the rounded reciprocal, corrected by what is left of the division.
+    #[inline(always)]
+    fn divided(self, k: usize, fraction: Self) -> Self {
+        let quotient = self.0.mul(fraction.0);
+        let left = quotient.neg_mul_add(W::splat(k as f64), self.0);
+        Self(left.mul_add(fraction.0, quotient))
+    }
+
+    #[inline(always)]
+    fn split(value: DoubleDouble) -> (Self, Self) {
+        (Self::of(value.hi), Self::of(value.lo))
+    }
+
+    #[inline(always)]
+    fn double_double(self) -> DoubleDouble {
+        DoubleDouble::of(self.value())
+    }
+}
+
+impl<W: EightLanes> PartialEq for InLanes<W> {
+    #[inline(always)]
+    fn eq(&self, other: &Self) -> bool {
+        self.0.array() == other.0.array()
+    }
+}
+
+/// Where all lanes are ordered alike.
+impl<W: EightLanes> PartialOrd for InLanes<W> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        let (own, other) = (self.0.array(), other.0.array());
+        let order = own[0].partial_cmp(&other[0]);
+        (1..LANES).all(|lane| own[lane].partial_cmp(&other[lane]) == order).then_some(order).flatten()
+    }
+}
+
+impl<W: EightLanes> Add for InLanes<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self(self.0.add(other.0))
+    }
+}
+
+impl<W: EightLanes> Sub for InLanes<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self(self.0.sub(other.0))
+    }
+}
+
+impl<W: EightLanes> Mul for InLanes<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self(self.0.mul(other.0))
+    }
+}
+
+impl<W: EightLanes> Div for InLanes<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self(self.0.div(other.0))
+    }
+}
+
+impl<W: EightLanes> Neg for InLanes<W> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(W::ZERO.sub(self.0))
+    }
+}
+
+impl<W: EightLanes> AddAssign for InLanes<W> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        self.0 = self.0.add(other.0);
+    }
+}
+
+impl<W: EightLanes> SubAssign for InLanes<W> {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        self.0 = self.0.sub(other.0);
+    }
+}
+
+impl<W: EightLanes> Constants for InLanes<W> {
+    type Constant = f64;
+    type Time = Times;
+
+    fn moment(times: Times) -> Self {
+        Self::of_times(&times, |t| t.hi)
+    }
+
+    fn phase(law: &Law, times: Times) -> Phase<Self> {
+        let phases = times.map(|t| law.at::<f64>(t));
+        let join =
+            |part: fn(&Phase<f64>) -> f64| Self(W::of(&std::array::from_fn(|lane| part(&phases[lane]))));
+        Phase {
+            angle: join(|phase| phase.angle),
+            unit: Complex::new(join(|phase| phase.unit.re), join(|phase| phase.unit.im)),
+            rate: join(|phase| phase.rate),
+            acceleration: join(|phase| phase.acceleration),
+        }
+    }
+
+    fn law_value(law: &Law, times: Times) -> Self {
+        Self::of_times(&times, |t| law.value(t))
+    }
+
+    fn add_law(law: &Law, sign: f64, times: Times, series: &mut [Self], first: usize, stride: usize) {
+        let rate = Self::of_times(&times, |t| law.at::<f64>(t).rate);
+        let unit = |sine: &Sine| {
+            let units = times.map(|t| Scalar::sin_cos(sine.argument(t).reduced().0.hi));
+            let join = |part: fn((f64, f64)) -> f64| Self(W::of(&units.map(part)));
+            (join(|(sin, _)| sin), join(|(_, cos)| cos))
+        };
+        let profile = |profile: &Profile, order: usize| {
+            let powers = times.map(|t| profile.series::<f64>(t, order));
+            let power = |m: usize| Self(W::of(&std::array::from_fn(|lane| powers[lane][m])));
+            (0..powers[0].len()).map(power).collect()
+        };
+        drive::add_from(law, sign, rate, (unit, profile), (series, first, stride));
+    }
+}
+
+impl<W: EightLanes> Factored for InLanes<W> {
+    type Factor = FactorInLanes<W>;
+}
+
+impl<W: EightLanes> SeriesNumber for InLanes<W> {
+    const HAS_INVERSE: bool = true;
+    const HAS_ROWS: bool = true;
+
+    #[inline(never)]
+    fn perform<K: Task>(task: K) -> K::Output {
+        W::perform(task)
+    }
+
+    #[inline(always)]
+    fn with_product(self, factor: Self, constant: Self, _is_varied: bool) -> Self {
+        Self(factor.0.mul_add(constant.0, self.0))
+    }
+
+    #[inline(always)]
+    fn with_constant(self, factor: Self, constant: f64) -> Self {
+        Self(factor.0.mul_add(W::splat(constant), self.0))
+    }
+
+    #[inline(always)]
+    fn begin(series: &mut Series<Self>, times: Times, u: &[Self], u_rest: &[Self], u_rate: &[Self]) {
+        series.begin(times, u, u_rest, u_rate);
+    }
+
+    #[inline(always)]
+    fn orders(series: &mut Series<Self>, terms: &Terms<f64>, first: usize) {
+        series.orders_here::<0>(terms, first);
+    }
+
+    fn products(n: usize, a: &[Complex<Self>], b: &[Complex<Self>], sums: &mut [Complex<Self>]) {
+        bodywise::products(n, a, b, sums);
+    }
+}

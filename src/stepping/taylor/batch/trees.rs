@@ -1,0 +1,248 @@
+//! Hinge trees with springs, torsion springs, applied forces and motors, all lanes of equal mechanisms: the
+//! series of [`dynamics`](crate::dynamics::series) on numbers with a lane for each trajectory.
+
+use super::super::terms::over;
+use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
+use crate::arithmetic::angle;
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
+use crate::dynamics::law::Law;
+use crate::dynamics::series::lanes::{SeriesInLanes, in_lanes};
+use crate::dynamics::{Mechanism, State, Time};
+use std::f64::consts::{PI, TAU};
+
+/// Largest number of bodies: beyond, dense matrices are not the form to compute in.
+const BODIES: usize = 12;
+const ZERO: Octet = Octet([0.0; LANES]);
+
+/// The mechanism, states and coefficients of the trajectories in the lanes.
+#[derive(Debug)]
+pub(super) struct TreeTeam {
+    mechanism: Mechanism,
+    series: Box<dyn SeriesInLanes>,
+    order: usize,
+    /// Number of coordinates f.
+    coordinates: usize,
+    /// The energy scale times the unit of time \[J s\].
+    energy: Octet,
+    /// Leading parts of angles, rates and work (2f + 1), and what they leave out.
+    high: Vec<Octet>,
+    low: Vec<Octet>,
+    /// Angles at the start of the step (f), and the step \[s\].
+    before: Vec<Octet>,
+    taken: Octet,
+    times: [Time; LANES],
+}
+
+/// True for hinge trees whose motors are all eliminated, with a motion left, and laws that are no formulas;
+/// not for bodies on their axes under gravity and springs alone: more of them than have lanes of their own
+/// are faster one by one.
+pub(super) fn fits(mechanism: &Mechanism) -> bool {
+    (1..=BODIES).contains(&mechanism.bodies.len())
+        && !super::free::fits(mechanism)
+        && mechanism.coordinates() == mechanism.bodies.len()
+        && mechanism.partition.count() > 0
+        && mechanism.tree.is_dense()
+        && !mechanism.has_multipliers()
+        && mechanism.forces.is_empty()
+        && mechanism.contacts.is_empty()
+        && mechanism.frictions.is_empty()
+        && laws(mechanism).all(|law| law.profile.is_none())
+}
+
+/// The laws of motors and applied forces.
+fn laws(mechanism: &Mechanism) -> impl Iterator<Item = &Law> {
+    let motors = mechanism.partition.bodies.iter().flat_map(|angle| angle.laws.iter().map(|(_, law)| law));
+    motors.chain(mechanism.actions.iter().filter_map(|action| action.law.as_ref()))
+}
+
+/// About the fastest rate of a mechanism from a time on \[rad/s\].
+fn fastest_rate(mechanism: &Mechanism, t: f64) -> f64 {
+    let mobility = mechanism.tree.mobility();
+    let torsions = mechanism.torsions.iter().map(|torsion| {
+        let mobility = mobility[torsion.body] + torsion.base.map_or(0.0, |base| mobility[base]);
+        2.0 * mobility * (torsion.stiffness + 2.0 * mobility * torsion.damping.powi(2))
+    });
+    let motors = laws(mechanism).map(|law| {
+        let [fastest, bend] = law.bounds(t);
+        let frequency = law.sines.iter().fold(0.0, |most: f64, sine| most.max(sine.frequency.abs()));
+        fastest * fastest + bend + frequency * frequency
+    });
+    let squares = torsions.chain(motors).fold(0.0, |sum, square| sum + square);
+    (mechanism.tree.fastest_rate(&mechanism.springs).powi(2) + squares).sqrt()
+}
+
+impl TreeTeam {
+    /// The coordinate that a body's angle is, where it is not driven.
+    fn coordinate(&self, body: usize) -> Option<usize> {
+        let dependent_angle = &self.mechanism.partition.bodies[body];
+        dependent_angle.base.filter(|_| dependent_angle.laws.is_empty())
+    }
+
+    /// The angle of a body where the step began, less whole turns \[rad\].
+    fn start(&self, lane: usize, body: usize) -> f64 {
+        let Some(base) = self.coordinate(body) else { return self.series.angle_of(body, lane) };
+        let angle = self.before[base].0[lane];
+        if angle.abs() <= PI { angle } else { angle - TAU * (angle / TAU).round() }
+    }
+}
+
+impl Team for TreeTeam {
+    fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self {
+        let f = like.partition.count();
+        Self {
+            series: in_lanes(like, order, vectors),
+            mechanism: like.clone(),
+            order,
+            coordinates: f,
+            energy: Octet::splat(1.0),
+            high: vec![ZERO; 2 * f + 1],
+            low: vec![ZERO; 2 * f + 1],
+            before: vec![ZERO; f],
+            taken: ZERO,
+            times: [Time::default(); LANES],
+        }
+    }
+
+    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
+        // What starts and energies are measured by may differ: it is not in the series.
+        let is_equal = || {
+            (&mechanism.tree, &mechanism.partition, &mechanism.springs)
+                == (&like.tree, &like.partition, &like.springs)
+                && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
+        };
+        fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && is_equal())
+    }
+
+    fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
+        for (numbers, unknowns) in [(&mut self.high, &member.state.y), (&mut self.low, &member.state.low)] {
+            for (number, unknown) in numbers.iter_mut().zip(unknowns) {
+                number.0[lane] = *unknown;
+            }
+        }
+        self.energy.0[lane] = member.mechanism.energy_scale * member.mechanism.units.time;
+        let tied = if self.mechanism.partition.driven() { 8.0 } else { 3.0 };
+        order as f64 / tied / fastest_rate(&self.mechanism, member.state.time.hi)
+    }
+
+    /// At rest.
+    fn park(&mut self, lane: usize) {
+        self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
+    }
+
+    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
+        self.before.copy_from_slice(&self.high[..self.coordinates]);
+        for (time, slot) in self.times.iter_mut().zip(slots) {
+            *time = slot.time;
+        }
+    }
+
+    fn expand<W: EightLanes>(&mut self, _order: usize) {
+        let f = self.coordinates;
+        let (angles, rates) = self.high[..2 * f].split_at(f);
+        self.series.expand(&self.mechanism, self.times, [angles, &self.low[..f], rates]);
+    }
+
+    #[inline(always)]
+    fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES] {
+        let (f, rates, power) = (self.coordinates, self.series.rates(), self.series.power());
+        let energy = load::<W>(&self.energy);
+        let mut sizes = [ZERO; JUDGES];
+        let mut back = 0;
+        while back < JUDGES {
+            let k = order - back;
+            // The work over the energy scale counts as the rates do.
+            let mut most = load::<W>(&power[k - 1]).div(energy.mul(W::splat(k as f64))).larger(W::ZERO);
+            for c in 0..f {
+                most = load::<W>(&rates[k * f + c]).larger(most);
+            }
+            sizes[back] = store(most);
+            back += 1;
+        }
+        sizes
+    }
+
+    fn is_finite(&self, lane: usize, order: usize) -> bool {
+        let f = self.coordinates;
+        self.series.rates()[order * f..(order + 1) * f].iter().all(|rate| rate.0[lane].is_finite())
+    }
+
+    #[inline(always)]
+    fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet) {
+        let (f, h) = (self.coordinates, load::<W>(taken));
+        let (rates, power, square) = (self.series.rates(), self.series.power(), h.mul(h));
+        self.taken = *taken;
+        for c in 0..f {
+            // Even and odd powers apart.
+            let (mut angle, mut rate) = ([W::ZERO; 2], [W::ZERO; 2]);
+            let mut k = order;
+            while k > 0 {
+                let v = load::<W>(&rates[k * f + c]);
+                if k.is_multiple_of(2) {
+                    (angle[0], rate[0]) =
+                        (angle[0].mul_add(square, over(v, k + 1)), rate[0].mul_add(square, v));
+                } else {
+                    (angle[1], rate[1]) =
+                        (angle[1].mul_add(square, over(v, k + 1)), rate[1].mul_add(square, v));
+                }
+                k -= 1;
+            }
+            let angle = h.mul(load::<W>(&rates[c]).add(moved(angle, h)));
+            let drifted = load::<W>(&self.low[f + c]).mul(h);
+            (self.high[c], self.low[c]) = added([&self.high[c], &self.low[c]], angle, drifted);
+            (self.high[f + c], self.low[f + c]) =
+                added([&self.high[f + c], &self.low[f + c]], moved(rate, h), W::ZERO);
+        }
+        let mut work = [W::ZERO; 2];
+        let mut k = order;
+        while k > 0 {
+            let part = over(load::<W>(&power[k - 1]), k);
+            if k.is_multiple_of(2) {
+                work[0] = work[0].mul_add(square, part);
+            } else {
+                work[1] = work[1].mul_add(square, part);
+            }
+            k -= 1;
+        }
+        (self.high[2 * f], self.low[2 * f]) =
+            added([&self.high[2 * f], &self.low[2 * f]], moved(work, h), W::ZERO);
+    }
+
+    fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
+        let (start, f) = (self.start(lane, body), self.coordinates);
+        if let Some(base) = self.coordinate(body) {
+            let moved = self.high[base].0[lane] - self.before[base].0[lane];
+            let rate = self.series.rates()[base].0[lane];
+            return [[start, rate], [start + moved, self.high[f + base].0[lane]]];
+        }
+        let (end, rate) = self.at(self.order, lane, body, self.taken.0[lane]);
+        [[start, self.series.rate_of(0, body, lane)], [end, rate]]
+    }
+
+    fn wrap(&mut self, lane: usize, turns: &mut [i64]) {
+        if self.mechanism.is_winding() {
+            return;
+        }
+        for (c, turns) in turns.iter_mut().enumerate().take(self.coordinates) {
+            *turns += angle::wrap(&mut self.high[c].0[lane], &mut self.low[c].0[lane]);
+        }
+    }
+
+    fn leave(&self, lane: usize, state: &mut State) {
+        for (unknowns, numbers) in [(&mut state.y, &self.high), (&mut state.low, &self.low)] {
+            for (unknown, number) in unknowns.iter_mut().zip(numbers) {
+                *unknown = number.0[lane];
+            }
+        }
+    }
+
+    fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
+        let (mut angle, mut rate) = (0.0, 0.0);
+        for k in (0..=order).rev() {
+            let v = self.series.rate_of(k, body, lane);
+            rate = rate * after + v;
+            angle = angle * after + v / (k + 1) as f64;
+        }
+        (self.start(lane, body) + angle * after, rate)
+    }
+}
