@@ -237,7 +237,7 @@ fn linkage(seed: u64) -> String {
     format!(
         r#"{{"name": "linkage", "gravity": [0, {}], "bars": [{}], "hinges": [{}], {sliders} {more}
         "start": {{{}}}, "until": 2, "every": 0.5}}"#,
-        if dice.is(0.5) { -9.81 } else { 0.0 },
+        if dice.is(0.5) { -9.81 } else { -2.0 },
         bars.join(", "),
         hinges.join(", "),
         starts.join(", ")

@@ -11,7 +11,7 @@
 //! that of the places that touch and do not slide, which is small, and nothing else tells a problem without a
 //! solution, or with several, from one whose solution was not found.  Among combinations that fit, those that
 //! stick most come first: with a static coefficient above the kinetic one a place at rest stays so.
-//! Places that share a degree of freedom may also be at their limits, see [`shared`](super::shared).
+//! Places that share a degree of freedom may also be at their limits, see `friction/shared.rs`.
 //!
 //! Source: D. Stewart, *Rigid-body dynamics with friction and impact*, SIAM Review 42 (2000); of the paradox
 //! F. Génot, B. Brogliato, *New results on Painlevé paradoxes*, Eur. J. Mech. A 18 (1999).
