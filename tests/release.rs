@@ -2,7 +2,7 @@
 
 use super::formulas::{adaptive, rotor, run, scene};
 use super::friction::{Absolute, pin};
-use driftless::run::{Limits, MethodId, Plan, Request, Run, Running};
+use driftless::run::{Limits, METHODS, MethodId, Plan, Request, Run, Running};
 use driftless::{Mechanism, read_scene};
 use nalgebra::DVector;
 use std::sync::Arc;
@@ -136,6 +136,45 @@ fn a_rotor_coasts_once_its_motor_is_off() {
         near(outcome.last.work, 0.5 * 6.0 * 4.0, "work of the motor");
         assert_eq!(outcome.last.motors[0], [0.0; 2]);
     }
+}
+
+/// Fixed steps are laid from the event on, which is at no multiple of them.
+#[test]
+fn every_method_is_at_its_output_times_after_an_event_between_steps() {
+    let law = r#""parameters": {"k": 2}, "events": [{"name": "E", "when": "t - 0.777", "set": {"k": 3}}],"#;
+    let tree = format!(
+        r#"{{"name": "tree", "gravity": [0, -{G}], {law}
+        "bars": [{{"name": "a", "mass": 1, "length": 1, "centre": [0.5, 0], "inertia": 0.1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}}],
+        "torsion_springs": [{{"name": "s", "body": "a", "stiffness": "k", "free_angle": 0}}],
+        "start": {{"a": {{"phi": 0, "omega": 1}}}}, "until": 2, "every": 0.5}}"#
+    );
+    let rail = r#""sliders": [{"name": "S", "point": {"body": "a", "point": [1, 0]},
+        "rail": {"body": "ground", "point": [0, 0], "direction": [1, 1]}}], "start": {"a": {"phi": 0.5, "omega": 1, "origin": [-0.4, 0], "velocity": [0, 0]}}"#;
+    let hinge = tree.find("\"hinges\"").zip(tree.find("\"torsion_springs\"")).expect("both are there");
+    let start = tree.find("\"start\"").zip(tree.find(", \"until\"")).expect("both are there");
+    let on_rail = format!("{}{}{rail}{}", &tree[..hinge.0], &tree[hinge.1..start.0], &tree[start.1..]);
+    let mut compared = 0;
+    for text in [&tree, &on_rail] {
+        let scene = scene(text);
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        let (until, expected) = (scene.until, run(&scene, &adaptive(MethodId::Taylor, 1e-14)));
+        for info in METHODS {
+            let request = Request { method: Some(info.id), ..Request::default() };
+            if Plan::new(&scene, &mechanism, &request).is_err() {
+                continue;
+            }
+            let outcome = run(&scene, &request);
+            assert!(outcome.stop.is_none(), "{}: {:?}", info.name, outcome.stop);
+            let late = (outcome.last.t - until).abs();
+            let off = (outcome.last.phi[0] - expected.last.phi[0]).abs();
+            println!("{}: {late:e} s late, off by {off:e}", info.name);
+            assert!(late < 1e-12, "{}: {late:e} s late", info.name);
+            assert!(off < 1e-4, "{}: off by {off:e}", info.name);
+            compared += 1;
+        }
+    }
+    assert!(compared >= 28, "{compared} compared");
 }
 
 #[test]

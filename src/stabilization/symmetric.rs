@@ -234,7 +234,7 @@ impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {
         Ok(())
     }
 
-    /// A whole step; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
+    /// A whole step, or a shorter one that ends at `until`; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
     fn step(
         &mut self,
         problem: &mut P,
@@ -242,14 +242,14 @@ impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {
         until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        let h = self.inner.step().copysign((until - state.time).hi);
+        let h = self.inner.next(state, until);
         statistics.check(Integrator::<P>::name(self), state.time.hi, h)?;
         self.shifted(problem, state, h, statistics)?;
         Ok(None)
     }
 
     fn is_at(&self, state: &State, until: Time) -> bool {
-        ((until - state.time).hi / self.inner.step()).abs().round() == 0.0
+        self.inner.next(state, until) == 0.0
     }
 
     fn changed(&mut self, state: &mut State) {

@@ -223,7 +223,7 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Gauss {
 
 impl Gauss {
     /// The next step \[s\] on the way to `until`: a whole one, what is left where that is shorter, or zero.
-    fn next(&self, state: &State, until: Time) -> f64 {
+    pub(crate) fn next(&self, state: &State, until: Time) -> f64 {
         let span = (until - state.time).hi;
         let (whole, least) =
             ((span / self.step).abs().round(), WHOLE * self.step + 4.0 * f64::EPSILON * until.hi.abs());

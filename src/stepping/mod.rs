@@ -166,8 +166,8 @@ pub trait Integrator<P: ?Sized> {
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError>;
 
-    /// True where no step is left before `until`: adaptive methods land on it, fixed-step methods take the
-    /// whole number of steps nearest to it.
+    /// True where no step is left before `until`: adaptive methods land on it, fixed-step methods to the
+    /// rounding of whole steps, or by a shorter one where an event came between.
     fn is_at(&self, state: &State, until: Time) -> bool {
         (until - state.time).hi <= 0.0
     }
