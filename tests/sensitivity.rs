@@ -197,6 +197,32 @@ fn what_is_driven_is_derived_by_its_law() {
     assert_near(found.measures[0].slopes[1], 1.0, 1e-11, "start");
 }
 
+/// What only the motor of a slider-crank feels leaves its motion alone: dT/dk = (s - s0) ds/dphi by virtual work.
+#[test]
+fn a_driven_linkage_is_derived_by_what_only_its_motor_feels() {
+    let scene = template(
+        r#"{"name": "press", "gravity": [0, -3],
+            "bars": [{"name": "crank", "mass": 0.7, "centre": [0.15, 0], "inertia": 0.01, "length": 0.3},
+                {"name": "rod", "mass": 1.4, "centre": [0.4, 0], "inertia": 0.08, "length": 0.8}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+                {"name": "B", "between": [{"body": "crank", "point": [0.3, 0]}, {"body": "rod", "point": [0, 0]}]}],
+            "sliders": [{"name": "S", "point": {"body": "rod", "point": [0.8, 0]},
+                "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+            "springs": [{"name": "spring", "between": [{"body": "ground", "point": [2, 0]}, {"body": "rod", "point": [0.8, 0]}],
+                "stiffness": 38, "free_length": 0.7}],
+            "motors": [{"name": "motor", "body": "crank", "law": {"start": 0.5, "rate": 1.5}}],
+            "start": {"rod": {"phi": -0.18}}, "until": 2, "every": 0.1}"#,
+    );
+    let found = derived(&scene, &["motor.torque", "rod.phi", "rod.omega"], &["spring.stiffness"], 2.0);
+    let (phi, r, l) = (3.5_f64, 0.3, 0.8);
+    let along = (l * l - r * r * phi.sin().powi(2)).sqrt();
+    let (x, by_phi) = (r * phi.cos() + along, -r * phi.sin() - r * r * phi.sin() * phi.cos() / along);
+    assert_near(found.measures[0].slopes[0], -(2.0 - x - 0.7) * by_phi, 1e-9, "torque by stiffness");
+    for measure in &found.measures[1..] {
+        assert!(measure.slopes[0].abs() < 1e-12, "{}: {:e}", measure.name, measure.slopes[0]);
+    }
+}
+
 #[test]
 fn numbers_with_units_are_numbers() {
     let scene = template(

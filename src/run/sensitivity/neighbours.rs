@@ -12,6 +12,7 @@
 
 use super::super::contact::in_modes;
 use crate::dynamics::constraint::Posture;
+use crate::dynamics::contact::metric::Metric;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::saltation::Weighted;
@@ -39,6 +40,8 @@ const NEAR_ZERO: f64 = 1e-3;
 const ROUNDED: f64 = 1e-12;
 /// Groups of values of the start: coordinates and rates.
 const STARTS: usize = 2;
+/// States that are looked at, as shares of the horizon and changes of the start \[rad, m\].
+const STATES: [(f64, f64); 3] = [(0.0, 0.0), (0.5, 0.4), (1.0, -0.7)];
 /// Offsets and weights: on both sides, and on one.
 const BOTH: [[f64; 2]; 4] = [[-2.0, 1.0 / 12.0], [-1.0, -2.0 / 3.0], [1.0, 2.0 / 3.0], [2.0, -1.0 / 12.0]];
 const ONE: [[f64; 2]; 5] = [[0.0, -25.0 / 12.0], [1.0, 4.0], [2.0, -3.0], [3.0, 4.0 / 3.0], [4.0, -0.25]];
@@ -363,15 +366,37 @@ impl Search<'_> {
         (slopes, sizes)
     }
 
-    /// The size that values of a group have at least: a start at rest and a constraint that is met are
-    /// differences of numbers that are not small, and rounded as those.
+    /// The size that values of a group have at least: a start at rest, a constraint that is met and an
+    /// acceleration that constraints leave are differences of numbers that are not small, and rounded as those.
     fn least_size(&self, group: usize) -> f64 {
         let units = self.base.0.units;
         let (place, rate) = (units.length.min(1.0), 1.0 / units.time);
         match group.checked_sub(STARTS) {
             None => [1.0, rate][group],
-            Some(rest) => [0.0, place, place * rate, place][rest % 4],
+            Some(rest) if rest % 4 == 0 => self.unconstrained(rest / 4),
+            Some(rest) => [place, place * rate, place][rest % 4 - 1],
         }
+    }
+
+    /// The largest acceleration \[rad/s², m/s²\] that forces alone would cause at a state; zero where they act
+    /// alone.
+    fn unconstrained(&self, state: usize) -> f64 {
+        let mechanism = self.base.0;
+        if mechanism.constraints.is_empty() {
+            return 0.0;
+        }
+        let (t, phi, omega) = self.state(state);
+        let metric = Metric::at(mechanism, t, &phi, &omega);
+        let accelerations = metric.map(|metric| metric.rates(&metric.unconstrained()));
+        accelerations.unwrap_or_default().iter().fold(0.0, |most, a| most.max(a.abs()))
+    }
+
+    /// The states everything is derived at: that of the start, and two that are like no other.
+    fn state(&self, number: usize) -> (Time, Vec<f64>, Vec<f64>) {
+        let (n, (share, turn)) = (self.base.0.coordinates(), STATES[number]);
+        let phi = (0..n).map(|k| self.base.1.phi[k].hi + turn * unlike(k));
+        let omega = (0..n).map(|k| self.base.1.omega[k].hi + 3.0 * turn * unlike(k));
+        (Time::from(share * self.until), phi.collect(), omega.collect())
     }
 
     /// The start in [`STARTS`] groups; then for each state accelerations, constraints, their rates and gaps.
@@ -383,10 +408,7 @@ impl Search<'_> {
             start.omega.iter().map(|omega| omega.hi).collect(),
         ];
         let mut kernel = Kernel::<f64>::new(mechanism);
-        for (share, turn) in [(0.0, 0.0), (0.5, 0.4), (1.0, -0.7)] {
-            let t = Time::from(share * self.until);
-            let phi: Vec<f64> = (0..n).map(|k| self.base.1.phi[k].hi + turn * unlike(k)).collect();
-            let omega: Vec<f64> = (0..n).map(|k| self.base.1.omega[k].hi + 3.0 * turn * unlike(k)).collect();
+        for (t, phi, omega) in (0..STATES.len()).map(|number| self.state(number)) {
             kernel.accelerate::<0>(mechanism, t, &phi, &omega, Bias::default());
             groups.push(kernel.load.clone());
             let (positions, rates) = residuals(mechanism, t, &phi, &omega);
