@@ -97,6 +97,36 @@ fn a_force_to_and_fro_below_what_both_rails_hold_moves_nothing() {
     }
 }
 
+#[test]
+fn a_block_with_friction_rests_against_a_wall_until_it_is_pulled_off() {
+    let (mass, [kinetic, stiction], push, rate, until) = (2.0, [0.4, 0.6], 30.0, 1.0_f64, 3.0);
+    // Pushed against the wall by more than friction holds, then by less, then pulled.
+    let begin = (-stiction * mass * G / push).acos() / rate;
+    let (by, accelerated) = (until - begin, push / (mass * rate * rate));
+    let way = accelerated * ((rate * until).cos() - (rate * begin).cos())
+        + accelerated * rate * (rate * begin).sin() * by
+        - kinetic * G * by * by / 2.0;
+    // Set against it, and thrown against it.
+    for start in [r#""origin": [0, 0], "velocity": [0, 0]"#, r#""origin": [0.5, 0], "velocity": [-2, 0]"#] {
+        let text = format!(
+            r#"{{"name": "block", "gravity": [0, -{G}],
+            "bars": [{{"name": "block", "mass": {mass}, "centre": [0, 0], "inertia": 0.1, "length": 0.2}}],
+            "sliders": [{{"name": "rail", "point": {{"body": "block", "point": [0, 0]}}, "angle": "locked",
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}},
+                "friction": {{"kinetic": {kinetic}, "static": {stiction}}}}}],
+            "walls": [{{"name": "wall", "body": "block", "point": [0, 0], "restitution": 0,
+                "line": {{"through": [0, 0], "normal": [1, 0]}}}}],
+            "forces": [{{"name": "F", "body": "block", "point": [0, 0], "force": ["-{push}*cos({rate}*t)", 0]}}],
+            "start": {{"block": {{"phi": 0, "omega": 0, {start}}}}}, "until": {until}, "every": {until}}}"#
+        );
+        for (name, outcome) in runs(&text) {
+            let off = outcome.last.phi[1] - way;
+            println!("{name}: {:?}, off by {off:e} of {way}", outcome.frictions);
+            assert!(off.abs() < 1e-9, "{name}: off by {off:e}");
+        }
+    }
+}
+
 /// A balanced wheel that a motor turns by a law, on a shaft with friction.
 fn wheel(law: &str, until: f64) -> String {
     format!(
@@ -132,7 +162,7 @@ fn what_a_motor_holds_needs_no_friction_and_slides_as_soon_as_it_is_moved() {
 }
 
 /// A crank with a slotted rocker, a slider-crank or a four-bar, with friction in most joints, springs, torques and
-/// motors, some of which rest for a while.
+/// motors, some of which rest for a while, and a stop for the crank.
 fn linkage(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 7);
     let friction = |dice: &mut Dice, radius: bool| {
@@ -234,6 +264,17 @@ fn linkage(seed: u64) -> String {
             dice.within(0.0, 2.0)
         );
     }
+    // A crank that a motor drives into it would have no way on.
+    if !more.contains("motors") && dice.is(0.5) {
+        let side = dice.within(-3.0, 3.0);
+        let (normal, clear) = ([side.cos(), side.sin()], dice.within(0.0, 0.2));
+        let through = [pin[0] - clear * normal[0], pin[1] - clear * normal[1]];
+        let restitution = if dice.is(0.6) { 0.0 } else { dice.within(0.0, 0.6) };
+        more += &format!(
+            r#""walls": [{{"name": "W", "body": "a", "point": [{crank}, 0], "restitution": {restitution},
+            "line": {{"through": {through:?}, "normal": {normal:?}}}}}],"#
+        );
+    }
     format!(
         r#"{{"name": "linkage", "gravity": [0, {}], "bars": [{}], "hinges": [{}], {sliders} {more}
         "start": {{{}}}, "until": 2, "every": 0.5}}"#,
@@ -247,7 +288,7 @@ fn linkage(seed: u64) -> String {
 #[test]
 fn random_linkages_with_friction_in_their_joints_agree_between_methods() {
     let count: u64 = std::env::var("FRICTION").ok().and_then(|count| count.parse().ok()).unwrap_or(100);
-    let [mut compared, mut transitions, mut resting] = [0_u64; 3];
+    let [mut compared, mut transitions, mut resting, mut stopped] = [0_u64; 4];
     for seed in 0..count {
         let text = linkage(seed);
         let scene = scene(&text);
@@ -266,8 +307,11 @@ fn random_linkages_with_friction_in_their_joints_agree_between_methods() {
         }
         compared += 1;
         transitions += one.friction_count;
+        stopped += u64::from(one.impact_count > 0);
         resting += u64::from(one.last.omega.iter().all(|omega| omega.abs() < 1e-9));
     }
-    println!("{compared} compared: {transitions} transitions, {resting} at rest at the end");
-    assert!(compared == count && transitions > count && resting > 0);
+    println!(
+        "{compared} compared: {transitions} transitions, {resting} at rest at the end, {stopped} met a wall"
+    );
+    assert!(compared == count && transitions > count && resting > 0 && stopped > count / 8);
 }

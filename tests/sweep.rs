@@ -7,7 +7,7 @@ use crate::program;
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::trust::Level;
 use driftless::run::{
-    Flip, MethodId, Point, PointObserver, Request, Shard, Stabilization, Status, Sweep, SweepError,
+    Flip, MethodId, Outcome, Point, PointObserver, Request, Shard, Stabilization, Status, Sweep, SweepError,
     SweepTable, Vary, reference, simulate, sweep,
 };
 use driftless::scene::{Override, Template};
@@ -73,6 +73,20 @@ fn every_point_is_the_run_it_stands_for() {
     }
 }
 
+/// The run alone of a point that is integrated over a second, with which it agrees.
+fn agreed(scene: &str, plan: &Sweep, point: &Point, request: &Request) -> Outcome {
+    let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+    let outcome = simulate(&alone, request, &mut |_| Ok(())).expect("a run");
+    assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
+    for (found, exact) in
+        point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
+    {
+        assert!((found - exact).abs() < 1e-9, "{scene}: {point:?} {outcome:?}");
+    }
+    assert!(point.energy < 1e-12, "{scene}: {point:?}");
+    outcome
+}
+
 #[test]
 fn points_in_lanes_agree_with_single_runs() {
     let request = Request { rtol: Some(1e-12), ..request("taylor", 1.0) };
@@ -84,15 +98,7 @@ fn points_in_lanes_agree_with_single_runs() {
     ] {
         let plan = prepared(scene, &vary, &request);
         for point in points(&plan, 1) {
-            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
-            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
-            assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
-            for (found, exact) in
-                point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
-            {
-                assert!((found - exact).abs() < 1e-9, "{scene}: {point:?} {outcome:?}");
-            }
-            assert!(point.energy < 1e-12, "{scene}: {point:?}");
+            let outcome = agreed(scene, &plan, &point, &request);
             let defects = outcome.drift.constraints.first().map(|(_, levels)| [levels[0].max, levels[1].max]);
             for (found, alone) in point.constraint.into_iter().flatten().zip(defects.into_iter().flatten()) {
                 assert!(found < 1e-14 && alone < 1e-14, "{scene}: {found:e} {alone:e}");
@@ -112,15 +118,7 @@ fn points_of_one_tree_agree_with_single_runs() {
     ] {
         let plan = prepared(scene, &vary, &request);
         for point in points(&plan, 1) {
-            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
-            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
-            assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
-            for (found, exact) in
-                point.phi.iter().chain(&point.omega).zip(outcome.last.phi.iter().chain(&outcome.last.omega))
-            {
-                assert!((found - exact).abs() < 1e-9, "{scene}: {point:?} {outcome:?}");
-            }
-            assert!(point.energy < 1e-12, "{scene}: {point:?}");
+            agreed(scene, &plan, &point, &request);
             assert_eq!(plan.point(point.index).as_ref(), Some(&point));
         }
     }

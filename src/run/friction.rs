@@ -1,8 +1,8 @@
 //! Dry friction in a run: when places begin and cease to stick, and what is counted of it.
 //!
 //! The event functions of the places are watched beside those of the scene: the relative velocity of what
-//! slides, or is held by others, and `(mu0 N)² - tau²` of what sticks.  Steps end at their zeros, and there the modes of all places
-//! are found anew, see [`modes`](crate::dynamics::friction::modes).
+//! slides, or is held by others, and `(mu0 N)² - tau²` of what sticks.  Steps end at their zeros, and there
+//! the modes of all places are found anew, see [`modes`](crate::dynamics::friction::modes).
 
 use super::contact::ContactDriver;
 use super::running::Outcome;
@@ -76,26 +76,28 @@ impl FrictionWatch {
         let z = self.mechanism.elements(phi);
         let (at, mut row) = (Posture { phi, z: &z, omega }, vec![0.0; phi.len()]);
         let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
-            Mode::Slip(sign) => {
+            Mode::Slip(_) | Mode::Strained(_) => {
                 row.fill(0.0);
                 friction.tangent.differentiate(t, at, &mut row);
-                sign * dot(&row, omega)
-            }
-            Mode::Strained(0.0) => {
-                row.fill(0.0);
-                friction.tangent.differentiate(t, at, &mut row);
-                self.rest(number, &row, omega)
+                self.velocity(number, *mode, &row, omega)
             }
             _ => 1.0,
         };
         self.mechanism.frictions.iter().zip(&self.mechanism.modes).enumerate().map(of_place).collect()
     }
 
-    /// Positive as long as a place that motors hold rests.
-    fn rest(&self, place: usize, row: &[f64], omega: &[f64]) -> f64 {
-        let parts: f64 = row.iter().zip(omega).map(|(d, omega)| (d * omega).abs()).sum();
-        AT_REST * parts.max(self.mechanism.displacement_unit(place) / self.mechanism.units.time)
-            - dot(row, omega).abs()
+    /// The relative velocity of a place that slides, and what is left to one that motors hold of what counts
+    /// as rest; `row` is the place's Jacobian.
+    fn velocity(&self, place: usize, mode: Mode, row: &[f64], omega: &[f64]) -> f64 {
+        match mode {
+            Mode::Slip(sign) => sign * dot(row, omega),
+            Mode::Strained(0.0) => {
+                let parts: f64 = row.iter().zip(omega).map(|(d, omega)| (d * omega).abs()).sum();
+                let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time;
+                AT_REST * parts.max(own) - dot(row, omega).abs()
+            }
+            _ => 1.0,
+        }
     }
 
     /// Their values at a motion: positive as long as the modes hold.
@@ -125,11 +127,9 @@ impl FrictionWatch {
         let mut rows = kernel.friction_rows.chunks_exact(n);
         let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
             Mode::Open => 1.0,
-            Mode::Strained(strain) => {
-                let row = rows.next().filter(|_| *strain == 0.0);
-                row.map_or(1.0, |row| self.rest(number, row, &omega))
+            Mode::Slip(_) | Mode::Strained(_) => {
+                rows.next().map_or(0.0, |row| self.velocity(number, *mode, row, &omega))
             }
-            Mode::Slip(sign) => sign * rows.next().map_or(0.0, |row| dot(row, &omega)),
             Mode::Stick(_) => {
                 let [tau, pressing] = forces[number];
                 let most = friction.stiction * pressing;

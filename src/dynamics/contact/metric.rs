@@ -35,6 +35,8 @@ pub struct Metric {
     load: Vec<f64>,
     /// The mechanism's rows, contacts that are held included.
     pub rows: Vec<Gradient>,
+    /// How many rows say something new by their geometry alone.
+    rank: usize,
     /// The rows that count, in the order of the columns of `basis`.
     counting: Vec<usize>,
     basis: Basis,
@@ -53,8 +55,8 @@ impl Metric {
         let at = Posture { phi, z: &kernel.z, omega };
         let rows: Vec<Gradient> = mechanism.constraints.iter().map(|row| Gradient::of(row, t, at)).collect();
         let counting = new_rows(mechanism, &mechanism.constraints.iter().zip(&rows).collect::<Vec<_>>());
-        let mut metric = Self { lower, scale, load: kernel.load, rows, counting, basis: Basis::new(n) };
-        let counting = std::mem::take(&mut metric.counting);
+        let (load, rank) = (kernel.load, counting.len());
+        let mut metric = Self { lower, scale, load, rows, rank, counting: Vec::new(), basis: Basis::new(n) };
         metric.counting = counting
             .into_iter()
             .filter(|&r| metric.basis.push(&metric.column(&metric.rows[r].along)))
@@ -90,9 +92,8 @@ impl Metric {
     pub fn has(&self, mechanism: &Mechanism, row: &ConstraintEquation, gradient: &Gradient) -> bool {
         let mut rows: Vec<(&ConstraintEquation, &Gradient)> =
             mechanism.constraints.iter().zip(&self.rows).collect();
-        let before = new_rows(mechanism, &rows).len();
         rows.push((row, gradient));
-        new_rows(mechanism, &rows).len() == before
+        new_rows(mechanism, &rows).len() == self.rank
     }
 
     /// What the constraints leave of a column.

@@ -100,6 +100,7 @@ impl Mechanism {
             let count = |options: &[Vec<Mode>]| {
                 options.iter().map(Vec::len).try_fold(1_usize, |all, of| all.checked_mul(of))
             };
+            self.spare_driven(at, &pushed, &mut options);
             let simple = options.clone();
             self.strain(at, &closed, &pushed, &mut options);
             if count(&options).is_none_or(|count| looked_at + count > MOST) {
@@ -258,8 +259,8 @@ impl Mechanism {
                         f64::EPSILON * kernel.multiplier.iter().fold(pressing, |most, x| most.max(x.abs()));
                     let is_enough = tau.abs()
                         <= friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding;
-                    // Where the travel of a moving linkage turns back, the linkage moves it on, and no force of
-                    // friction holds it.
+                    // Where the travel of a moving linkage turns back, the linkage moves it on, and no
+                    // force of friction holds it.
                     let is_moved_on = || {
                         let room = beside(number);
                         room.is_held(number) && !room.is_still(number, false)

@@ -1,11 +1,11 @@
 //! Places with friction that rest together where fewer would be enough, as those of all joints of a linkage.
 //!
-//! Rigid bodies do not tell how such places share a load: many forces tau fit.  They rest where any do, and where
-//! any do there are some at a vertex of `|tau_j| <= mu0_j N_j`: as many places stick as there are degrees of
-//! freedom to hold, and each other one is at its limit, `tau_j = ±mu0_j N_j`, a law of force like that of what
-//! slides.  As loads change, one that sticks comes to its limit.  Then it stays there and one that was at the
-//! opposite limit sticks in its place, or all slide.  What motors and locks hold needs no friction to rest, and
-//! is given none.
+//! Rigid bodies do not tell how such places share a load: many forces tau fit. They rest where any do, and
+//! where any do there are some at a vertex of `|tau_j| <= mu0_j N_j`: as many places stick as there are
+//! degrees of freedom to hold, and each other one is at its limit, `tau_j = ±mu0_j N_j`, a law of force like
+//! that of what slides. As loads change, one that sticks comes to its limit. Then it stays there and one
+//! that was at the opposite limit sticks in its place, or all slide. What motors and locks hold needs no
+//! friction to rest, and is given none.
 //!
 //! Source: G. Strang, *Linear Algebra and Its Applications*, 3rd ed. (1988), section 8.2 (vertices).
 
@@ -117,8 +117,22 @@ impl Mechanism {
         pushed
     }
 
-    /// Adds to the modes of places that rest, and that others at rest hold, those in which they are at their
-    /// limits, or without friction where motors hold them.
+    /// Leaves without friction the places at rest that motors and locks hold.
+    pub(super) fn spare_driven(&self, at: Moment, pushed: &[Option<f64>], options: &mut [Vec<Mode>]) {
+        let resting = resting(options, pushed);
+        if resting.is_empty() {
+            return;
+        }
+        let driven = Room::new(self, at, &[], &vec![Mode::Open; options.len()]);
+        for place in resting {
+            if driven.is_held(place) {
+                options[place] = vec![Mode::Strained(0.0), Mode::Slip(1.0), Mode::Slip(-1.0)];
+            }
+        }
+    }
+
+    /// Adds to the modes of places that rest, and that walls or others at rest hold, those in which they are
+    /// at their limits.
     pub(super) fn strain(
         &self,
         at: Moment,
@@ -126,19 +140,13 @@ impl Mechanism {
         pushed: &[Option<f64>],
         options: &mut [Vec<Mode>],
     ) {
-        let rests = |number: &usize| options[*number].len() > 1 || pushed[*number].is_some();
-        let resting: Vec<usize> = (0..options.len()).filter(rests).collect();
-        let stuck = |number: usize| Mode::Stick(self.frictions[number].displacement(at.phi, at.z));
-        let driven =
-            (!resting.is_empty()).then(|| Room::new(self, at, &[], &vec![Mode::Open; options.len()]));
-        for &place in &resting {
-            if driven.as_ref().is_some_and(|room| room.is_held(place)) {
-                options[place] = vec![Mode::Strained(0.0), Mode::Slip(1.0), Mode::Slip(-1.0)];
-            }
+        let mut resting = resting(options, pushed);
+        resting.retain(|&place| options[place][0] != Mode::Strained(0.0));
+        if resting.len() + closed.len() < 2 {
+            return;
         }
-        let resting: Vec<usize> =
-            resting.into_iter().filter(|&place| options[place][0] != Mode::Strained(0.0)).collect();
-        for &place in resting.iter().filter(|_| resting.len() > 1) {
+        let stuck = |number: usize| Mode::Stick(self.frictions[number].displacement(at.phi, at.z));
+        for &place in &resting {
             let is_other = |number: usize| number != place && resting.contains(&number);
             let others: Vec<Mode> = (0..options.len())
                 .map(|number| if is_other(number) { stuck(number) } else { Mode::Open })
@@ -154,4 +162,10 @@ impl Mechanism {
             options[place].splice(first..first, strained);
         }
     }
+}
+
+/// The places that may rest.
+fn resting(options: &[Vec<Mode>], pushed: &[Option<f64>]) -> Vec<usize> {
+    let rests = |number: &usize| options[*number].len() > 1 || pushed[*number].is_some();
+    (0..options.len()).filter(rests).collect()
 }

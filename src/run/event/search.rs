@@ -21,8 +21,8 @@ const SLOPE: f64 = 1e-3;
 const LEAVES: f64 = 1e-5;
 /// Share of the largest value within a step up to which a condition is at its zero where the step begins.
 const NO_VALUE: f64 = 1e-12;
-/// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a side, and
-/// the part of a step within which that is looked for: at a zero of a higher order it takes a while.
+/// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a
+/// side, and the part of a step within which that is looked for: at a zero of a higher order it takes a while.
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
 /// Steps of this share of the time are rounding.
@@ -35,15 +35,21 @@ pub(super) struct Passage {
     pub rises: bool,
 }
 
-/// Where a curve has left what it may be `off` by about its zero, from `share` on; `share` itself where that is not
+/// Where a curve has left what it may be `off` by about its zero, from `share` on; `None` where that is not
 /// soon.
-fn clear(curve: &Chebyshev, share: f64, off: f64) -> f64 {
+fn clear(curve: &Chebyshev, share: f64, off: f64) -> Option<f64> {
     let is_clear = |at: &f64| *at >= 1.0 || curve.at(*at)[0].abs() > CLEAR * off;
     let mut ahead =
         std::iter::successors(Some(0.0), |&step| Some(if step == 0.0 { SAME } else { 4.0 * step }))
             .take_while(|&step| step < SOON)
             .map(|step| share + step);
-    ahead.find(is_clear).unwrap_or(share)
+    ahead.find(is_clear)
+}
+
+/// The value by which a curve that begins near zero leaves it: it may be back before the next node.
+fn soon(curve: &Chebyshev, first: f64, resolved: f64) -> Option<f64> {
+    let off = (resolved.max(NO_VALUE) * curve.most()).max(first.abs());
+    Some(curve.at(clear(curve, 0.0, off)?)[0])
 }
 
 impl EventDetector {
@@ -88,7 +94,7 @@ impl EventDetector {
                 // An impact may have carried it across.
                 let other = if mode { -1 } else { 1 };
                 let is_there = first.abs() <= NO_VALUE * curve.most() || sign(first) == other;
-                if is_there && sign(next) == other {
+                if is_there && sign(soon(curve, first, self.resolved).unwrap_or(next)) == other {
                     all.push(Passage { t: begin, event, rises: !mode });
                 }
             }
@@ -109,7 +115,7 @@ impl EventDetector {
             }
             while let Some(zero) = root(curve, 0.0, share, 1.0) {
                 share = if is_condition {
-                    clear(curve, zero + SAME, self.resolved * curve.most())
+                    clear(curve, zero + SAME, self.resolved * curve.most()).unwrap_or(zero + SAME)
                 } else {
                     zero + SAME
                 };

@@ -91,6 +91,18 @@ impl<S: Slots> Tangent<S> {
         }
     }
 
+    /// R_m of a body from z'' of power m.
+    #[inline(always)]
+    fn couple(&mut self, k: usize, m: usize) {
+        let (room, [curve_re, curve_im]) = (self.room, &self.curve);
+        let (mut re, mut im) = (0.0, 0.0);
+        for entry in self.known.coupling.row(k) {
+            re += entry.value * curve_re[entry.column * room + m];
+            im += entry.value * curve_im[entry.column * room + m];
+        }
+        (self.force[0][k * room + m], self.force[1][k * room + m]) = (re, im);
+    }
+
     /// Order m of the motion of a tree, m > 0: the next power of its rates, that of z after it, and R_m.
     #[inline(always)]
     pub(super) fn extend(&mut self, m: usize) {
@@ -110,12 +122,7 @@ impl<S: Slots> Tangent<S> {
             (self.curve[0][k * room + m], self.curve[1][k * room + m]) = (-sum_im * times, sum_re * times);
         }
         for k in 0..n {
-            let (mut re, mut im) = (0.0, 0.0);
-            for entry in self.known.coupling.row(k) {
-                re += entry.value * self.curve[0][entry.column * room + m];
-                im += entry.value * self.curve[1][entry.column * room + m];
-            }
-            (self.force[0][k * room + m], self.force[1][k * room + m]) = (re, im);
+            self.couple(k, m);
             let last = self.place(k);
             let (z_re, z_im) = (&self.z[0][last - m..=last], &self.z[1][last - m..=last]);
             let own = k * room..k * room + m + 1;
@@ -140,12 +147,7 @@ impl<S: Slots> Tangent<S> {
             self.curve[1][k * room + m] = self.z[1][newest] * times;
         }
         for k in 0..n {
-            let (mut re, mut im) = (0.0, 0.0);
-            for entry in self.known.coupling.row(k) {
-                re += entry.value * self.curve[0][entry.column * room + m];
-                im += entry.value * self.curve[1][entry.column * room + m];
-            }
-            (self.force[0][k * room + m], self.force[1][k * room + m]) = (re, im);
+            self.couple(k, m);
         }
     }
 }
