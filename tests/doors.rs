@@ -500,6 +500,57 @@ fn an_integrator_from_outside_is_driven_like_the_others() {
     }
 }
 
+/// The same, which takes whole steps only and calls the last one before an output time its end.
+struct Early(Rk4);
+
+impl<P: OdeSystem + ?Sized> Integrator<P> for Early {
+    fn name(&self) -> &'static str {
+        "early"
+    }
+
+    fn order(&self) -> u32 {
+        4
+    }
+
+    fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
+        self.0.begin(problem, state, until)
+    }
+
+    fn step(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        _until: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
+        let end = state.time + self.0.step;
+        self.0.step(problem, state, end, statistics)
+    }
+
+    fn is_at(&self, state: &State, until: Time) -> bool {
+        (until - state.time).hi < self.0.step
+    }
+}
+
+#[test]
+fn a_method_that_ends_beside_its_output_times_is_stopped() {
+    let scene = driftless::read_scene("examples/scenes/free.json".as_ref(), &[]).expect("a scene");
+    for (step, misses) in [(3e-3, true), (1.0 / 512.0, false)] {
+        let custom = Custom::new("early", move || {
+            let rk4 = Rk4 { step, stages: Default::default() };
+            Box::new(Early(rk4)) as Box<dyn Integrator<dyn Problem> + Send>
+        });
+        let simulation = Simulation::new(&scene).expect("equations").until(0.5).every(0.125);
+        let outcome = simulation.integrator(custom).run().expect("a run");
+        match outcome.stop {
+            Some(stop) if misses => {
+                assert_eq!((stop.cause, stop.t), (driftless::stepping::Cause::Unsuited, outcome.last.t))
+            }
+            stop => assert!(stop.is_none() && !misses, "step {step}: {stop:?}"),
+        }
+    }
+}
+
 #[test]
 fn a_run_by_an_integrator_from_outside_goes_on_to_the_same_bits() {
     let scene = driftless::read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");

@@ -9,7 +9,7 @@ mod stops;
 pub use self::outcome::{Outcome, RunError};
 pub use self::prepared::Run;
 pub use self::snapshot::{ResumeError, Snapshot};
-use self::stops::{advised, came_apart, drift_stop, not_finite, uncounted};
+use self::stops::{advised, came_apart, drift_stop, missed, not_finite, uncounted};
 use super::clock::{Clock, still};
 use super::contact::ContactDriver;
 use super::drift::{Drift, Limits};
@@ -301,10 +301,12 @@ impl Running {
                 }
             }
             let exceeded = outcome.drift.see(sample, limits, steps_made);
+            let has_arrived = stopped == Ok(true) && outcome.ended_by.is_none();
             outcome.stop = stopped
                 .err()
                 .map(|stop| advised(stop, has_closed_loops))
                 .or(moved)
+                .or_else(|| if has_arrived { missed(&outcome.plan, self.row, sample) } else { None })
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))
                 .or_else(|| uncounted(&outcome.plan, sample))
                 .or_else(|| turns.lost(&present, &outcome.plan, sample))

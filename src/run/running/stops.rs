@@ -7,6 +7,9 @@ use super::super::plan::Plan;
 use super::super::sample::Sample;
 use crate::stepping::{Cause, StepError};
 
+/// Share of the output interval by which a row may be beside its time.
+const BESIDE: f64 = 1e-6;
+
 /// Steps that shrink where loops and sliders are have another cause than a stiff spring.
 pub(super) fn advised(stop: StepError, has_closed_loops: bool) -> StepError {
     if stop.cause != Cause::StepTooSmall || !has_closed_loops {
@@ -37,6 +40,21 @@ pub(super) fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<
             None => format!("the energy balance is off by {off:.1e} of its scale, and nothing puts loops and sliders back"),
         },
         hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
+    })
+}
+
+/// A method that says it is at an output time and is not, beyond a part of the interval that no row shows:
+/// what is written would be of another moment.
+pub(super) fn missed(plan: &Plan, row: u64, sample: &Sample) -> Option<StepError> {
+    let until = plan.time(row).hi;
+    let allowed = BESIDE * plan.every + 16.0 * f64::EPSILON * until.abs();
+    ((sample.t - until).abs() > allowed).then(|| StepError {
+        cause: Cause::Unsuited,
+        method: plan.method.to_string(),
+        t: sample.t,
+        step: plan.step.unwrap_or(0.0),
+        what: format!("its steps end beside the output time {until} s"),
+        hint: "let the last step before an output time be a shorter one".into(),
     })
 }
 
