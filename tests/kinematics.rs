@@ -185,6 +185,40 @@ fn loads_are_those_of_nine_equations_at_speed_and_at_rest() {
     }
 }
 
+/// A rocker that swings through half a turn, and further with more turns behind it: what its spring asks of the
+/// motor is k (b - b0) db/da, whatever turns `b` has.
+#[test]
+fn a_torsion_spring_counts_the_turns_of_its_body() {
+    let (r, d, free) = (0.24_f64, 0.9, 0.7);
+    for turns in [0.0, 2.0] {
+        let scene = |stiffness: f64| {
+            let text = format!(
+                r#"{{"name": "rocker", "gravity": [0, 0],
+                "bars": [{{"name": "crank", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": {r}}},
+                    {{"name": "rocker", "mass": 1.4, "centre": [0.7, 0.04], "inertia": 0.07, "length": 1.4}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "crank", "point": [0, 0]}}]}},
+                    {{"name": "B", "between": [{{"body": "ground", "point": [{d}, 0]}}, {{"body": "rocker", "point": [0, 0]}}]}}],
+                "sliders": [{{"name": "S", "point": {{"body": "crank", "point": [{r}, 0]}},
+                    "rail": {{"body": "rocker", "point": [0, 0], "direction": [1, 0]}}}}],
+                "torsion_springs": [{{"name": "spring", "body": "rocker", "stiffness": {stiffness}, "free_angle": {free}}}],
+                "motors": [{{"name": "motor", "body": "crank", "law": {{"start": 0.3, "rate": 2}}}}],
+                "start": {{"rocker": {{"phi": {}}}}}, "until": 1, "every": 1}}"#,
+                3.04 + TAU * turns
+            );
+            parse_scene(&text, "rocker", &[]).expect("a scene")
+        };
+        let [stiff, soft] = [3.0, 1.0].map(|stiffness| over(&scene(stiffness), "motor=0.3..7", 60));
+        for (stiff, soft) in stiff.positions.iter().zip(&soft.positions) {
+            let a = stiff.drive;
+            let b = PI + (-r * a.sin()).atan2(d - r * a.cos()) + TAU * turns;
+            let by_a = (r * r - r * d * a.cos()) / (r * r + d * d - 2.0 * r * d * a.cos());
+            assert!((stiff.phi[1] - b).abs() < 1e-12, "{a}: {} {b}", stiff.phi[1]);
+            let (found, expected) = (stiff.force - soft.force, 2.0 * (b - free) * by_a);
+            assert!((found - expected).abs() < 1e-10, "{a}: {found} instead of {expected}");
+        }
+    }
+}
+
 #[test]
 fn a_slider_crank_goes_as_far_as_crank_and_rod_reach() {
     // Its own start is a dead centre of the block.

@@ -86,7 +86,10 @@ impl Walk {
         let mut unknowns: Vec<_> = start.phi.iter().chain(&start.omega).copied().collect();
         unknowns.resize(2 * n + 3, Time::default());
         let mut state = State::new(&unknowns, bodies);
-        state.turns.clone_from(&start.turns);
+        state.turns.iter_mut().zip(&start.turns).for_each(|(own, given)| *own += given);
+        if mechanism.is_winding() {
+            state.unwind();
+        }
         let mut walk = Self {
             mechanism: Arc::clone(mechanism),
             kernel: Kernel::new(mechanism),

@@ -82,6 +82,9 @@ impl<'a> Local<'a> {
         let mut unknowns: Vec<Time> = phi.iter().chain(omega).map(|&x| Time::of(x)).collect();
         unknowns.resize(2 * n + 3, Time::default());
         let mut state = State::new(&unknowns, self.mechanism.bodies.len());
+        if self.mechanism.is_winding() {
+            state.unwind();
+        }
         project(self.mechanism, &mut self.kernel, &mut state, KEPT).ok()?;
         let turned = |k: usize| state.turns.get(k).map_or(0.0, |&turns| TAU * turns as f64);
         let phi = (0..n).map(|k| state.unknown(k).hi + turned(k)).collect();
