@@ -108,3 +108,17 @@ fn what_data_do_not_tell_is_refused() {
     let many = FitRequest { segments: 50, ..request("gravity[0]") };
     assert!(told(&many).contains("two rows"));
 }
+
+/// A motor's motion is its own, whatever the bar weighs.
+#[test]
+fn a_number_that_does_nothing_to_the_data_is_refused() {
+    let template = template("motor", &[]);
+    let data = data(&template, 1.0, 0.05, 0.0, 1);
+    let refusal = |path: &str| {
+        let request = FitRequest { vary: vec![path.into()], ..FitRequest::default() };
+        fit(&template, &data, &request, &mut || false).map(|_| ()).map_err(|error| error.to_string())
+    };
+    let error = refusal("bars.bar1.density").expect_err("no fit");
+    assert!(error.contains("the data do not depend on bars.bar1.density"), "{error}");
+    assert_eq!(refusal("bars.bar2.length"), Ok(()));
+}

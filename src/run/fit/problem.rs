@@ -23,6 +23,8 @@ const TOLERANCE: f64 = 1e-11;
 const PATIENCE: usize = 40;
 /// Residual in place of one that cannot be computed: the step is taken back.
 const FAR: f64 = 1e9;
+/// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
+const NOTHING: f64 = 1e-11;
 /// Weight of a state as guessed, where a part does not tell it.
 const GUESSED: f64 = 1e-3;
 
@@ -379,6 +381,13 @@ impl<'a> Problem<'a> {
         self.take(columns);
         let jacobian = self.evaluate()?.jacobian;
         let count = self.variables.len();
+        let most = |column: &FittedColumn| {
+            column.measured.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs())) / column.sigma
+        };
+        let size = columns.iter().map(most).fold(0.0, f64::max);
+        if let Some(k) = (0..count).find(|&k| jacobian.column(k).amax() < NOTHING * size) {
+            return Err(format!("the data do not depend on {}", self.variables[k].path));
+        }
         let svd = jacobian.svd(false, true);
         let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
         let least = f64::EPSILON * values.amax() * values.len() as f64;
