@@ -5,6 +5,7 @@ use super::friction::{Absolute, pin};
 use driftless::run::{Limits, METHODS, MethodId, Plan, Request, Run, Running};
 use driftless::{Mechanism, read_scene};
 use nalgebra::DVector;
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 const G: f64 = 9.81;
@@ -175,6 +176,36 @@ fn every_method_is_at_its_output_times_after_an_event_between_steps() {
         }
     }
     assert!(compared >= 28, "{compared} compared");
+}
+
+/// A rotor passes three events in every half turn at one and the same moment, each of which acts once.
+#[test]
+fn events_of_one_moment_act_once_each() {
+    let more = r#""parameters": {"a": 1, "b": 1, "c": 1},
+        "torques": [{"name": "T", "body": "bar", "torque": "1e-9*(a + b + c)"}],
+        "events": [{"name": "A", "when": "bar.sin", "set": {"a": "-a"}},
+            {"name": "B", "when": "bar.sin*(2 + bar.cos)", "set": {"b": "-b"}},
+            {"name": "C", "when": "(1 + t)*bar.sin", "set": {"c": "-c"}}]"#;
+    let (rate, until) = (1.7, 60.0);
+    let scene = scene(&rotor([0.3, rate], until, more));
+    let expected: Vec<f64> =
+        (1..).map(|k| (f64::from(k) * PI - 0.3) / rate).take_while(|t| *t < until).collect();
+    for method in [MethodId::Taylor, MethodId::Dp5, MethodId::Dp8, MethodId::Radau(5)] {
+        for rtol in [1e-6, 1e-9, 1e-12] {
+            let outcome = run(&scene, &adaptive(method, rtol));
+            for name in ["A", "B", "C"] {
+                let times: Vec<f64> =
+                    outcome.events.iter().filter(|event| event.name == name).map(|event| event.t).collect();
+                assert_eq!(times.len(), expected.len(), "{method} {rtol}, {name}: {times:?}");
+                for (t, expected) in times.iter().zip(&expected) {
+                    assert!(
+                        (t - expected).abs() < 1e-4,
+                        "{method} {rtol}, {name}: {t} instead of {expected}"
+                    );
+                }
+            }
+        }
+    }
 }
 
 #[test]

@@ -23,8 +23,13 @@ const KEPT: usize = 100_000;
 pub(in crate::run) struct EventMemory {
     /// The side of zero each function was on last: -1, 1, or 0 where that is not known.
     pub(super) sides: Vec<i8>,
-    /// The event that happened last, and when.
-    pub(super) last: Option<(usize, Time)>,
+    /// The largest magnitude of each function so far.
+    pub(super) largest: Vec<f64>,
+    /// The events of the moment at which one happened last.
+    pub(super) last: Vec<(usize, Time)>,
+    /// Events of that moment which are still to happen, and whether their functions rise: the step was cut
+    /// short by another one.
+    due: Vec<(usize, bool)>,
     /// What is to be done at the end of the step.
     pub pending: Option<(usize, Action)>,
     /// Conditions that changed sign last, and when.
@@ -94,6 +99,7 @@ impl EventDetector {
         };
         detector.closers = detector.closing();
         detector.memory.sides = vec![0; detector.functions()];
+        detector.memory.largest = vec![0.0; detector.functions()];
         detector
     }
 
@@ -202,7 +208,9 @@ impl EventDetector {
     pub fn restore(&mut self, memory: EventMemory) -> bool {
         let functions = self.functions();
         let fits = memory.sides.len() == functions
-            && memory.last.is_none_or(|(event, _)| event < functions)
+            && memory.largest.len() == functions
+            && memory.last.iter().all(|(event, _)| *event < functions)
+            && memory.due.iter().all(|(event, _)| *event < functions)
             && memory.pending.as_ref().is_none_or(|(event, _)| *event < functions);
         if fits {
             self.memory = memory;
@@ -300,21 +308,26 @@ impl StepWatcher for EventDetector {
         let mut passages = Vec::new();
         self.passages(inside, begin, span, 0, &mut passages);
         self.memory.woken.clear();
+        passages.retain(|passage| self.counts(passage.event, passage.rises));
+        for passage in passages.iter_mut().filter(|passage| passage.t > begin) {
+            passage.t = self.polished(inside, passage.event, passage.t);
+        }
+        let due = std::mem::take(&mut self.memory.due).into_iter();
+        passages.extend(due.map(|(event, rises)| Passage { t: begin, event, rises }));
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
-        for Passage { t, event, rises } in passages {
+        for (number, &Passage { t, event, .. }) in passages.iter().enumerate() {
             let is_friction = matches!(self.owner(event), Owner::Friction(..));
             let is_condition = is_friction || matches!(self.owner(event), Owner::Condition(..));
-            let is_same = self
-                .memory
-                .last
-                .is_some_and(|(last, before)| last == event && (t - before).hi <= SAME * span);
-            if !self.counts(event, rises) || is_same && !is_condition {
+            // What was found near the beginning may be the zero that the last step ended with.
+            self.memory.last.retain(|(_, before)| (t - *before).hi <= SAME * span);
+            let is_same = self.memory.last.iter().any(|(last, _)| *last == event);
+            if is_same && !is_condition {
                 continue;
             }
-            let t = if t > begin { self.polished(inside, event, t) } else { t };
             let landed = inside.landed(t).cloned();
             let motion = landed.unwrap_or_else(|| inside.at(t).clone());
-            self.memory.last = Some((event, t));
+            self.memory.last.retain(|(last, _)| *last != event);
+            self.memory.last.push((event, t));
             if is_condition {
                 self.memory.flipped.retain(|(_, before)| (t - *before).hi <= SAME * span);
                 if !is_friction {
@@ -322,6 +335,7 @@ impl StepWatcher for EventDetector {
                     self.memory.flipped.push((event, t));
                 }
                 self.memory.pending = Some((event, self.action(event, &motion)));
+                self.put_off(&passages[number + 1..], t, span);
                 return Some(t);
             }
             self.count += 1;
@@ -334,9 +348,25 @@ impl StepWatcher for EventDetector {
             let action = self.action(event, &motion);
             if action != Action::Record {
                 self.memory.pending = Some((event, action));
+                self.put_off(&passages[number + 1..], t, span);
                 return Some(t);
             }
         }
         None
+    }
+}
+
+impl EventDetector {
+    /// Remembers the events that happen at the very moment, too, at which another one cuts a step short: where
+    /// the next one begins rounding may have them behind.  Conditions stay on their sides until they flip.
+    fn put_off(&mut self, later: &[Passage], t: Time, span: f64) {
+        let is_now = |passage: &&Passage| (passage.t - t).hi <= SAME * span;
+        for Passage { event, rises, .. } in later.iter().take_while(is_now) {
+            let is_done = self.memory.last.iter().any(|(last, _)| last == event);
+            let is_event = matches!(self.owner(*event), Owner::Scene(..) | Owner::Outside(_));
+            if is_event && !is_done {
+                self.memory.due.push((*event, *rises));
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 //! ask for, and searched by the same root finding as walls and flips ([`search`](crate::stepping)); a zero is
 //! then polished on the dense output itself.
 
-use super::detector::{EventDetector, Owner, SAME};
+use super::detector::{EventDetector, EventMemory, Owner, SAME};
 use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
 use crate::run::inside::Inside;
@@ -19,7 +19,8 @@ const ROUNDS: usize = 6;
 const SLOPE: f64 = 1e-3;
 /// Share of a step in which an event function leaves zero that was kept there by a joint.
 const LEAVES: f64 = 1e-5;
-/// Share of the largest value within a step up to which a condition is at its zero where the step begins.
+/// Share of the largest value, of a condition within the step, of an event so far, up to which a function is at
+/// its zero.
 const NO_VALUE: f64 = 1e-12;
 /// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a
 /// side, and the part of a step within which that is looked for: at a zero of a higher order it takes a while.
@@ -99,15 +100,18 @@ impl EventDetector {
                 }
             }
             let is_condition = matches!(self.owner(event), Owner::Condition(..));
-            let side = &mut self.memory.sides[event];
-            if mode.is_none() && first == 0.0 && *side != 0 && sign(next) == -*side {
+            let EventMemory { sides, largest, last, .. } = &mut self.memory;
+            let (side, largest) = (&mut sides[event], &mut largest[event]);
+            *largest = largest.max(curve.most());
+            // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding alone.
+            if mode.is_none() && curve.most() <= NO_VALUE * *largest {
+                continue;
+            }
+            let is_at_zero = first == 0.0 || mode.is_none() && first.abs() <= NO_VALUE * *largest;
+            if mode.is_none() && is_at_zero && *side != 0 && sign(next) == -*side {
                 all.push(Passage { t: begin, event, rises: *side < 0 });
             }
-            *side = if first == 0.0 || self.memory.last == Some((event, begin)) {
-                sign(next)
-            } else {
-                sign(first)
-            };
+            *side = if is_at_zero || last.contains(&(event, begin)) { sign(next) } else { sign(first) };
             // What has just left zero is not sent back by rounding.
             let mut share = if is_woken { LEAVES } else { 0.0 };
             if is_woken {
