@@ -5,7 +5,7 @@
 use crate::program;
 
 use program::Program;
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
 #[track_caller]
@@ -618,12 +618,21 @@ fn the_program_tells_changes_and_refuses_them_where_asked() {
     let record: Value = serde_json::from_str(&program.read(&record)).expect("JSON");
     assert_eq!(record["result"]["assembly"]["changes"][0]["given"].as_f64(), Some(0.43));
     program.run("check kite.json --strict").exits(0).shows(&["1 degree: 3 coordinates less 2 constraints"]);
-    program
-        .run("check four_bar_motor.json --set start.coupler.phi=2.5 --set until=1")
-        .exits(3)
-        .says(&["error: no start fits", "hint: "]);
+    program.run("check four_bar_motor.json --set start.coupler.phi=2.5 --set until=1").exits(3).says(&[
+        "error: four_bar_motor.json:",
+        ": hinges[",
+        "no start fits",
+        "hint: ",
+    ]);
     program
         .run("check four_bar_motor.json --set start={}")
         .exits(3)
-        .says(&["error: the start is ambiguous: `start.", "roughly is enough"]);
+        .says(&["error: four_bar_motor.json: the start is ambiguous: `start.", "roughly is enough"]);
+    // A wall that a loop swings its point behind.
+    let mut scene: Value = serde_json::from_str(&program.read("kite.json")).expect("JSON");
+    let bar = scene["bars"][0]["name"].clone();
+    scene["walls"] = json!([{"name": "stop", "body": bar, "point": [0, 0], "restitution": 0.5,
+        "line": {"through": [100, 0], "normal": [1, 0]}}]);
+    program.write("behind.json", &serde_json::to_string_pretty(&scene).expect("text"));
+    program.run("check behind.json").exits(3).says(&["behind.json:", ": walls[0]", "`stop`", "hint: "]);
 }

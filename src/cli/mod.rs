@@ -31,7 +31,7 @@ mod view;
 pub use failure::Failure;
 pub use flags::{Flags, parse};
 
-use crate::dynamics::Mechanism;
+use crate::dynamics::{CompileError, Mechanism};
 use crate::report;
 use crate::report::page::counted;
 use crate::scene::{self, Override, Scene, Template};
@@ -99,13 +99,21 @@ fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Fa
     for set in &flags.set {
         flags.remark(&format!("set {} to {}", set.path, set.value));
     }
-    let mechanism = Arc::new(Mechanism::new(&scene)?);
+    let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| placed(flags, text, &error))?);
     settle(flags, &mechanism)?;
     if !flags.tell.quiet {
         let doubts = scene.doubts().into_iter();
         doubts.chain(stays(flags, text, &scene)).for_each(|note| output::message(&format!("note: {note}")));
     }
     Ok((scene, mechanism))
+}
+
+/// Why the scene of this text has no equations, and where the part at fault is written.
+fn placed(flags: &SceneFlags, text: &str, error: &CompileError) -> Failure {
+    let template = Template::new(text.to_owned(), scene::source_name(&flags.scene), &flags.set);
+    let place = error.part().and_then(|(lists, name)| template.place_of(lists, name));
+    let place = place.map_or_else(|| format!("{}: ", scene::source_name(&flags.scene)), |place| place + ": ");
+    Failure::new(Exit::Scene, format!("{place}{error}"))
 }
 
 /// The scene with the outputs of the command line beside its own.

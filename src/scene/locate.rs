@@ -166,6 +166,18 @@ impl Source {
         }
     }
 
+    /// "scene.json:3:7", or "scene.json with" the option.
+    pub fn place_in_file(&self, span: Span) -> String {
+        let text = &self.texts[span.text as usize];
+        match &text.set {
+            Some(set) => format!("{} with {set}", self.file),
+            None => {
+                let (line, column) = position(&text.json, span.start as usize);
+                format!("{}:{line}:{column}", self.file)
+            }
+        }
+    }
+
     /// Bytes `start..end` of text number `text`.
     pub fn span(&self, text: usize, start: usize, end: usize) -> Span {
         Span { text: text as u32, start: start as u32, end: end as u32 }

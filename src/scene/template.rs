@@ -133,6 +133,17 @@ impl Template {
         (&self.text, &self.source, &self.overrides)
     }
 
+    /// Where the part of this name in one of these lists is written, as `scene.json:3:7: walls[0]`; `None`
+    /// where there is none.
+    pub fn place_of(&self, lists: &[&str], name: &str) -> Option<String> {
+        let (source, tree) = put_together(&self.text, &self.source, &self.overrides).ok()?;
+        lists.iter().find_map(|list| {
+            let Value::List(nodes) = &member(&tree, list)?.value else { return None };
+            let index = nodes.iter().position(|node| self::name(node) == Some(name))?;
+            Some(format!("{}: {list}[{index}]", source.place_in_file(nodes[index].span)))
+        })
+    }
+
     /// The number called `name`: a path, or the short form of one.
     ///
     /// # Errors

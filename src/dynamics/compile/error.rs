@@ -110,6 +110,24 @@ pub enum CompileError {
     },
 }
 
+/// The lists of a scene whose parts are constraints.
+const CONSTRAINTS: &[&str] = &["motors", "locks", "hinges", "sliders", "welds", "springs"];
+
+impl CompileError {
+    /// The name of the part that is at fault, and the lists of the scene it may be in; `None` where it is not
+    /// one alone.
+    pub fn part(&self) -> Option<(&'static [&'static str], &str)> {
+        match self {
+            Self::Redundant(name) => Some((CONSTRAINTS, name)),
+            Self::Impossible { row, .. } | Self::ImpossibleRates { row, .. } => Some((CONSTRAINTS, row)),
+            Self::Massless(bar) => Some((&["bars"], bar)),
+            Self::SpringWithoutLength(spring) | Self::NotAlone { spring, .. } => Some((&["springs"], spring)),
+            Self::FrictionOnCurve(wall) | Self::BehindWall { wall, .. } => Some((&["walls"], wall)),
+            _ => None,
+        }
+    }
+}
+
 /// Names in backticks, with commas and an `and`.
 pub(in crate::dynamics) fn quoted(names: &[String]) -> String {
     let all: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
