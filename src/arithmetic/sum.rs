@@ -38,8 +38,9 @@ pub fn fused(a: f64, b: f64, c: f64) -> f64 {
     if cfg!(target_arch = "x86") { libm::fma(a, b, c) } else { a.mul_add(b, c) }
 }
 
-/// The same but for the last bit in rare cases, and for numbers near the ends of the range: for processors that
-/// would do it in software, where same bits are not asked for (`--cfg driftless_relaxed`, the playground).
+/// The same but for the last bit in rare cases, and for numbers near the ends of the range: for processors
+/// that would do it in software, where same bits are not asked for (`--cfg driftless_relaxed`, the
+/// playground).
 fn nearly_fused(a: f64, b: f64, c: f64) -> f64 {
     /// 2²⁷ + 1 (Veltkamp).
     const HALVES: f64 = 134_217_729.0;

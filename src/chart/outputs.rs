@@ -50,7 +50,8 @@ const PANELS: usize = 6;
 /// Outputs in a panel that have their extremes ringed; of more, only the largest is.
 const RINGED: usize = 3;
 
-/// Draws every output, with rings at the extremes, or only at the largest one of a panel of many, and a figure there.
+/// Draws every output, with rings at the extremes, or only at the largest one of a panel of many, and a
+/// figure there.
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.

@@ -1,4 +1,5 @@
-//! Torque or force and power of motors against time, above each other, the largest magnitudes of what is drawn marked.
+//! Torque or force and power of motors against time, above each other, the largest magnitudes of what is
+//! drawn marked.
 
 use super::axis::Axis;
 use super::file::Picture;

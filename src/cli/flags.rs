@@ -247,8 +247,8 @@ pub struct RunFlags {
     #[cfg(feature = "charts")]
     #[command(flatten)]
     pub motion: MotionFlags,
-    /// Write a page that plays the motion beside its charts, `run.html`; of several stabilizations one more of
-    /// all, `runs.html`
+    /// Write a page that plays the motion beside its charts, `run.html`; of several stabilizations one more
+    /// of all, `runs.html`
     #[cfg(feature = "charts")]
     #[arg(long, help_heading = "Files")]
     pub html: bool,
@@ -263,8 +263,8 @@ pub struct RunFlags {
         help_heading = "Files"
     )]
     pub chart: Vec<String>,
-    /// Show this part of the run in charts, animations and pages, in seconds [default: of charts all of it or as
-    /// much as can be told apart, of animations the beginning]
+    /// Show this part of the run in charts, animations and pages, in seconds [default: of charts all of it or
+    /// as much as can be told apart, of animations the beginning]
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "FROM..TO", value_parser = window, allow_hyphen_values = true, help_heading = "Files")]
     pub window: Option<[f64; 2]>,

@@ -6,9 +6,10 @@
 //! ```
 //!
 //! A contact that lasts is a row like any other as long as it presses, and does no work; what dry friction
-//! changes of that is found by [`friction`](super::friction). Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996),
-//! chapter 5; the set is found by adding the point that is pressed hardest and dropping those that would be
-//! pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems* (1974), chapter 23).
+//! changes of that is found by [`friction`](super::friction). Source: F. Pfeiffer, C. Glocker, *Multibody
+//! Dynamics with Unilateral Contacts* (1996), chapter 5; the set is found by adding the point that is pressed
+//! hardest and dropping those that would be pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems*
+//! (1974), chapter 23).
 
 pub mod metric;
 pub mod scale;

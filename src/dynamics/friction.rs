@@ -77,8 +77,8 @@ pub enum Mode {
     Stick(f64),
     /// It slides: the sign of the relative velocity.
     Slip(f64),
-    /// It rests since others hold it: other places, its own friction at the limit `mu0 N` against a velocity of
-    /// this sign, or motors, its own friction zero, as is the sign.
+    /// It rests since others hold it: other places, its own friction at the limit `mu0 N` against a velocity
+    /// of this sign, or motors, its own friction zero, as is the sign.
     Strained(f64),
 }
 

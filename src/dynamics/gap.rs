@@ -6,8 +6,8 @@
 //! |g''| <= Σ |g_k| (|phi_k''| + phi_k'²) + Σ |g_f| |zeta_f''| + |s''|
 //! ```
 //!
-//! Walls of bodies have products of elements beside, of which value and slope are known, and no bound; of walls
-//! that move by a formula of places the value alone is known here.
+//! Walls of bodies have products of elements beside, of which value and slope are known, and no bound; of
+//! walls that move by a formula of places the value alone is known here.
 //!
 //! Derivatives may be by time or by anything that grows in proportion with it.
 

@@ -8,10 +8,10 @@
 //! nearest to v⁻ that keeps the rows and f what brings c·v⁺ to -e c·v⁻.  Rows that depend on others get no
 //! impulse.
 //!
-//! The impulse on the point along the wall's normal is -rho, never negative.  With dry friction at the wall it
-//! follows with that of friction from Routh's method, see [`Shock`].  Without motors and friction the energy
-//! changes by `-rho (1-e) J w⁻ / 2`. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral
-//! Contacts* (1996), section 8.2 (Newton's law of impact).
+//! The impulse on the point along the wall's normal is -rho, never negative.  With dry friction at the wall
+//! it follows with that of friction from Routh's method, see [`Shock`].  Without motors and friction the
+//! energy changes by `-rho (1-e) J w⁻ / 2`. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with
+//! Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
 
 use super::constraint::{ConstraintEquation, Measure, Posture};
 use super::contact::metric::{Gradient, Metric};

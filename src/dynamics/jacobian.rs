@@ -28,8 +28,8 @@ pub struct Jacobian {
     omega: Vec<Slopes>,
     /// da/dq and, beside it, da/dw, row by row (n × 2n) \[1/s², 1/s\].
     pub acceleration: Vec<f64>,
-    /// Derivatives of the powers of motors, dampers and applied forces, of the stabilizer and of dry friction,
-    /// by q and by w (3 × 2n) \[W, W·s\].
+    /// Derivatives of the powers of motors, dampers and applied forces, of the stabilizer and of dry
+    /// friction, by q and by w (3 × 2n) \[W, W·s\].
     pub power: Vec<f64>,
 }
 

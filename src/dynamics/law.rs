@@ -8,7 +8,8 @@
 //! rate·t + start = q π/2 + x + y,    |x| <= π/4,    π/2 = P1 + P2 + P3,   q P1 and q P2 exact
 //! ```
 //!
-//! Source of the latter: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980), chapter 8.
+//! Source of the latter: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980), chapter
+//! 8.
 
 use super::Time;
 use crate::arithmetic::sum::{fast_two_sum, nearest, two_sum};

@@ -26,8 +26,8 @@
 //! found body by body ([`recursive`]), and those of rows from the factors left behind.
 //!
 //! **Everything else is a row.**  The hinges make a [`forest`]; those that close a loop, sliders, slots,
-//! locks and motors are rows, each a measured angle or a quadratic function of the elements ([`constraint`]).  Where
-//! rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them
+//! locks and motors are rows, each a measured angle or a quadratic function of the elements ([`constraint`]).
+//! Where rows lose their independence ([`rank`]) they are left out ([`schur`]); the start is found from them
 //! ([`assembly`]).
 //!
 //! The same mechanism is integrated in several forms, chosen before the first step: [`multiplier`] in (q, w)

@@ -1,9 +1,8 @@
 //! The mechanism in (q, w), with one multiplier per row.
 //!
 //! Unknowns: coordinates (n), rates (n) and, where the scene has rows or forces that do work, the work of
-//! motors, dampers and applied forces and the energy the stabilizer puts in \[J\], then the energy lost in dry
-//! friction where there is any.  With `WORK = false`
-//! neither rows nor accounts exist in the code.
+//! motors, dampers and applied forces and the energy the stabilizer puts in \[J\], then the energy lost in
+//! dry friction where there is any.  With `WORK = false` neither rows nor accounts exist in the code.
 
 use super::gap::turning;
 use super::jacobian::Jacobian;

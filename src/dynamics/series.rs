@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Nothing but Cauchy products: four real ones a body, no sine beyond the first.  Driven angles enter with
-//! the known series of their laws: the coordinates are those of [`elimination`](super::elimination), q = S u +
-//! s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is the motors'
+//! the known series of their laws: the coordinates are those of [`elimination`](super::elimination), q = S u
+//! + s(t), and the solve is with Sᵀ M_0 S.  What the rows of driven bodies lack of balance is the motors'
 //! torque, whose power is integrated with the rest.  Rows that are not eliminated border M_0 with their
 //! Jacobian (module `rows`).
 //!
@@ -125,7 +125,8 @@ pub struct Series<T: SeriesNumber> {
 }
 
 impl<T: SeriesNumber> Series<T> {
-    /// Room for series of the terms of a mechanism in some coordinates up to this power of the rates, at least
+    /// Room for series of the terms of a mechanism in some coordinates up to this power of the rates, at
+    /// least
     /// 2.
     pub fn of_terms(terms: &Terms<T::Constant>, coordinates: Coordinates, order: usize) -> Self {
         let mechanism = terms.structure;

@@ -132,8 +132,8 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
     })
 }
 
-/// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x' +
-/// c x fitted to three iterates.
+/// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x'
+/// + c x fitted to three iterates.
 fn largest(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Complex<f64> {
     let n = phi.len();
     let mut kernel = Kernel::<Dual<1>>::new(mechanism);

@@ -102,8 +102,8 @@ impl Drawing<'_> {
 }
 
 impl Drawing<'_> {
-    /// A point and the normal of every wall, drawn once for all poses: where it is at the start; of none that a body
-    /// or a formula of places moves \[m\].
+    /// A point and the normal of every wall, drawn once for all poses: where it is at the start; of none that
+    /// a body or a formula of places moves \[m\].
     pub fn walls(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
         let stays = |wall: &&Wall| wall.on.is_none() && wall.aim.is_none();
         self.scene.walls.iter().filter(stays).map(|wall| {
@@ -185,8 +185,8 @@ impl Drawing<'_> {
         self.scene.springs.iter().map(|spring| spring.between).chain(laws)
     }
 
-    /// What joins the origin of a bar with its hinges, spring ends and points that lie off it, counted from its
-    /// origin \[m\].
+    /// What joins the origin of a bar with its hinges, spring ends and points that lie off it, counted from
+    /// its origin \[m\].
     pub fn arms(&self) -> impl Iterator<Item = (usize, [Complex<f64>; 2])> {
         let hinges = self.scene.hinges.iter().flat_map(|hinge| hinge.between);
         let points = self.points().map(|point| point.place);

@@ -1,5 +1,5 @@
-//! A moment of a motion, the start of a scene or a later one, looked at closely: accelerations, multipliers, motors, hinge forces, energies,
-//! impacts.
+//! A moment of a motion, the start of a scene or a later one, looked at closely: accelerations, multipliers,
+//! motors, hinge forces, energies, impacts.
 //!
 //! Signs, whichever body is the ground:
 //!
@@ -53,8 +53,8 @@ pub struct Inspection {
     pub energy_scale: f64,
     /// Each wall with what happens there at the start.
     pub walls: Vec<Contact>,
-    /// Places with dry friction: what they do, whether it is a torque \[N·m\] or a force \[N\], it and the force
-    /// \[N\] that presses them.
+    /// Places with dry friction: what they do, whether it is a torque \[N·m\] or a force \[N\], it and the
+    /// force \[N\] that presses them.
     pub frictions: Vec<(String, &'static str, bool, [f64; 2])>,
     /// Name, unit and value of each of the scene's outputs.
     pub outputs: Vec<(String, String, f64)>,

@@ -2,8 +2,8 @@
 //!
 //! A point stays where its wall presses it and it does not move along the normal, or would rebound to less
 //! than [`REST_HEIGHT`](crate::dynamics::contact::REST_HEIGHT): bounces that accumulate end so, see `rest`.
-//! What is left of its normal velocity is taken off it and booked as lost in impacts.  From then on the wall is
-//! a row kept by projection, until its force would have to pull.
+//! What is left of its normal velocity is taken off it and booked as lost in impacts.  From then on the wall
+//! is a row kept by projection, until its force would have to pull.
 
 mod impacts;
 mod jumps;

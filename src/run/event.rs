@@ -1,4 +1,5 @@
-//! Events of scenes and from outside the crate: conditions on the motion, and what happens where they come true.
+//! Events of scenes and from outside the crate: conditions on the motion, and what happens where they come
+//! true.
 //!
 //! The module `detector` looks for them in every step, `search` locates them on its dense output.
 
@@ -74,8 +75,8 @@ pub enum Action {
     Record,
     /// The run ends here; its outcome is kept.
     Stop,
-    /// The motion goes on changed.  A fixed step that is cut short there is followed by one that ends on the next
-    /// output time.
+    /// The motion goes on changed.  A fixed step that is cut short there is followed by one that ends on the
+    /// next output time.
     Change(Change),
 }
 

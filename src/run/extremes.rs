@@ -1,5 +1,5 @@
-//! Extremes and means of the scene's outputs over a whole run, located between its rows on the dense output of
-//! every step.
+//! Extremes and means of the scene's outputs over a whole run, located between its rows on the dense output
+//! of every step.
 //!
 //! The outputs are interpolated at Chebyshev points of every step, by as high a degree as they ask for; the
 //! zeros of the interpolants' slopes are the extremes, their integrals the means.  Where all of them lie well
@@ -21,8 +21,9 @@ const RESOLVED: f64 = 1e-10;
 /// Degrees by which a step is judged before anything else is done: short steps, as between close rows, by the
 /// lower one first.
 const FIRST: [usize; 2] = [6, 12];
-/// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the degree
-/// are what the dense output is off, where its pieces join: neither a higher degree nor halves have less.
+/// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the
+/// degree are what the dense output is off, where its pieces join: neither a higher degree nor halves have
+/// less.
 const NOISE: f64 = 1e-6;
 const FALLS: f64 = 0.3;
 /// What an output may be beside its interpolant, over the largest value, for a step to be passed over, and
@@ -144,8 +145,8 @@ impl ExtremesDetector {
         })
     }
 
-    /// From here on the outputs are those of this mechanism: the same with other contacts held, or other parts
-    /// that act.
+    /// From here on the outputs are those of this mechanism: the same with other contacts held, or other
+    /// parts that act.
     pub fn hold(&mut self, mechanism: &Arc<Mechanism>) {
         if !Arc::ptr_eq(mechanism, &self.mechanism) {
             self.kernel = Kernel::new(mechanism);

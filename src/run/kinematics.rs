@@ -9,7 +9,8 @@
 //! change point:  det G changes its sign: two ways of motion cross, and the one that goes straight on is taken
 //! ```
 //!
-//! Source: E. J. Haug, *Computer Aided Kinematics and Dynamics of Mechanical Systems* (1989), sections 3.6 and
+//! Source: E. J. Haug, *Computer Aided Kinematics and Dynamics of Mechanical Systems* (1989), sections 3.6
+//! and
 //! 3.7; the law at a limit is that of a fold, q - q* ~ |t - t*|^(1/2).
 
 mod drive;

@@ -1,14 +1,14 @@
-//! Parts that events switch on while the motion goes on: joints and locks that close, motors that engage, walls
-//! that come into the way.
+//! Parts that events switch on while the motion goes on: joints and locks that close, motors that engage,
+//! walls that come into the way.
 //!
 //! ```text
 //! M (w⁺ - w⁻) + Gᵀ sigma = 0,   G w⁺ + C_t = 0         of all rows, those that close among them
 //! ```
 //!
-//! A joint closes plastically: of all rates that its rows allow, the nearest in kinetic energy follow, and the
-//! energy lost is booked with the event.  Its points have to meet there; a motor, and a lock without an angle,
-//! goes on from where it is.  Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts*
-//! (1996), section 8.2, with restitution 0.
+//! A joint closes plastically: of all rates that its rows allow, the nearest in kinetic energy follow, and
+//! the energy lost is booked with the event.  Its points have to meet there; a motor, and a lock without an
+//! angle, goes on from where it is.  Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral
+//! Contacts* (1996), section 8.2, with restitution 0.
 
 use super::contact::{ContactDriver, in_modes};
 use crate::arithmetic::DoubleDouble;
@@ -28,7 +28,8 @@ const BEHIND: f64 = 1e-9;
 const ROUNDING: f64 = 1e-12;
 
 impl ContactDriver {
-    /// Lets motors, and locks without an angle, that come into force at this motion go on from where they are.
+    /// Lets motors, and locks without an angle, that come into force at this motion go on from where they
+    /// are.
     pub(super) fn engage(&mut self, motion: &Motion) {
         let clutches = &self.whole.switches.clutches;
         let rows: Vec<usize> = (0..self.whole.constraints.len())
@@ -54,8 +55,8 @@ impl ContactDriver {
     }
 }
 
-/// Closes the rows that `after` has in force and `before` has not, and changes the motion accordingly; contacts
-/// held that this would have to pull are let go.
+/// Closes the rows that `after` has in force and `before` has not, and changes the motion accordingly;
+/// contacts held that this would have to pull are let go.
 ///
 /// # Errors
 /// What does not meet, or a point behind a wall that is switched on, and what to try.

@@ -7,8 +7,8 @@
 //! modes:         (s² - s T' A_w T - T' A_q T) y = 0                 damping ratio -Re s / |s|
 //! ```
 //!
-//! A_q and A_w are exact (dual numbers).  To first order the curvature of the constraints has no part in it, as
-//! a(q0, 0) = 0.  Source: L. Meirovitch, *Methods of Analytical Dynamics* (1970), sections 5.3 to 5.6.
+//! A_q and A_w are exact (dual numbers).  To first order the curvature of the constraints has no part in it,
+//! as a(q0, 0) = 0.  Source: L. Meirovitch, *Methods of Analytical Dynamics* (1970), sections 5.3 to 5.6.
 
 mod local;
 mod periodic;
@@ -220,8 +220,8 @@ impl Equilibrium {
 }
 
 impl Modes {
-    /// Coordinates at a phase \[rad\] of a mode's vibration about an equilibrium, of an amplitude of `share`: rad
-    /// of the largest angle, or sizes of the mechanism where a position is largest.
+    /// Coordinates at a phase \[rad\] of a mode's vibration about an equilibrium, of an amplitude of `share`:
+    /// rad of the largest angle, or sizes of the mechanism where a position is largest.
     pub fn displaced(&self, equilibrium: &Equilibrium, mode: &Mode, phase: f64, share: f64) -> Vec<f64> {
         let mut local = Local::new(&self.mechanism);
         let bodies = self.mechanism.bodies.len();

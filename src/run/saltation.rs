@@ -28,8 +28,8 @@ use crate::dynamics::friction::Mode;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
-/// Normal velocity over that of the point's parts, or over a usual one where these are nearly at rest, below which
-/// a wall is grazed, and neighbours may miss it.
+/// Normal velocity over that of the point's parts, or over a usual one where these are nearly at rest, below
+/// which a wall is grazed, and neighbours may miss it.
 const GRAZED: f64 = 1e-7;
 /// Share of the approach that a difference may take off.
 const SHARE: f64 = 0.05;

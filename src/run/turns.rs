@@ -48,8 +48,8 @@ impl Turns {
         Self(angles.collect())
     }
 
-    /// Why the run is no success where an angle has left its law by whole turns; the mechanism has its laws on
-    /// the branches that hold at the sample.
+    /// Why the run is no success where an angle has left its law by whole turns; the mechanism has its laws
+    /// on the branches that hold at the sample.
     pub fn lost(&self, mechanism: &Mechanism, plan: &Plan, sample: &Sample) -> Option<StepError> {
         let lost = |angle: &&Angle| {
             let row = mechanism.constraints.iter().find(|row| row.name() == angle.name);

@@ -3,8 +3,8 @@
 //! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
 //! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  Formulas of
 //! time and state are kept as texts and read as exactly when the mechanism is compiled.  What a formula takes
-//! from a table has no such digits, and what has corners no series; both are refused by name.  Numbers may also
-//! be given beside the text, with derivatives that no text holds.
+//! from a table has no such digits, and what has corners no series; both are refused by name.  Numbers may
+//! also be given beside the text, with derivatives that no text holds.
 
 mod laws;
 mod parts;
@@ -28,8 +28,8 @@ pub struct Times<C> {
 }
 
 impl Template {
-    /// The scene with its numbers as written.  `typed` are the texts `PATH=VALUE` of the overrides as they were
-    /// typed; where one is missing, the shortest digits of its value count.
+    /// The scene with its numbers as written.  `typed` are the texts `PATH=VALUE` of the overrides as they
+    /// were typed; where one is missing, the shortest digits of its value count.
     ///
     /// # Errors
     /// As [`Template::scene`]; a number whose digits do not tell all of it, or a part that is not known

@@ -47,8 +47,8 @@ pub struct Signal {
 
 /// An integral over time of a formula, as a controller has one, for other formulas to use.
 ///
-/// It is carried as the rate of a rotor of its own, on which nothing but a torque of `INERTIA` times the formula
-/// acts, so that every method integrates it with its own accuracy.
+/// It is carried as the rate of a rotor of its own, on which nothing but a torque of `INERTIA` times the
+/// formula acts, so that every method integrates it with its own accuracy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Integral {
     /// Name, unique among parameters, signals and integrals; also that of its rotor.

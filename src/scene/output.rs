@@ -12,8 +12,8 @@
 //! | wall | `gap`, `force` |
 //! | hinge, slider, wall with dry friction | `friction` |
 //!
-//! Forces are those on the bodies that [`inspect`](crate::report::inspect()) names; `force` of a hinge, a weld or
-//! a slider is the magnitude.
+//! Forces are those on the bodies that [`inspect`](crate::report::inspect()) names; `force` of a hinge, a
+//! weld or a slider is the magnitude.
 
 use super::formula::unit::Dimension;
 use super::formula::{Formula, FormulaError};
@@ -60,8 +60,8 @@ pub enum Component {
     Magnitude,
 }
 
-/// What no formula of the state alone says; `P` is what points are given by, parts are given by name, as some of
-/// them come and go in a run.
+/// What no formula of the state alone says; `P` is what points are given by, parts are given by name, as some
+/// of them come and go in a run.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Quantity<P = Place> {
     /// Angular acceleration of a bar \[rad/s²\].
@@ -80,8 +80,8 @@ pub enum Quantity<P = Place> {
     Tension(String, [P; 2]),
     /// Torque of a torsion spring on its body \[N·m\].
     Torsion(String),
-    /// Travel of a slider \[m\], or its rate \[m/s\]: the point, a point of the rail, and its direction in the
-    /// frame of the body.
+    /// Travel of a slider \[m\], or its rate \[m/s\]: the point, a point of the rail, and its direction in
+    /// the frame of the body.
     Travel([P; 2], Option<usize>, [f64; 2], bool),
     /// Gap of a wall \[m\]: the point, a point of the wall and its normal.
     Gap(P, [f64; 2], [f64; 2]),
@@ -147,8 +147,8 @@ pub struct OutputNames {
 }
 
 impl OutputNames {
-    /// Those of a scene.  Where two parts of different kinds have one name and a quantity alike, it is that of
-    /// the kind that comes first in the table above.
+    /// Those of a scene.  Where two parts of different kinds have one name and a quantity alike, it is that
+    /// of the kind that comes first in the table above.
     pub fn of(scene: &Scene) -> Self {
         let mut all = Self { names: Names::with_signals(scene), carried: HashMap::new(), order: Vec::new() };
         all.add_motion(scene);

@@ -66,8 +66,8 @@ impl Scene {
         })
     }
 
-    /// Points off the bar they are on: beyond its ends on its line, or farther away than it is long; of plates
-    /// only those much farther away.
+    /// Points off the bar they are on: beyond its ends on its line, or farther away than it is long; of
+    /// plates only those much farther away.
     fn points_off_bars(&self) -> Vec<String> {
         let off = |(path, place): (String, Place)| {
             let bar = &self.bars[place.bar?];

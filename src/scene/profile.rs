@@ -1,8 +1,8 @@
 //! Laws of motors that are no sum of sines and a parabola: any formula of time, recorded with its first two
 //! derivatives.
 //!
-//! A formula with corners, or with tables, is recorded on the branches that hold at one time; a run that meets
-//! a zero of one of its conditions records it anew, as it does with laws of forces.
+//! A formula with corners, or with tables, is recorded on the branches that hold at one time; a run that
+//! meets a zero of one of its conditions records it anew, as it does with laws of forces.
 
 use super::formula::Formula;
 use super::number::Decimal;
@@ -28,7 +28,8 @@ pub struct Profile<C = f64> {
 }
 
 impl Profile {
-    /// The law of a formula on the branches that hold at t = 0; `values` are those of its names, `None` for t.
+    /// The law of a formula on the branches that hold at t = 0; `values` are those of its names, `None` for
+    /// t.
     pub(crate) fn new(formula: &Formula, values: &[Option<f64>]) -> Self {
         let at = |t: f64| values.iter().map(|value| value.unwrap_or(t)).collect::<Vec<f64>>();
         let modes = formula.modes(&at(0.0));

@@ -234,7 +234,8 @@ impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {
         Ok(())
     }
 
-    /// A whole step, or a shorter one that ends at `until`; see [`Gauss`].  The state's memory is that of the Gauss method, then mu.
+    /// A whole step, or a shorter one that ends at `until`; see [`Gauss`].  The state's memory is that of the
+    /// Gauss method, then mu.
     fn step(
         &mut self,
         problem: &mut P,

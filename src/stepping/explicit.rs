@@ -234,8 +234,8 @@ impl<P: Pair> Explicit<P> {
         });
     }
 
-    /// Writes the interpolation of the step just made, whose stages beside those of the step are evaluated the
-    /// first time; returns what it may be off, over the tolerance.
+    /// Writes the interpolation of the step just made, whose stages beside those of the step are evaluated
+    /// the first time; returns what it may be off, over the tolerance.
     fn interpolate_last<F: OdeSystem + ?Sized>(
         &mut self,
         field: &mut F,

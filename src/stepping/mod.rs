@@ -228,8 +228,8 @@ pub trait Integrator<P: ?Sized> {
     /// run, where it is not [dense](Integrator::is_dense).
     fn interpolate(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) {}
 
-    /// The same where a cheaper polynomial of nearly that accuracy serves, and constraints need not be kept as
-    /// well as at the step's end.
+    /// The same where a cheaper polynomial of nearly that accuracy serves, and constraints need not be kept
+    /// as well as at the step's end.
     #[doc(hidden)]
     fn interpolate_roughly(&mut self, problem: &mut P, from: &State, time: Time, inside: &mut State) {
         self.interpolate(problem, from, time, inside);
@@ -241,8 +241,8 @@ pub trait Integrator<P: ?Sized> {
         false
     }
 
-    /// Writes the powers of the motion about the beginning of the last step; false, and nothing written, where
-    /// the method has none of a hinge tree.
+    /// Writes the powers of the motion about the beginning of the last step; false, and nothing written,
+    /// where the method has none of a hinge tree.
     #[doc(hidden)]
     fn powers(&self, _powers: &mut MotionPowers) -> bool {
         false

@@ -97,7 +97,8 @@ impl<const W: usize> Digits<W> {
     fn rounded(&self, power: i64) -> String {
         let mut size = *self;
         size.kind = Kind::Positive;
-        // Two limbs more than the number has: the power is then as good as exact, and not as long as the room.
+        // Two limbs more than the number has: the power is then as good as exact, and not as long as the
+        // room.
         let ten = Self::whole(10).shortened(self.limbs() + 2).powi(power.unsigned_abs() as i32);
         let size = if power < 0 { size / ten } else { size * ten } + Self::of(0.5);
         if size.exponent <= 0 {

@@ -41,8 +41,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// For series up to power `order` that converge up to 2^`radius` s and make steps of up to 2^`step` s, kept
-    /// to so many bits.
+    /// For series up to power `order` that converge up to 2^`radius` s and make steps of up to 2^`step` s,
+    /// kept to so many bits.
     pub fn new(radius: f64, step: f64, order: usize, bits: usize) -> Self {
         let unit = libm::floor(radius - 0.1);
         // Every product left out and every limb cut off may cost one in the last place.

@@ -7,10 +7,10 @@
 //!
 //! Exponents count limbs, so that nothing is ever shifted by bits and products fall into the columns of a sum
 //! as they are: Σ a b is accumulated in double width, and rounded once (`convolution.rs`).  A number carries
-//! how many limbs it was asked for, and a result has those of its shorter operand: coefficients of high powers,
-//! which contribute little, are kept short, and whatever is computed from them is short by itself.  Results are
-//! cut off, not rounded; a limb below the digits wanted takes that.  All is integer arithmetic, so that bits
-//! are the same on every machine.
+//! how many limbs it was asked for, and a result has those of its shorter operand: coefficients of high
+//! powers, which contribute little, are kept short, and whatever is computed from them is short by itself.
+//! Results are cut off, not rounded; a limb below the digits wanted takes that.  All is integer arithmetic,
+//! so that bits are the same on every machine.
 
 mod convolution;
 mod decimal;

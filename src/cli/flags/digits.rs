@@ -15,8 +15,8 @@ pub struct DigitsFlags {
     /// Write so many digits of every number [default: those carried, or those known and 3 more]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=2000))]
     pub show_digits: Option<u16>,
-    /// Choose the digits so that the path is known up to this time in seconds, and prove it by a second run with
-    /// more digits and another order; exit code 0 only where both agree
+    /// Choose the digits so that the path is known up to this time in seconds, and prove it by a second run
+    /// with more digits and another order; exit code 0 only where both agree
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, conflicts_with_all = ["digits", "until"])]
     pub trusted_until: Option<f64>,
     /// How near the two runs must be, in rad, m and their rates [default: 1e-3]

@@ -200,8 +200,8 @@ pub struct SensitivityFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub scene: SceneFlags,
-    /// What to derive, joined by commas: outputs as bar2.phi or tip.x, max:motor.torque, min:OUTPUT, flip (first
-    /// time a bar turns over), event:NAME, impact:WALL (first times)
+    /// What to derive, joined by commas: outputs as bar2.phi or tip.x, max:motor.torque, min:OUTPUT, flip
+    /// (first time a bar turns over), event:NAME, impact:WALL (first times)
     #[arg(long, value_name = "MEASURES", value_delimiter = ',', allow_hyphen_values = true)]
     pub of: Vec<Measure>,
     /// By which numbers of the scene, joined by commas, as bar1.phi,spring.stiffness
@@ -255,7 +255,8 @@ pub struct FitFlags {
     /// Standard deviation of a column's noise, in its unit; repeatable [default: found from the residuals]
     #[arg(long, value_name = "COLUMN=SIGMA", value_parser = named_size, allow_hyphen_values = true)]
     pub sigma: Vec<(String, f64)>,
-    /// Parts of the data for multiple shooting, short against the growth of small differences of a chaotic motion
+    /// Parts of the data for multiple shooting, short against the growth of small differences of a chaotic
+    /// motion
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub segments: u32,
     /// Tolerance of the motion [default: 1e-14]

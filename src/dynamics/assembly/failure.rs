@@ -82,8 +82,8 @@ impl Problem<'_> {
         Closest { written: format!("\"start\": {{{}}}", all.join(", ")), q, apart, guesses }
     }
 
-    /// Refuses a start of which neither rows nor what is given fix a coordinate, or its rate, and names as many
-    /// as must be given.
+    /// Refuses a start of which neither rows nor what is given fix a coordinate, or its rate, and names as
+    /// many as must be given.
     pub(super) fn check_open(
         &self,
         q: &[DoubleDouble],

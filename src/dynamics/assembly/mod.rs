@@ -149,8 +149,8 @@ impl Mechanism {
         Ok(self)
     }
 
-    /// Other positions that close all rows at the start's time, of which that of the motors is one: angles and
-    /// translational coordinates of each, found from so many guesses of a fixed set.
+    /// Other positions that close all rows at the start's time, of which that of the motors is one: angles
+    /// and translational coordinates of each, found from so many guesses of a fixed set.
     pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> Vec<Vec<f64>> {
         let start: Vec<DoubleDouble> = self.start(scene).phi;
         let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };

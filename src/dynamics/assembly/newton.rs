@@ -194,8 +194,8 @@ impl Problem<'_> {
         self.descend(q, rows, held, 0.0)
     }
 
-    /// The same, given up where [`SLOW`] iterations do not make the sum of squares smaller by a factor: on the
-    /// way to a minimum that is not zero, where steps are many and lead nowhere.
+    /// The same, given up where [`SLOW`] iterations do not make the sum of squares smaller by a factor: on
+    /// the way to a minimum that is not zero, where steps are many and lead nowhere.
     pub fn descend(&self, q: &mut Vec<DoubleDouble>, rows: &[bool], held: &[bool], factor: f64) -> f64 {
         let columns = self.columns(held);
         let (mut left, mut matrix) = self.equations::<f64>(q, rows, held, &columns);

@@ -36,7 +36,8 @@ impl Mechanism {
         Ok(mechanism)
     }
 
-    /// The mechanism with motors and locks, by row number, going on so much further than they said \[rad, m\].
+    /// The mechanism with motors and locks, by row number, going on so much further than they said \[rad,
+    /// m\].
     pub(crate) fn shifted(&self, shifts: &[(usize, f64)]) -> Self {
         let mut mechanism = self.clone();
         for &(row, by) in shifts {
@@ -69,8 +70,8 @@ impl Mechanism {
         self.whole.as_ref().map_or(self, |(whole, _)| whole)
     }
 
-    /// Releases motors, locks, and joints that are closed by rows: the rows stay in their places, and constrain
-    /// nothing any more.  False where there are none.
+    /// Releases motors, locks, and joints that are closed by rows: the rows stay in their places, and
+    /// constrain nothing any more.  False where there are none.
     pub(super) fn release(&mut self, is_released: impl Fn(&String) -> bool) -> bool {
         let motors: Vec<usize> =
             self.switched_angles().filter(|&r| is_released(&self.constraints[r].name)).collect();

@@ -1,13 +1,14 @@
-//! The aim of a motor, or the travel of a wall, that depends on where the mechanism is: gears, cams, followers.
+//! The aim of a motor, or the travel of a wall, that depends on where the mechanism is: gears, cams,
+//! followers.
 //!
 //! ```text
 //! C = Q - f(t, q),   dC/dq = dQ/dq - f_q,   C_t = -f_t
 //! C'' at zero acceleration = Q'' - (f' differentiated along q' = w, w' = 0),    f' = f_q w + f_t
 //! ```
 //!
-//! Q is a travel, or zero where f has the angle as well.  The formula is recorded once with its derivatives, by
-//! the reverse mode of the tape, so that the Jacobian and the quadratic terms are exact on every scalar.  As
-//! long as f does not depend on time the row does no work.
+//! Q is a travel, or zero where f has the angle as well.  The formula is recorded once with its derivatives,
+//! by the reverse mode of the tape, so that the Jacobian and the quadratic terms are exact on every scalar.
+//! As long as f does not depend on time the row does no work.
 
 use super::{Linearised, Posture, Site};
 use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
@@ -49,8 +50,8 @@ pub struct Aim {
 }
 
 impl Aim {
-    /// Records a formula, from which the angle of `angles[0]`, less that of `angles[1]`, is taken; `None` where it
-    /// depends on rates.
+    /// Records a formula, from which the angle of `angles[0]`, less that of `angles[1]`, is taken; `None`
+    /// where it depends on rates.
     pub(in crate::dynamics) fn record(
         angles: &[usize],
         formula: impl FnOnce(&Configuration<Symbol>) -> Symbol,

@@ -277,7 +277,8 @@ pub(super) mod tests {
         }
     }
 
-    /// A point of body 0, one of body 1 which hangs on it, and an origin that moves freely, carried with body 1.
+    /// A point of body 0, one of body 1 which hangs on it, and an origin that moves freely, carried with body
+    /// 1.
     pub fn crank() -> Site {
         Site { body: Some(0), point: Point::ground([0.1, 0.0]).along(0, Complex::new(0.6, 0.0)) }
     }

@@ -11,10 +11,11 @@
 //!
 //! A complementarity problem of both phases, solved as that of [`modes`](super::modes) by looking at every
 //! combination.  Among those that fit, points that slide on come before those that stop, and those that stick
-//! before those that turn.  A wall whose point does not approach has no restitution.  Impulses that the motion
-//! does not determine, as at two corners of one body that both stick, are shared in any way that fits.
+//! before those that turn.  A wall whose point does not approach has no restitution.  Impulses that the
+//! motion does not determine, as at two corners of one body that both stick, are shared in any way that fits.
 //!
-//! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), sections 8.2 and 8.3.
+//! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), sections 8.2 and
+//! 8.3.
 
 use super::super::constraint::Posture;
 use super::super::contact::metric::{Gradient, Metric};
@@ -51,8 +52,8 @@ struct Way {
 }
 
 impl Shocks {
-    /// Normal and tangential impulses \[N·s\] of all walls; `None` where no combination fits, or there are too
-    /// many.
+    /// Normal and tangential impulses \[N·s\] of all walls; `None` where no combination fits, or there are
+    /// too many.
     pub fn impulses(&self) -> Option<Vec<[f64; 2]>> {
         let count = self.restitution.len();
         let nothing = vec![0.0; count];

@@ -5,8 +5,8 @@
 //! gradient on z_k: -i z_k df/dphi_k;  on an origin: -(df/dx, df/dy)                        at |z| = 1
 //! ```
 //!
-//! All derivatives are those of [`Aim`], in angles.  Of the rows |z| = 1, which are kept beside it, this one has
-//! the freedom to take any part along z: with none the multiplier is that of the form in angles.
+//! All derivatives are those of [`Aim`], in angles.  Of the rows |z| = 1, which are kept beside it, this one
+//! has the freedom to take any part along z: with none the multiplier is that of the form in angles.
 
 use super::Natural;
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};

@@ -10,16 +10,16 @@
 //!           (1 - c n R) tau_m = c (n·N_m0 + what is known)
 //! ```
 //!
-//! Where N begins with power k, as at rest without weight, |N| does too from the start of the step on: tau_k is
-//! found as tau_0 is, and k takes the place of 0 in what follows.
+//! Where N begins with power k, as at rest without weight, |N| does too from the start of the step on: tau_k
+//! is found as tau_0 is, and k takes the place of 0 in what follows.
 //!
 //! A rail's N is one multiplier with a sign, a wall's never negative: of these |N| is linear.  A joint's
 //! follows from Newton's equation of what is beyond it, of which centre c, mass m and applied forces F are
 //! series: `N_m = Σ (m+1)(m+2) m c_{m+2} - F_m`.  Each order is solved twice, without tau_m and with it.
 //!
 //! N may pass zero in a step, and |N| has a corner there; its series goes on below zero instead, and
-//! [`Series::pressing`] tells where.  From there on n of a rail is turned, and N of a joint begins at zero: what
-//! rounding has left of it has no direction.
+//! [`Series::pressing`] tells where.  From there on n of a rail is turned, and N of a joint begins at zero:
+//! what rounding has left of it has no direction.
 
 use super::Series;
 use super::coefficient::{SeriesNumber, Terms};
@@ -352,8 +352,8 @@ impl<T: SeriesNumber> Series<T> {
         places.filter(has_corner).map(|place| place.size.iter().map(|size| size.value()).collect())
     }
 
-    /// Marks the places whose N passes zero here, for an expansion anew; false where there are none.  `unit` is
-    /// the mechanism's unit of time \[s\].
+    /// Marks the places whose N passes zero here, for an expansion anew; false where there are none.  `unit`
+    /// is the mechanism's unit of time \[s\].
     pub(super) fn find_reversals(&mut self, unit: f64) -> bool {
         let mut is_any = false;
         for place in self.friction.iter_mut().flat_map(|friction| &mut friction.places) {

@@ -11,9 +11,9 @@
 //!
 //! The motion is expanded first, in plain doubles, or its powers are those of its own step; what is left for
 //! the derivatives are five products with known numbers where a recurrence on
-//! [numbers with derivatives](super::slots) has eight, and four of numbers.  Two orders are summed at once, so
-//! that a coefficient is loaded for both.  Everything new of an order is found at once, by one matrix of M_0
-//! and the constraints.  Mechanisms with anything else in them are expanded on such numbers.
+//! [numbers with derivatives](super::slots) has eight, and four of numbers.  Two orders are summed at once,
+//! so that a coefficient is loaded for both.  Everything new of an order is found at once, by one matrix of
+//! M_0 and the constraints.  Mechanisms with anything else in them are expanded on such numbers.
 
 mod known;
 mod pair;

@@ -1,6 +1,6 @@
 //! The series of a tape on numbers that are constants too: the recurrences of [`TapeSeries`], whose sums of
-//! products are those of [factors](super::factors), and numbers of the tape that no time is in, which have one
-//! power.
+//! products are those of [factors](super::factors), and numbers of the tape that no time is in, which have
+//! one power.
 //!
 //! [`TapeSeries`]: crate::arithmetic::tape::TapeSeries
 

@@ -44,8 +44,8 @@ impl Viewed {
         Err(ViewError::Run { what: format!("the reference of {}", self.label), why: refusal })
     }
 
-    /// Integrates a plan and keeps what a page shows of it, of the columns those that are `wanted`; a run that
-    /// stops is shown up to there.
+    /// Integrates a plan and keeps what a page shows of it, of the columns those that are `wanted`; a run
+    /// that stops is shown up to there.
     pub(super) fn integrated(
         label: &str,
         scene: Scene,

@@ -1,7 +1,7 @@
 //! Runs as a page to look at: read back from their folders, thinned out where they are long.
 //!
-//! A page is made of what stands in the folder, `run.json` and `trajectory.csv`, and of nothing else: a run of
-//! last year, or of another machine, has the same page as one that has just ended.
+//! A page is made of what stands in the folder, `run.json` and `trajectory.csv`, and of nothing else: a run
+//! of last year, or of another machine, has the same page as one that has just ended.
 
 mod columns;
 mod compare;
@@ -132,8 +132,8 @@ pub fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
 impl Viewed {
     /// Reads the run in a folder.
     ///
-    /// `window` \[s\] is kept row by row where the run is longer than a page can hold; left out, its beginning.
-    /// Rows that were `gathered` while it ran need not be read again.
+    /// `window` \[s\] is kept row by row where the run is longer than a page can hold; left out, its
+    /// beginning. Rows that were `gathered` while it ran need not be read again.
     ///
     /// # Errors
     /// There is none, or its files do not go together.

@@ -142,8 +142,8 @@ impl ContactDriver {
         Ok(-impact.approach)
     }
 
-    /// Gives the motion these rates \[rad/s, m/s\], with this impulsive work of motors \[J\]: the motion on both
-    /// sides, and the energy lost \[J\].
+    /// Gives the motion these rates \[rad/s, m/s\], with this impulsive work of motors \[J\]: the motion on
+    /// both sides, and the energy lost \[J\].
     pub(super) fn jump_to(&mut self, omega: &[f64], motor_work: f64) -> (Motion, Motion, f64) {
         let last = self.motion();
         let (mut motion, before) = (last.clone(), self.sampler.balance(&last));

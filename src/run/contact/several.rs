@@ -1,4 +1,5 @@
-//! Impacts at several walls at one moment: their impulses are found together, as the order of impacts matters.
+//! Impacts at several walls at one moment: their impulses are found together, as the order of impacts
+//! matters.
 
 use super::super::impact_monitor;
 use super::super::running::Outcome;

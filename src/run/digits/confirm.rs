@@ -1,10 +1,10 @@
 //! Whether a step of the series agrees with the equations inside it.
 //!
 //! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step begins
-//! and change within it, as `tanh(100*x)` does: the powers that would say so are not among those carried.  At a
-//! few times inside the step the motion is therefore expanded anew to its first powers, and their acceleration
-//! compared with that of the series; the step is shortened until they agree.  What rises and is flat again
-//! between these times is not seen.
+//! and change within it, as `tanh(100*x)` does: the powers that would say so are not among those carried.  At
+//! a few times inside the step the motion is therefore expanded anew to its first powers, and their
+//! acceleration compared with that of the series; the step is shortened until they agree.  What rises and is
+//! flat again between these times is not seen.
 
 use super::motion::Motion;
 use crate::arithmetic::Scalar;

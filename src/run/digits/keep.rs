@@ -88,8 +88,8 @@ impl<const W: usize> Keeper<W> {
         Ok(())
     }
 
-    /// Changes of coordinates that take residuals away: elimination with the coordinates that are not given as
-    /// pivots first, then the given ones, the last first.
+    /// Changes of coordinates that take residuals away: elimination with the coordinates that are not given
+    /// as pivots first, then the given ones, the last first.
     fn correction(&self, mut left: Vec<Digits<W>>, given: &[bool]) -> Vec<Digits<W>> {
         let n = given.len();
         let mut matrix = self.jacobian.clone();

@@ -70,8 +70,8 @@ pub struct Row {
     pub number: u64,
     /// Time \[s\].
     pub t: Wide,
-    /// Of every body: angle \[rad\], not wrapped, and rate \[rad/s\], position of the centre of mass \[m\] and
-    /// its velocity \[m/s\].
+    /// Of every body: angle \[rad\], not wrapped, and rate \[rad/s\], position of the centre of mass \[m\]
+    /// and its velocity \[m/s\].
     pub bodies: Vec<[Wide; 6]>,
     /// Kinetic and potential energy, and the work of motors, dampers and applied forces \[J\].
     pub energy: [Wide; 3],

@@ -4,11 +4,11 @@
 //! u(t+h) = u + Σ w_m h^(m+1)/(m+1),  w(t+h) = Σ w_m h^m,   h = (tolerance / |w_k|)^(1/k), least over the last five powers k
 //! ```
 //!
-//! The series is that of all methods ([`Series`]), over numbers of `W` limbs; the m-th power is kept to as many
-//! limbs as it weighs.  A step's length is a double, so that time is a sum of such and exact, and output times
-//! are read off the steps.  Angles are not wrapped: turns cost no digits worth the name.  Rows that are not
-//! eliminated are put back by Newton's iteration after every step (module `keep`), walls located by it (module
-//! `wall`).
+//! The series is that of all methods ([`Series`]), over numbers of `W` limbs; the m-th power is kept to as
+//! many limbs as it weighs.  A step's length is a double, so that time is a sum of such and exact, and output
+//! times are read off the steps.  Angles are not wrapped: turns cost no digits worth the name.  Rows that are
+//! not eliminated are put back by Newton's iteration after every step (module `keep`), walls located by it
+//! (module `wall`).
 
 use super::confirm::{Probe, confirmed};
 use super::keep::Keeper;
@@ -45,8 +45,8 @@ pub struct LongState<const W: usize> {
     pub steps: u64,
     /// Impacts passed.
     pub impacts: u64,
-    /// log2 of the radius of convergence of the last step's series \[s\], as far as its last powers tell; `None`
-    /// before there is one.
+    /// log2 of the radius of convergence of the last step's series \[s\], as far as its last powers tell;
+    /// `None` before there is one.
     pub radius: Option<f64>,
 }
 
@@ -71,7 +71,8 @@ pub struct Motion<const W: usize> {
     pub(super) keeper: Keeper<W>,
     /// What confirms steps, where laws may be flat.
     pub(super) probe: Option<Probe<W>>,
-    /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends on.
+    /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends
+    /// on.
     step: Option<(Digits<W>, Option<usize>)>,
     /// The radius its series has: see [`LongState`].
     radius: Option<f64>,
@@ -290,9 +291,9 @@ impl<const W: usize> Motion<W> {
 
     /// Expands the state, and tells how long a step its series makes \[s\].
     ///
-    /// Products are formed for the radius of convergence that the last step had, and steps may grow by a fifth.
-    /// Where powers turn out larger, where there is no step before, and of mechanisms with loops, whose radius
-    /// changes too fast near singular positions, they are formed in full.
+    /// Products are formed for the radius of convergence that the last step had, and steps may grow by a
+    /// fifth. Where powers turn out larger, where there is no step before, and of mechanisms with loops,
+    /// whose radius changes too fast near singular positions, they are formed in full.
     fn expand(&mut self) -> f64 {
         let Precision { order, bits, .. } = self.precision;
         let far = -self.precision.tolerance() / order as f64;
@@ -395,8 +396,8 @@ impl<const W: usize> Motion<W> {
         (u, rates, work)
     }
 
-    /// Σ a_m h^m, or Σ a_m h^m/(m+1), of every `stride`-th number: with as many limbs as each power is kept to,
-    /// and all of them at the end.
+    /// Σ a_m h^m, or Σ a_m h^m/(m+1), of every `stride`-th number: with as many limbs as each power is kept
+    /// to, and all of them at the end.
     fn sum(&self, series: &[Digits<W>], stride: usize, h: Digits<W>, is_integral: bool) -> Digits<W> {
         let mut sum = Digits::ZERO;
         let count = series.len().div_ceil(stride);

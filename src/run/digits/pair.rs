@@ -43,7 +43,8 @@ impl Pair {
         Ok(Self { runs, next: 0, rows: 1, saved })
     }
 
-    /// Goes on where others were, before the row `next`; false where they cannot have been runs of this scene.
+    /// Goes on where others were, before the row `next`; false where they cannot have been runs of this
+    /// scene.
     pub fn resume(&mut self, saved: &[Saved], next: u64) -> bool {
         let is_sound = saved.len() == self.runs.len() && next <= self.last_row() + 1;
         if !is_sound || !self.runs.iter_mut().zip(saved).all(|(run, saved)| run.resume(saved)) {

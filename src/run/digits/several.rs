@@ -1,4 +1,5 @@
-//! Impacts at several walls at one moment in many digits: their impulses are found together, by Poisson's law.
+//! Impacts at several walls at one moment in many digits: their impulses are found together, by Poisson's
+//! law.
 //!
 //! ```text
 //! v⁺ = v⁻ + A n,   A = G M⁻¹ Gᵀ with the constraints kept
@@ -18,8 +19,8 @@ use crate::stepping::{Cause, StepError};
 
 /// Walls that are taken at once.
 const MOST: usize = 12;
-/// Part of the bits carried that a gap has to be zero in, of what touches; and velocities and impulses, of what
-/// does not move or press.
+/// Part of the bits carried that a gap has to be zero in, of what touches; and velocities and impulses, of
+/// what does not move or press.
 const SURE: f64 = 0.75;
 
 /// What the walls that touch do to each other.
@@ -35,7 +36,8 @@ pub(super) struct Meeting<const W: usize> {
 }
 
 impl<const W: usize> Meeting<W> {
-    /// The walls that touch at the impact of one of them; `None` where that is the only one that is approached.
+    /// The walls that touch at the impact of one of them; `None` where that is the only one that is
+    /// approached.
     pub fn at(motion: &Motion<W>, wall: usize) -> Option<Self> {
         if motion.mechanism.walls.len() < 2 {
             return None;
@@ -153,8 +155,8 @@ impl<const W: usize> Problem<W> {
         })
     }
 
-    /// The impulses after which the points of these walls stand still, the others with the least; `None` where
-    /// there are none.
+    /// The impulses after which the points of these walls stand still, the others with the least; `None`
+    /// where there are none.
     fn pressed(&self, from: &[Digits<W>], least: &[Digits<W>], pressed: &[usize]) -> Option<Vec<Digits<W>>> {
         let mut impulse = least.to_vec();
         pressed.iter().for_each(|&i| impulse[i] = Digits::ZERO);

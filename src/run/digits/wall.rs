@@ -5,8 +5,8 @@
 //! gap(t) = c + Σ_m t^m Σ_k Re(conj(g_k) z_k,m) = 0;      w⁺ = w⁻ - (1 + e) (g·w⁻) a / (g·a),   a = response to an impulse along g
 //! ```
 //!
-//! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12 of
-//! the length of a contact are not told from touching.
+//! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12
+//! of the length of a contact are not told from touching.
 
 use super::motion::Motion;
 use super::several::Meeting;

@@ -38,7 +38,8 @@ pub(in crate::run) struct EventMemory {
     pub(super) resting: Vec<usize>,
     /// Those that rested until the last step.
     pub(super) woken: Vec<usize>,
-    /// True where what is to be done cannot be: the motion is driven back onto that condition from both sides.
+    /// True where what is to be done cannot be: the motion is driven back onto that condition from both
+    /// sides.
     pub slides: bool,
 }
 
@@ -357,8 +358,9 @@ impl StepWatcher for EventDetector {
 }
 
 impl EventDetector {
-    /// Remembers the events that happen at the very moment, too, at which another one cuts a step short: where
-    /// the next one begins rounding may have them behind.  Conditions stay on their sides until they flip.
+    /// Remembers the events that happen at the very moment, too, at which another one cuts a step short:
+    /// where the next one begins rounding may have them behind.  Conditions stay on their sides until they
+    /// flip.
     fn put_off(&mut self, later: &[Passage], t: Time, span: f64) {
         let is_now = |passage: &&Passage| (passage.t - t).hi <= SAME * span;
         for Passage { event, rises, .. } in later.iter().take_while(is_now) {

@@ -19,11 +19,12 @@ const ROUNDS: usize = 6;
 const SLOPE: f64 = 1e-3;
 /// Share of a step in which an event function leaves zero that was kept there by a joint.
 const LEAVES: f64 = 1e-5;
-/// Share of the largest value, of a condition within the step, of an event so far, up to which a function is at
-/// its zero.
+/// Share of the largest value, of a condition within the step, of an event so far, up to which a function is
+/// at its zero.
 const NO_VALUE: f64 = 1e-12;
 /// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a
-/// side, and the part of a step within which that is looked for: at a zero of a higher order it takes a while.
+/// side, and the part of a step within which that is looked for: at a zero of a higher order it takes a
+/// while.
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
 /// Steps of this share of the time are rounding.
@@ -103,7 +104,8 @@ impl EventDetector {
             let EventMemory { sides, largest, last, .. } = &mut self.memory;
             let (side, largest) = (&mut sides[event], &mut largest[event]);
             *largest = largest.max(curve.most());
-            // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding alone.
+            // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding
+            // alone.
             if mode.is_none() && curve.most() <= NO_VALUE * *largest {
                 continue;
             }

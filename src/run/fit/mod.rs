@@ -131,7 +131,8 @@ pub struct Fit {
     pub degrees_of_freedom: usize,
     /// Runs made.
     pub runs: u64,
-    /// Parts of the data, and the largest step between them that is left \[rad, or lengths of the mechanism\].
+    /// Parts of the data, and the largest step between them that is left \[rad, or lengths of the
+    /// mechanism\].
     pub segments: usize,
     /// See [`Fit::segments`].
     pub gap: f64,

@@ -166,8 +166,8 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    /// A step of Gauss and Newton for the state of a part, from its own rows and what was guessed, halved until
-    /// it helps; none where it does not.
+    /// A step of Gauss and Newton for the state of a part, from its own rows and what was guessed, halved
+    /// until it helps; none where it does not.
     fn state_step(&mut self, study: &Study, k: usize) -> Option<DVector<f64>> {
         let state = self.parts[k].state.clone()?;
         let passed = self.pass(study, k, Some(&state)).ok()?;
@@ -291,8 +291,8 @@ impl<'a> Problem<'a> {
         line
     }
 
-    /// The step from the end of the part before to the state of part `k`, in local coordinates; the largest is
-    /// returned.
+    /// The step from the end of the part before to the state of part `k`, in local coordinates; the largest
+    /// is returned.
     fn tie(
         &self,
         k: usize,

@@ -1,4 +1,5 @@
-//! One part of the data: the motion through it, the outputs at its times, and where it ends, with derivatives.
+//! One part of the data: the motion through it, the outputs at its times, and where it ends, with
+//! derivatives.
 
 use super::super::build::build;
 use super::super::contact::ContactDriver;

@@ -1,7 +1,7 @@
 //! Transmission angles: how well a coupler pushes what it moves.
 //!
-//! Where a coupler meets a body that hangs on the ground, the angle between the lines from the common hinge to
-//! the other hinge of each; where its end slides on the ground, that between the coupler and the normal of
+//! Where a coupler meets a body that hangs on the ground, the angle between the lines from the common hinge
+//! to the other hinge of each; where its end slides on the ground, that between the coupler and the normal of
 //! the rail.  It is 90° where all of the force moves, and 0 where none does.
 //!
 //! Source: H. Alt, *Der Übertragungswinkel und seine Bedeutung für das Konstruieren periodischer Getriebe*

@@ -235,8 +235,8 @@ impl Walk {
         away.is_finite().then_some([away, self.state.time.hi + away])
     }
 
-    /// The limit ahead: of two foretold ends that are wrong in proportion to the power 3/2 of the distance, the
-    /// value at none.
+    /// The limit ahead: of two foretold ends that are wrong in proportion to the power 3/2 of the distance,
+    /// the value at none.
     fn limit(&self, ends: &[[f64; 2]]) -> Limit {
         let is_fold = self.fastest() > STEEP * self.usual;
         let mut t = self.state.time.hi;

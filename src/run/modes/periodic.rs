@@ -102,8 +102,8 @@ pub struct PeriodicMotions {
     pub left_out: Vec<&'static str>,
 }
 
-/// Looks for motions that repeat themselves with the drives of a scene, from its start and from `starts` other
-/// positions.  The period \[s\] is that of motors at a constant rate and of sines, or the one given.
+/// Looks for motions that repeat themselves with the drives of a scene, from its start and from `starts`
+/// other positions.  The period \[s\] is that of motors at a constant rate and of sines, or the one given.
 ///
 /// # Errors
 /// The scene has none by its nature, or its period is not known.

@@ -193,8 +193,8 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Eigenvalues of the linearized motion.  Without damping they are the square roots of those of the stiffness,
-/// which then have all digits of a problem half the size.
+/// Eigenvalues of the linearized motion.  Without damping they are the square roots of those of the
+/// stiffness, which then have all digits of a problem half the size.
 fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, system: DMatrix<f64>) -> Vec<Complex<f64>> {
     if damping.amax() == 0.0 {
         let squares = stiffness.clone().complex_eigenvalues();

@@ -5,11 +5,13 @@
 //! dq += h dw + h² Σ_i b_i (1 - c_i) K_i,   dw += h Σ_i b_i K_i
 //! ```
 //!
-//! Six stages, order 12: on a step of [`taylor`](crate::stepping::taylor), which is a seventh of the radius of
-//! convergence, the error is about 1e-15 of what is integrated.  How far it is from that, the last coefficient
-//! of K in Legendre polynomials tells: it falls with the power 5 of the step where the error falls with 12.
+//! Six stages, order 12: on a step of [`taylor`](crate::stepping::taylor), which is a seventh of the radius
+//! of convergence, the error is about 1e-15 of what is integrated.  How far it is from that, the last
+//! coefficient of K in Legendre polynomials tells: it falls with the power 5 of the step where the error
+//! falls with 12.
 //!
-//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section II.1.3.
+//! Source: E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section
+//! II.1.3.
 
 use super::super::trust::eliminate;
 use crate::stepping::gauss::collocation;
@@ -46,9 +48,9 @@ impl Collocation {
     /// Takes columns (dq, dw) of n coordinates through a step; `pull` has B and C at the nodes, n × 2n row by
     /// row, one node after the other, `forcing` F of every column, node by node, empty for columns without.
     ///
-    /// `floors` are sizes of columns below which they need not be resolved.  Returns the last coefficient over
-    /// the size of what is integrated, and leaves the columns alone where it is above `limit`; NaN where there
-    /// is no solution.
+    /// `floors` are sizes of columns below which they need not be resolved.  Returns the last coefficient
+    /// over the size of what is integrated, and leaves the columns alone where it is above `limit`; NaN where
+    /// there is no solution.
     pub fn step(
         &mut self,
         h: f64,

@@ -8,9 +8,9 @@
 //!
 //! The scene is read once more on [`Varied`] numbers, in which the numbers asked for are seeds, and compiled
 //! like any other, so that every constant of the equations has its exact derivatives by them.  The recurrence
-//! that expands the motion then expands its derivatives, of so many numbers at once as there are lanes, in the
-//! same order and with the same multipliers.  The motion stays what it was: its value is expanded again for
-//! every block of lanes.
+//! that expands the motion then expands its derivatives, of so many numbers at once as there are lanes, in
+//! the same order and with the same multipliers.  The motion stays what it was: its value is expanded again
+//! for every block of lanes.
 
 use super::super::inside::Step;
 use super::super::trust::Ground;

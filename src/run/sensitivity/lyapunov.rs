@@ -5,10 +5,10 @@
 //! ⟨x, y⟩ = ν² dqᵀ M dq + (P dw)ᵀ M (P dw)         P  onto the directions that the constraints allow, ν = 1/unit of time
 //! ```
 //!
-//! In this product volumes are those of the phase space of positions and momenta of the constrained mechanism,
-//! which a motion without dissipation keeps (Liouville): the exponents then add up to zero, not in the limit
-//! but at every time.  With dampers their sum is the mean of tr(W dQ/dw), Q being the applied forces and W the
-//! inverse mass matrix that the constraints leave; an impact of restitution e adds log e².
+//! In this product volumes are those of the phase space of positions and momenta of the constrained
+//! mechanism, which a motion without dissipation keeps (Liouville): the exponents then add up to zero, not in
+//! the limit but at every time.  With dampers their sum is the mean of tr(W dQ/dw), Q being the applied
+//! forces and W the inverse mass matrix that the constraints leave; an impact of restitution e adds log e².
 //!
 //! Sources: G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980), 9-30; V. I. Arnold,
 //! *Mathematical Methods of Classical Mechanics*, 2nd ed. (1989), section 16.

@@ -1,11 +1,12 @@
 //! Sensitivities: derivatives of outputs and measures of a run by any number of its scene.
 //!
 //! One run of [`taylor`](crate::stepping::taylor) carries a column for each number beside the motion (module
-//! `variation`), through impacts, events and the transitions of dry friction (module `crossing`).  Columns are power
-//! series on numbers with derivatives (module `expanded`) where the scene has such, and else integrated by
-//! collocation (module `collocation`); what a number does there, to the start, to outputs and to impacts, is
-//! told by neighbouring mechanisms at one and the same state (module `neighbours`).  Nothing is a difference of
-//! runs, so that the derivatives are as accurate as the motion, however fast neighbouring motions part.
+//! `variation`), through impacts, events and the transitions of dry friction (module `crossing`).  Columns
+//! are power series on numbers with derivatives (module `expanded`) where the scene has such, and else
+//! integrated by collocation (module `collocation`); what a number does there, to the start, to outputs and
+//! to impacts, is told by neighbouring mechanisms at one and the same state (module `neighbours`).  Nothing
+//! is a difference of runs, so that the derivatives are as accurate as the motion, however fast neighbouring
+//! motions part.
 //!
 //! ```text
 //! dy/dp = Y_x δ + Y_p       of an output Y(t, x; p)       δ  the column of p

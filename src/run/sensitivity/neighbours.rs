@@ -5,10 +5,10 @@
 //! ```
 //!
 //! F stands for accelerations, constraints, gaps, impacts, outputs and the start, all at one and the same
-//! state.  They are smooth functions of p, so that the formula is right to 11 digits and more with an e that is
-//! found by trying: from one e to the next smaller one the error of truncation goes with e⁴, that of rounding
-//! with 1/e.  What a difference of *runs* suffers from, growth of rounding and of e itself with time, is not in
-//! it.
+//! state.  They are smooth functions of p, so that the formula is right to 11 digits and more with an e that
+//! is found by trying: from one e to the next smaller one the error of truncation goes with e⁴, that of
+//! rounding with 1/e.  What a difference of *runs* suffers from, growth of rounding and of e itself with
+//! time, is not in it.
 
 use super::super::contact::in_modes;
 use crate::dynamics::constraint::Posture;
@@ -81,8 +81,8 @@ pub(in crate::run) struct Neighbours {
     pub start: Vec<f64>,
     /// Estimated relative error of derivatives.
     pub error: f64,
-    /// Size of a column \[rad/s, m/s\] below which steps need not resolve it to its own accuracy: what moves it
-    /// is known to a share of 1e-11 of what changes of the number by its own size do.
+    /// Size of a column \[rad/s, m/s\] below which steps need not resolve it to its own accuracy: what moves
+    /// it is known to a share of 1e-11 of what changes of the number by its own size do.
     pub floor: f64,
 }
 
@@ -185,8 +185,8 @@ impl Neighbours {
         self.list.iter().map(|neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism))).collect()
     }
 
-    /// Goes on with the parts that act, the contacts held and the branches of a mechanism, and with the values
-    /// of the parameters, by number, that events have set.
+    /// Goes on with the parts that act, the contacts held and the branches of a mechanism, and with the
+    /// values of the parameters, by number, that events have set.
     ///
     /// # Errors
     /// A neighbour cannot go on so.
@@ -367,7 +367,8 @@ impl Search<'_> {
     }
 
     /// The size that values of a group have at least: a start at rest, a constraint that is met and an
-    /// acceleration that constraints leave are differences of numbers that are not small, and rounded as those.
+    /// acceleration that constraints leave are differences of numbers that are not small, and rounded as
+    /// those.
     fn least_size(&self, group: usize) -> f64 {
         let units = self.base.0.units;
         let (place, rate) = (units.length.min(1.0), 1.0 / units.time);
@@ -378,8 +379,8 @@ impl Search<'_> {
         }
     }
 
-    /// The largest acceleration \[rad/s², m/s²\] that forces alone would cause at a state; zero where they act
-    /// alone.
+    /// The largest acceleration \[rad/s², m/s²\] that forces alone would cause at a state; zero where they
+    /// act alone.
     fn unconstrained(&self, state: usize) -> f64 {
         let mechanism = self.base.0;
         if mechanism.constraints.is_empty() {

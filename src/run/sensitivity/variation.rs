@@ -5,14 +5,15 @@
 //! G dq + C_p dp = 0,  (G w + C_t)' (dq, dw) + C'_p dp = 0        kept after every step
 //! ```
 //!
-//! The columns (dq, dw) are integrated on the steps of the motion itself, inside which its dense output is known
-//! (module `collocation`); A_q and A_w are evaluated on dual numbers, what a number p does at a state is told
-//! by its neighbours (module `neighbours`), what an impact or an event does by the saltation matrix
-//! ([`saltation`](crate::run::saltation)).  Driven angles are coordinates like all others here: their rows give them what the law's own
-//! numbers do.
+//! The columns (dq, dw) are integrated on the steps of the motion itself, inside which its dense output is
+//! known (module `collocation`); A_q and A_w are evaluated on dual numbers, what a number p does at a state
+//! is told by its neighbours (module `neighbours`), what an impact or an event does by the saltation matrix
+//! ([`saltation`](crate::run::saltation)).  Driven angles are coordinates like all others here: their rows
+//! give them what the law's own numbers do.
 //!
-//! Source: M. Géradin, A. Cardona, *Flexible Multibody Dynamics* (2001), chapter 12; E. Hairer, S. P. Nørsett,
-//! G. Wanner, *Solving Ordinary Differential Equations I*, section I.14 (variational equation, parameters).
+//! Source: M. Géradin, A. Cardona, *Flexible Multibody Dynamics* (2001), chapter 12; E. Hairer, S. P.
+//! Nørsett, G. Wanner, *Solving Ordinary Differential Equations I*, section I.14 (variational equation,
+//! parameters).
 
 use super::super::contact::{ContactDriver, JumpLog};
 use super::super::inside::{Observer, ObserverAdapter, Step};

@@ -48,7 +48,8 @@ fn tolerance(plan: &Plan) -> Option<f64> {
     plan.tolerance.map(|tolerance| tolerance.relative.min(tolerance.absolute))
 }
 
-/// Whether formulas or friction are what a step of a series costs: their work grows with the square of the order.
+/// Whether formulas or friction are what a step of a series costs: their work grows with the square of the
+/// order.
 fn is_dear(mechanism: &Mechanism) -> bool {
     !(mechanism.forces.is_empty() && mechanism.frictions.is_empty())
 }
@@ -159,8 +160,8 @@ pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
             && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
 }
 
-/// What a reference solution in doubles may be off by in each second \[rad/s\], where that may be as much as a
-/// run is: where it is as fine as doubles allow.
+/// What a reference solution in doubles may be off by in each second \[rad/s\], where that may be as much as
+/// a run is: where it is as fine as doubles allow.
 pub(super) fn own_error(series: &Plan) -> f64 {
     let is_finest = series.method == MethodId::Taylor
         && !series.extended

@@ -1,9 +1,9 @@
 //! Which branches of a formula hold, and pieces of tables among them.
 //!
-//! A table of n points has n + 1 pieces, and neighbours among them differ in one bit of their Gray numbers
-//! k ^ (k >> 1).  These bits are the conditions of a table: 20 for a million points.  Bit j changes at the
-//! knots whose numbers, from 1 on, are odd multiples of 2^j; its condition is a parabola with zeros at the two
-//! of them around the present piece,
+//! A table of n points has n + 1 pieces, and neighbours among them differ in one bit of their Gray numbers k
+//! ^ (k >> 1).  These bits are the conditions of a table: 20 for a million points.  Bit j changes at the
+//! knots whose numbers, from 1 on, are odd multiples of 2^j; its condition is a parabola with zeros at the
+//! two of them around the present piece,
 //!
 //! ```text
 //! ± (x - a) (b - x) / (b - a),    ± (x - a) or ± (b - x) where there is but one

@@ -1,8 +1,8 @@
 //! Formulas: texts as `-k*bar1.phi - 0.5*bar1.omega^2`, read once and evaluated over any scalar.
 //!
 //! Numbers (with units: `30 deg`, `5 mm`, `2 N*s/m`), names (with dots), `pi`, `+ - * / ^`, parentheses, the
-//! functions of [`FUNCTIONS`], and comparisons inside `if(a < b, x, y)`.  `^` binds tightest and to the right:
-//! `-2^2` is -4, `2^3^2` is 512.  Everything is SI, angles in radians.
+//! functions of [`FUNCTIONS`], and comparisons inside `if(a < b, x, y)`.  `^` binds tightest and to the
+//! right: `-2^2` is -4, `2^3^2` is 512.  Everything is SI, angles in radians.
 //!
 //! `abs`, `sign`, `min`, `max` and `if` have corners: a formula is smooth only while none of its
 //! [`conditions`](Formula::conditions) changes sign.  Which branches hold is said from outside, so that a

@@ -2,10 +2,11 @@
 //!
 //! A clamped cubic spline through the points, level at both ends and constant beyond them.  Its pieces are
 //! branches of the formula and the knots between them switches, so that methods of high order end a step at
-//! every knot and see a polynomial in between.  Pieces are found by bisection, and the [conditions](super::branches)
-//! of a table grow with the logarithm of its points.
+//! every knot and see a polynomial in between.  Pieces are found by bisection, and the
+//! [conditions](super::branches) of a table grow with the logarithm of its points.
 //!
-//! Source: C. de Boor, *A Practical Guide to Splines* (1978), chapter IV (complete cubic spline interpolation).
+//! Source: C. de Boor, *A Practical Guide to Splines* (1978), chapter IV (complete cubic spline
+//! interpolation).
 
 use super::branches::Knots;
 use super::{Formula, Node};
@@ -66,7 +67,8 @@ impl Interpolant {
     }
 }
 
-/// Slopes at the points of the cubic spline that is level at both ends, by elimination in a tridiagonal system.
+/// Slopes at the points of the cubic spline that is level at both ends, by elimination in a tridiagonal
+/// system.
 fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
     let n = points.len();
     let mut slopes = vec![0.0; n];

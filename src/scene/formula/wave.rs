@@ -1,5 +1,5 @@
-//! Formulas of time that are sums of sines and a parabola: what motors' laws are made of, so that their phases
-//! stay exact over long horizons.
+//! Formulas of time that are sums of sines and a parabola: what motors' laws are made of, so that their
+//! phases stay exact over long horizons.
 //!
 //! ```text
 //! a0 + a1 t + a2 t² + Σ (c cos w t + s sin w t)

@@ -248,7 +248,8 @@ pub(super) fn integrals(
     Ok(all.into_iter().enumerate().map(integral).collect())
 }
 
-/// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events name.
+/// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events
+/// name.
 pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
     let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
     let is_plain = is_plain && scene.walls.iter().all(|wall| wall.aim.is_none());

@@ -80,8 +80,8 @@ impl Nodes {
 /// enough for each of them, of which `is_enough` is given the number and the curve, and that of the degree
 /// before.
 ///
-/// `at` appends the value of each function at a place in \[0, 1\]; it is asked once about a place, of which each
-/// degree that is twice the one before has every other already.
+/// `at` appends the value of each function at a place in \[0, 1\]; it is asked once about a place, of which
+/// each degree that is twice the one before has every other already.
 pub fn interpolated(
     degrees: &[usize],
     mut at: impl FnMut(f64, &mut Vec<f64>),

@@ -47,7 +47,8 @@ impl<'a, F: OdeSystem + ?Sized> Window<'a, F> {
         rate[self.n] = 1.0;
     }
 
-    /// Counts a row; true where it was the last that may be kept, time hardly passes, or nobody waits for more.
+    /// Counts a row; true where it was the last that may be kept, time hardly passes, or nobody waits for
+    /// more.
     pub fn is_full(&mut self, y: &[f64]) -> bool {
         self.rows = self.rows.saturating_sub(1);
         self.made += 1;

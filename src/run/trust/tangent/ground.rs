@@ -22,7 +22,8 @@ pub struct Ground {
     omega: Vec<Number>,
     z: Vec<Complex<Number>>,
     gradient: Vec<Number>,
-    /// Rows that took hold where the motion was, as neighbours do where they are: motors and locks that engaged.
+    /// Rows that took hold where the motion was, as neighbours do where they are: motors and locks that
+    /// engaged.
     pub engaged: Vec<usize>,
 }
 

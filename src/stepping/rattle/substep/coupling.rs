@@ -1,7 +1,7 @@
 //! Gears and cams in a substep of RATTLE.
 //!
-//! Their formulas are no polynomials: the iterations on positions form C from pairs, because C in plain doubles,
-//! over h²/2, would be the rounding of positions as a force.
+//! Their formulas are no polynomials: the iterations on positions form C from pairs, because C in plain
+//! doubles, over h²/2, would be the rounding of positions as a force.
 
 use super::Work;
 use crate::arithmetic::{Complex, DoubleDouble};
