@@ -126,6 +126,38 @@ fn points_of_one_tree_agree_with_single_runs() {
     }
 }
 
+/// Closed loops and sliders where starts differ, through singular positions too, where points go alone.
+#[test]
+fn points_of_one_loop_agree_with_single_runs() {
+    for (scene, vary, until, near) in [
+        ("andrews", "OF.omega=-50..50:9", 0.01, 1e-8),
+        ("slider_crank_torque", "crank.omega=-1..1:9", 0.6, 1e-9),
+        ("four_bar_motor", "coupler.phi=0.42..0.44:9", 0.7, 1e-9),
+        ("kite", "crank.omega=7..8:9", 1.0, 1e-6),
+        ("four_bars", "U0.omega=-1.5..-1:9", 3.0, 1e-6),
+    ] {
+        let request = Request { rtol: Some(1e-12), every: Some(0.5 * until), ..request("taylor", until) };
+        let plan = prepared(scene, &[vary], &request);
+        for point in points(&plan, 1) {
+            let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
+            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+            assert_eq!((&point.status, point.t), (&Status::Done, until), "{scene}");
+            let fastest = point.omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
+            for (found, exact) in point.phi.iter().zip(&outcome.last.phi) {
+                assert!((found - exact).abs() < near, "{scene}: {point:?} {outcome:?}");
+            }
+            for (found, exact) in point.omega.iter().zip(&outcome.last.omega) {
+                assert!((found - exact).abs() < near * fastest, "{scene}: {point:?} {outcome:?}");
+            }
+            let flips = [&point.flip, &outcome.flip].map(|flip| flip.as_ref().map(|flip| flip.bar));
+            assert_eq!(flips[0], flips[1], "{scene}: {point:?} {outcome:?}");
+            let [position, rate] = point.constraint.expect("constraints");
+            assert!(position < 1e-15 && rate < 1e-14 * fastest, "{scene}: {point:?}");
+            assert_eq!(plan.point(point.index).as_ref(), Some(&point));
+        }
+    }
+}
+
 /// Without a method named, springs are in lanes unless one of them is so stiff that a method was chosen for it.
 #[test]
 fn stiff_springs_stay_with_the_method_chosen_for_them() {

@@ -41,7 +41,7 @@ impl<T: SeriesNumber> Series<T> {
     /// The factors of M_0, and those of the rows.
     #[inline(always)]
     pub(super) fn factor<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
-        let (n, f) = (size::<N>(self.elements), self.partition.count());
+        let n = size::<N>(self.elements);
         if N == 0
             && let Some(bodywise) = &mut self.bodywise
         {
@@ -49,6 +49,19 @@ impl<T: SeriesNumber> Series<T> {
             self.rows.prepare_bodywise(&mut bodywise.evaluation, &self.z[..n]);
             return;
         }
+        self.factor_mass::<N>(terms);
+        if T::HAS_INVERSE {
+            self.invert();
+        }
+        if !self.rows.is_empty() {
+            T::perform(Part::Factors { series: self, terms });
+        }
+    }
+
+    /// The factors of M_0, where there are matrices.
+    #[inline(always)]
+    pub(super) fn factor_mass<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
+        let (n, f) = (size::<N>(self.elements), self.partition.count());
         terms.tree.mass_matrix::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
         if self.is_tied {
             self.partition.reduce(&self.mass, &mut self.reduced);
@@ -56,12 +69,6 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             self.reduced.copy_from_slice(&self.mass);
             tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
-        }
-        if T::HAS_INVERSE {
-            self.invert();
-        }
-        if !self.rows.is_empty() {
-            T::perform(Part::Factors { series: self, terms });
         }
     }
 
@@ -95,6 +102,10 @@ impl<T: SeriesNumber> Series<T> {
     #[inline(always)]
     fn factor_rows(&mut self, terms: &Terms<T::Constant>) {
         let (n, f) = (self.elements, self.partition.count());
+        if T::HAS_BORDER {
+            self.rows.factor(&self.z[..n], &self.reduced, &self.pivot);
+            return self.rows.border_inverse(&self.inverse[..f * f]);
+        }
         self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
         let diagonal = &terms.structure.tree.diagonal;
         let diagonal = self.partition.independent.iter().map(|&body| diagonal[body]);
@@ -105,7 +116,11 @@ impl<T: SeriesNumber> Series<T> {
     #[inline(always)]
     fn solve_rows(&mut self, m: usize) {
         let n = self.elements;
-        self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+        if T::HAS_BORDER {
+            self.rows.solve_bordered(m, &self.z, &self.bend, &mut self.solution);
+        } else {
+            self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+        }
         self.rows.push(m, &self.z[..n], &mut self.rest[Self::row(m, n)]);
     }
 
@@ -260,7 +275,10 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             self.solution[..n].copy_from_slice(&self.load[..n]);
         }
-        if T::HAS_INVERSE {
+        let is_bordered = T::HAS_BORDER && !self.rows.is_empty();
+        if is_bordered {
+            // The loads are half of a right side.
+        } else if T::HAS_INVERSE {
             self.by_inverse::<N>();
         } else if self.is_tied {
             tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);

@@ -11,6 +11,8 @@
 //! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products
 //! of earlier multipliers with later powers of z enter through the loads like those of any force.
 
+mod bordered;
+
 use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::{copy, zeros};
@@ -41,6 +43,12 @@ pub struct RowSeries<T: SeriesNumber> {
     metric: Metric,
     /// The row nearest to being left out at the start.
     weakest: Weakest,
+    /// The inverse of [`border_inverse`](Self::border_inverse) (r + f by as many) and a right side of it, for
+    /// numbers that have it.
+    border: Vec<T>,
+    right: Vec<T>,
+    /// Where rows are to be put back to, see [`face`](Self::face).
+    goals: Vec<Complex<T>>,
     /// lambda: powers 0…P-1 (P × r).
     multiplier: Vec<T>,
 }
@@ -135,6 +143,9 @@ impl<T: SeriesNumber> RowSeries<T> {
             scale,
             metric,
             weakest: Weakest::NONE,
+            border: zeros(if T::HAS_BORDER { (r + f) * (r + f) } else { 0 }),
+            right: zeros(if T::HAS_BORDER { r + f } else { 0 }),
+            goals: Vec::new(),
             multiplier: zeros(order * r),
         }
     }

@@ -1,5 +1,5 @@
 //! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs or without, or of
-//! two of which one is driven; and ensembles of one mechanism, any hinge tree.
+//! two of which one is driven; and ensembles of one mechanism, any hinge tree, with closed loops or without.
 //!
 //! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
@@ -20,7 +20,7 @@ use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
 use self::vectors::{added, load, moved, store, unit};
 use super::step_size::{self, StepSize};
-use super::{JUDGES, Kernel, stop};
+use super::{JUDGES, Kernel, Taylor, stop};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::{Mechanism, State, Time};
@@ -34,7 +34,8 @@ const BODIES: usize = 4;
 const SPRINGS: usize = 8;
 
 /// One trajectory: its mechanism, its state in the form of
-/// [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
+/// [`Elimination`](crate::dynamics::elimination::Elimination), or with loops of
+/// [`Multiplier`](crate::dynamics::multiplier::Multiplier), and how it went.
 #[derive(Clone, Debug)]
 pub struct BatchMember<'a> {
     /// What is integrated.
@@ -45,12 +46,15 @@ pub struct BatchMember<'a> {
     pub statistics: Statistics,
     /// Why it stopped, if it did.
     pub stopped: Option<StepError>,
+    /// True where it came to a step that lanes do not take, near a singular position: it stands where that
+    /// step begins, to be taken on by [`Taylor`](super::Taylor) with projection.
+    pub has_left: bool,
 }
 
 impl<'a> BatchMember<'a> {
     /// A trajectory about to start.
     pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
-        Self { mechanism, state, statistics: Statistics::default(), stopped: None }
+        Self { mechanism, state, statistics: Statistics::default(), stopped: None, has_left: false }
     }
 }
 
@@ -73,7 +77,17 @@ pub struct Passage<'a> {
     series: &'a dyn Fn(usize, f64) -> (f64, f64),
 }
 
-impl Passage<'_> {
+impl<'a> Passage<'a> {
+    /// A step from a time on, so long \[s\], with what [`Passage::ends`] and [`Passage::at`] tell of it.
+    pub(crate) fn new(
+        from: Time,
+        step: f64,
+        ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
+        series: &'a dyn Fn(usize, f64) -> (f64, f64),
+    ) -> Self {
+        Self { from, step, ends, series }
+    }
+
     /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued
     /// from that at the start in [-π, π].
     pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
@@ -114,6 +128,11 @@ impl Batch {
         Self { is_portable: kernel != Kernel::Fastest, ..self }
     }
 
+    /// The method for one trajectory alone, at the same tolerance and with the same order.
+    pub(crate) fn alone(&self) -> Taylor<f64> {
+        Taylor::with_order(self.tolerance, self.order)
+    }
+
     /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
     /// beside gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or
     /// two bodies without springs, one of them driven from the ground by a law that is no formula.
@@ -126,7 +145,9 @@ impl Batch {
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
     /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
-    /// motors on angles, springs beside them, that are no formulas, without walls and friction.
+    /// motors on angles, springs beside them, that are no formulas, without walls and friction; and the same
+    /// with closed loops and sliders, their states in the form of
+    /// [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         trees::fits(mechanism)
     }
@@ -135,7 +156,7 @@ impl Batch {
     /// may end that one.
     ///
     /// Mechanisms of neither [these](Batch::takes) nor [those](Batch::takes_alike) kinds are stopped as
-    /// unsuited.  The result of each does not depend on the others.
+    /// unsuited; those with loops may [leave](BatchMember::has_left) on the way.  The result of each does not depend on the others.
     pub fn integrate(
         &self,
         members: &mut [BatchMember],
@@ -143,6 +164,7 @@ impl Batch {
         watch: &mut dyn FnMut(usize, &Passage) -> Going,
     ) {
         let mut is_done = vec![false; members.len()];
+        members.iter_mut().for_each(|member| member.has_left = false);
         while let Some(next) = is_done.iter().position(|is_done| !is_done) {
             let like = members[next].mechanism;
             macro_rules! try_teams {
@@ -160,7 +182,7 @@ impl Batch {
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
             try_teams!(DrivenTeam, SwingingTeam, TreeTeam);
             let (member, hint) = (&mut members[next], "integrate it by `taylor`");
-            let what = "lanes take hinge trees, whose motors and springs are no formulas".into();
+            let what = "lanes take hinge trees and loops, whose motors and springs are no formulas".into();
             member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));
             is_done[next] = true;
         }
@@ -207,6 +229,12 @@ trait Team {
 
     /// True where a lane's coefficients of this order are finite.
     fn is_finite(&self, lane: usize, order: usize) -> bool;
+
+    /// True where a lane's trajectory is better left to other code from where the present step begins: asked
+    /// after its expansion, and again after its end.
+    fn is_leaving(&self, _lane: usize) -> bool {
+        false
+    }
 
     /// Every lane's state at the end of its step \[s\].
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
@@ -351,7 +379,7 @@ impl<T: Team> Crew<T> {
         let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
         for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
             (slot.wanted, slot.taken) = (f64::NAN, 0.0);
-            if self.team.is_finite(lane, order) {
+            if self.team.is_finite(lane, order) && !self.team.is_leaving(lane) {
                 let mut own = [0.0; JUDGES];
                 for back in 0..JUDGES {
                     own[back] = sizes[back].0[lane];
@@ -376,6 +404,12 @@ impl<T: Team> Crew<T> {
             let slot = &mut self.slots[lane];
             let Some(index) = slot.member else { continue };
             let member = &mut members[index];
+            if self.team.is_leaving(lane) {
+                (member.has_left, member.state.time) = (true, slot.time);
+                self.team.leave(lane, &mut member.state);
+                slot.member = None;
+                continue;
+            }
             let (from, step) = (slot.time, slot.taken);
             match slot.failure(&member.statistics) {
                 Err(stop) => member.stopped = Some(stop),
@@ -388,7 +422,7 @@ impl<T: Team> Crew<T> {
             let time = slot.time;
             let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
             let ends = |body: usize| self.team.ends(lane, body);
-            let passage = Passage { from, step, ends: &ends, series: &series };
+            let passage = Passage::new(from, step, &ends, &series);
             let is_over =
                 member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until;
             self.team.wrap(lane, &mut member.state.turns);
