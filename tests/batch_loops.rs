@@ -99,10 +99,7 @@ fn violation(mechanism: &Mechanism, t: Time, ends: &dyn Fn(usize) -> [f64; 2]) -
         let mut jacobian = vec![DoubleDouble::default(); n];
         let here = row.linearise(t, Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
         let slip = jacobian.iter().zip(&omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
-        [
-            position.max(here.position.hi.abs() / size),
-            rate.max(slip.hi.abs() / (size * fastest)),
-        ]
+        [position.max(here.position.hi.abs() / size), rate.max(slip.hi.abs() / (size * fastest))]
     })
 }
 
@@ -141,8 +138,11 @@ fn kite([crank, rate]: [f64; 2]) -> ([f64; 2], [f64; 2], f64) {
     let coupler_rate = rate * (crank - rocker).sin() / sine;
     let rocker_rate = 0.5 * rate * (crank - coupler).sin() / sine;
     let g = 9.81;
-    let middle = [-y * rate - 0.5 * coupler.sin() * coupler_rate, x * rate + 0.5 * coupler.cos() * coupler_rate];
-    let turning = rate * rate * (1.0 / 3.0) + coupler_rate * coupler_rate / 12.0 + rocker_rate * rocker_rate * 8.0 / 3.0;
+    let middle =
+        [-y * rate - 0.5 * coupler.sin() * coupler_rate, x * rate + 0.5 * coupler.cos() * coupler_rate];
+    let turning = rate * rate * (1.0 / 3.0)
+        + coupler_rate * coupler_rate / 12.0
+        + rocker_rate * rocker_rate * 8.0 / 3.0;
     let kinetic = 0.5 * (turning + middle[0] * middle[0] + middle[1] * middle[1]);
     let potential = g * (0.5 * y + y + 0.5 * coupler.sin() + 2.0 * rocker.sin());
     ([coupler, rocker], [coupler_rate, rocker_rate], kinetic + potential)
@@ -159,7 +159,10 @@ fn a_four_bar_is_where_trigonometry_has_it_with_the_energy_it_began_with() {
         for body in [1, 2] {
             let off = (ends[body][0] - angles[body - 1]) / std::f64::consts::TAU;
             assert!((off - off.round()).abs() < 2e-15, "{k}: {ends:?} {angles:?}");
-            assert!((ends[body][1] - rates[body - 1]).abs() < 1e-13 * ends[0][1].abs(), "{k}: {ends:?} {rates:?}");
+            assert!(
+                (ends[body][1] - rates[body - 1]).abs() < 1e-13 * ends[0][1].abs(),
+                "{k}: {ends:?} {rates:?}"
+            );
         }
         let first = *energy[k].get_or_insert(total);
         assert!((total - first).abs() < 2e-13 * first, "{k}: {total} {first}");
@@ -194,6 +197,13 @@ fn what_lanes_do_not_take_is_told_beforehand() {
     for scene in ["crank_rocker", "trebuchet", "latch"] {
         let mechanism = compile(&shipped(scene, &[]));
         let takes = Batch::takes_alike(&mechanism);
-        assert!(!takes || mechanism.constraints.iter().all(|row| row.law.as_ref().is_none_or(|l| l.profile.is_none())), "{scene}");
+        assert!(
+            !takes
+                || mechanism
+                    .constraints
+                    .iter()
+                    .all(|row| row.law.as_ref().is_none_or(|l| l.profile.is_none())),
+            "{scene}"
+        );
     }
 }

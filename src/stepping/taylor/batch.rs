@@ -8,6 +8,8 @@
 mod driven;
 mod free;
 mod laws;
+mod looped;
+mod passage;
 mod series;
 mod springs;
 mod swinging;
@@ -16,6 +18,8 @@ mod vectors;
 
 use self::driven::DrivenTeam;
 use self::free::FreeTeam;
+use self::looped::LoopTeam;
+pub use self::passage::Passage;
 use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
 use self::vectors::{added, load, moved, store, unit};
@@ -65,40 +69,6 @@ pub enum Going {
     On,
     /// Enough was seen.
     Enough,
-}
-
-/// A step just taken, which can be looked at anywhere.
-pub struct Passage<'a> {
-    /// Time at its start.
-    pub from: Time,
-    /// Its length \[s\].
-    pub step: f64,
-    ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
-    series: &'a dyn Fn(usize, f64) -> (f64, f64),
-}
-
-impl<'a> Passage<'a> {
-    /// A step from a time on, so long \[s\], with what [`Passage::ends`] and [`Passage::at`] tell of it.
-    pub(crate) fn new(
-        from: Time,
-        step: f64,
-        ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
-        series: &'a dyn Fn(usize, f64) -> (f64, f64),
-    ) -> Self {
-        Self { from, step, ends, series }
-    }
-
-    /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued
-    /// from that at the start in [-π, π].
-    pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
-        (self.series)(body, after)
-    }
-
-    /// The same at the start and at the end, as the integration has them: without a sum, and to rounding
-    /// those of [`Passage::at`].
-    pub fn ends(&self, body: usize) -> [[f64; 2]; 2] {
-        (self.ends)(body)
-    }
 }
 
 /// Integrates many trajectories of hinge trees.
@@ -170,8 +140,8 @@ impl Batch {
             macro_rules! try_teams {
                 ($($team:ty),*) => {$(
                     if <$team>::fits(like, like) {
-                        let fits: Vec<bool> =
-                            members.iter().map(|member| <$team>::fits(member.mechanism, like)).collect();
+                        let fits = |one: &Mechanism| std::ptr::eq(one, like) || <$team>::fits(one, like);
+                        let fits: Vec<bool> = members.iter().map(|member| fits(member.mechanism)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
                         self.integrate_those::<$team>(like, &fits, members, until, watch);
                         continue;
@@ -180,7 +150,7 @@ impl Batch {
             }
             try_teams!(FreeTeam<1, false>, FreeTeam<2, false>, FreeTeam<3, false>, FreeTeam<4, false>);
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
-            try_teams!(DrivenTeam, SwingingTeam, TreeTeam);
+            try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
             let (member, hint) = (&mut members[next], "integrate it by `taylor`");
             let what = "lanes take hinge trees and loops, whose motors and springs are no formulas".into();
             member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));

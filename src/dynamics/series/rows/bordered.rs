@@ -15,6 +15,7 @@
 use super::{Kind, RowSeries, bent};
 use crate::arithmetic::Complex;
 use crate::dynamics::series::SeriesNumber;
+use crate::dynamics::series::order::rows_times;
 use crate::dynamics::tree;
 
 impl<T: SeriesNumber> RowSeries<T> {
@@ -154,19 +155,37 @@ impl<T: SeriesNumber> RowSeries<T> {
                 Kind::Angle { drive, .. } => -drive[m + 1].scale((m + 1) as f64),
             };
         }
-        let multiplier = &mut self.multiplier[m * r..(m + 1) * r];
-        for c in 0..size {
-            let row = &self.border[c * size..(c + 1) * size];
-            let mut sum = row[0] * right[0];
-            for d in 1..size {
-                sum = sum.with_product(row[d], right[d], true);
+        let found = &mut self.found[..size];
+        rows_times(&self.border, right, found);
+        solution.copy_from_slice(&found[..f]);
+        self.multiplier[m * r..(m + 1) * r].copy_from_slice(&found[f..]);
+    }
+
+    /// Power m of the power of the rows that do work \[W/s^m\].
+    #[inline(always)]
+    pub(super) fn power_of_motors(&mut self, m: usize, omega: &[T]) -> T {
+        let (r, mut power) = (self.kinds.len(), T::ZERO);
+        for (i, kind) in self.kinds.iter_mut().enumerate() {
+            if !self.works[i] {
+                continue;
             }
-            if c < f {
-                solution[c] = sum;
-            } else {
-                multiplier[c - f] = sum;
+            let rates = match kind {
+                Kind::Angle { body, base, speed, .. } => {
+                    speed[m] = omega[*body];
+                    if let Some(base) = base {
+                        speed[m] -= omega[*base];
+                    }
+                    &speed[..=m]
+                }
+                Kind::Place { drive, .. } => &drive[..=m],
+            };
+            let mut sum = T::ZERO;
+            for j in 0..=m {
+                sum = sum.with_product(self.multiplier[j * r + i], rates[m - j], true);
             }
+            power -= sum;
         }
+        power
     }
 
     /// Finds where the laws' rows are to be at a time, for [`violations`](Self::violations).

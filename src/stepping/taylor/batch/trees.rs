@@ -115,14 +115,18 @@ impl TreeTeam {
         if angle.abs() <= PI { angle } else { angle - TAU * (angle / TAU).round() }
     }
 
-    /// Brings the ends of the steps back onto the rows, and those that do not get there to where they began.
+    /// Brings the ends of the steps back onto the rows; lanes that take no step, or do not get there, stay where
+    /// it began.
     fn land(&mut self) {
-        let (Some([high, low]), taken) = (&self.kept, self.taken) else { return };
+        if self.kept.is_none() {
+            return;
+        }
         let mut times = self.times;
         for lane in 0..LANES {
-            times[lane] = times[lane] + taken.0[lane];
-            self.is_going[lane] &= taken.0[lane] > 0.0;
+            times[lane] = times[lane] + self.taken.0[lane];
+            self.is_going[lane] &= self.taken.0[lane] > 0.0;
         }
+        self.keep(&self.is_going.map(|is_going| !is_going));
         let landing = Landing {
             high: &mut self.high,
             low: &mut self.low,
@@ -130,8 +134,19 @@ impl TreeTeam {
             unit: 1.0 / self.mechanism.units.time,
         };
         let is_landed = self.series.land(&self.mechanism, times, landing);
-        for lane in (0..LANES).filter(|&lane| !is_landed[lane]) {
-            self.is_leaving[lane] |= self.is_going[lane];
+        if is_landed != self.is_going {
+            let is_lost = std::array::from_fn(|lane| self.is_going[lane] && !is_landed[lane]);
+            for lane in (0..LANES).filter(|&lane| is_lost[lane]) {
+                self.is_leaving[lane] = true;
+            }
+            self.keep(&is_lost);
+        }
+    }
+
+    /// Puts some lanes back to where the step began.
+    fn keep(&mut self, is_kept: &[bool; LANES]) {
+        let Some([high, low]) = &self.kept else { return };
+        for lane in (0..LANES).filter(|&lane| is_kept[lane]) {
             let unknowns = self.high.iter_mut().zip(high).chain(self.low.iter_mut().zip(low));
             unknowns.for_each(|(unknown, kept)| unknown.0[lane] = kept.0[lane]);
         }
