@@ -22,7 +22,7 @@ use self::looped::LoopTeam;
 pub use self::passage::Passage;
 use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
-use self::vectors::{added, load, moved, store, unit};
+use self::vectors::{added, load, moved, root, store, unit};
 use super::step_size::{self, StepSize};
 use super::{JUDGES, Kernel, Taylor, stop};
 use crate::arithmetic::eight::{LANES, Octet};

@@ -1,6 +1,6 @@
 //! The way back onto the constraint equations at the end of a step, eight motions at once.
 //!
-//! As the projection of the angle form ([`project`](crate::stabilization::projection)): positions, then rates,
+//! As the projection of the angle form (`stabilization/projection.rs`): positions, then rates,
 //! the shortest way in the metric of the mass matrix, with the factors of the step's end.  Every motion is
 //! moved as often as it needs by itself, so that none depends on the others.
 

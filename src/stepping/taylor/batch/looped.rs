@@ -1,7 +1,8 @@
 //! Bodies with closed loops, in natural coordinates, all lanes of equal mechanisms.
 //!
-//! The recurrence and the way back of [`looped`](super::super::looped), with the lanes over trajectories; one
-//! matrix of the step's start, three numbers a body by as many, stands between an order and the next:
+//! The recurrence and the way back of [`looped`](super::super::looped), with the lanes over trajectories; the
+//! matrices of the step's start stand between an order and the next, of which P is the square of a vector where
+//! there is one degree of freedom:
 //!
 //! ```text
 //! f_m = F_m - Σ_{j<m} mu_j z_{m-j},    q_m = (m+1)(m+2)/2 Σ_{j=1..m+1} z_j·z_{m+2-j}
@@ -93,7 +94,7 @@ impl Team for LoopTeam {
         Self {
             count: n,
             longest: libm::exp2(30.0) * like.units.time,
-            matrices: Matrices::new(reduced.as_ref(), n),
+            matrices: Matrices::new(reduced.as_ref(), n, like.assembly.degrees_of_freedom == 1),
             weight: like.tree.weight.iter().zip(&applied).map(|(&gravity, &force)| gravity + force).collect(),
             applied,
             torque,
@@ -121,6 +122,7 @@ impl Team for LoopTeam {
         fits(mechanism)
             && (&mechanism.tree, &mechanism.springs) == (&like.tree, &like.springs)
             && (&mechanism.actions, &mechanism.constraints) == (&like.actions, &like.constraints)
+            && mechanism.assembly.degrees_of_freedom == like.assembly.degrees_of_freedom
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, _order: usize) -> f64 {
@@ -222,14 +224,9 @@ impl Team for LoopTeam {
         let (z, rest) = self.end.split_at_mut(2 * n);
         let is_landed = self.matrices.land::<W>(z, &mut rest[..2 * n], &self.is_going);
         self.turns::<W>(order, h);
-        self.advance::<W>();
+        let longest = self.advance::<W>(h);
         for lane in 0..LANES {
-            let is_short = |i: usize| {
-                let rates = [self.before[0][n + i].0[lane], self.high[n + i].0[lane]];
-                let turns = rates.map(|rate| rate * taken.0[lane]);
-                [turns[0], turns[1], self.end[4 * n + i].0[lane]].iter().all(|turn| turn.abs() <= turn::MOST)
-            };
-            let is_whole = is_landed[lane] && (0..n).all(is_short);
+            let is_whole = is_landed[lane] && longest.0[lane] <= turn::MOST;
             self.is_leaving[lane] |= self.is_going[lane] && !is_whole;
             if !(self.is_going[lane] && is_whole) {
                 self.keep(lane);
@@ -345,16 +342,17 @@ impl LoopTeam {
         }
     }
 
-    /// Angles, rates and work at the step's end.
+    /// Angles, rates and work at the step's end; tells the longest turn, by the rates at both ends too \[rad\].
     #[inline(always)]
-    fn advance<W: EightLanes>(&mut self) {
-        let (n, mut work) = (self.count, W::ZERO);
+    fn advance<W: EightLanes>(&mut self, h: W) -> Octet {
+        let (n, mut work, mut longest) = (self.count, W::ZERO, W::ZERO);
         for i in 0..n {
             let turn = load::<W>(&self.end[4 * n + i]);
             (self.high[i], self.low[i]) = added([&self.high[i], &self.low[i]], turn, W::ZERO);
             let (x, y) = (load::<W>(&self.end[i]), load::<W>(&self.end[n + i]));
             let (dx, dy) = (load::<W>(&self.end[2 * n + i]), load::<W>(&self.end[3 * n + i]));
             let rate = y.neg_mul_add(dx, x.mul(dy));
+            longest = turn.larger(rate.mul(h).larger(load::<W>(&self.high[n + i]).mul(h).larger(longest)));
             (self.high[n + i], self.low[n + i]) = (store(rate), ZERO);
             let at = i * ROOM;
             let moved = [x.sub(load(&self.x[at])), y.sub(load(&self.y[at]))];
@@ -363,6 +361,7 @@ impl LoopTeam {
             work = turn.mul_add(W::splat(self.torque[i]), across);
         }
         (self.high[2 * n], self.low[2 * n]) = added([&self.high[2 * n], &self.low[2 * n]], work, W::ZERO);
+        store(longest)
     }
 
     /// Puts a lane back to where the step began.

@@ -8,7 +8,7 @@ use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::keeper::CLOSE;
 use crate::dynamics::natural::{Block, Reduced};
-use crate::stepping::taylor::batch::{load, store};
+use crate::stepping::taylor::batch::{load, root, store};
 
 /// Sweeps onto the unit lengths after the first one, of lanes that are far off.
 const SWEEPS: usize = 6;
@@ -25,8 +25,11 @@ pub(super) struct Matrices {
     /// V, x and y (each n × n), and S⁻¹.
     v: [Vec<Octet>; 2],
     schur: Vec<Octet>,
-    /// The matrix of an order (3n × 3n).
-    whole: Vec<Octet>,
+    /// U, x and y (each n × n).
+    u: [Vec<Octet>; 2],
+    /// P: (2n × 2n), or of one degree of freedom the vector (2n) whose square it is.
+    spread: Vec<Octet>,
+    is_line: bool,
     /// Violations, and factors made of them.
     far: Vec<Octet>,
     factors: Vec<Octet>,
@@ -39,6 +42,9 @@ struct Row {
     back: Vec<Complex<f64>>,
 }
 
+/// Share of a pivot above which a step may end: the next one leaves, but the way back is still well told.
+const NEARER: f64 = 1e-4;
+
 /// True where the largest reciprocal share of a pivot is that of a regular position; what is not a number is
 /// none.
 pub(super) fn is_regular(weakest: &Octet, lane: usize) -> bool {
@@ -46,8 +52,9 @@ pub(super) fn is_regular(weakest: &Octet, lane: usize) -> bool {
 }
 
 impl Matrices {
-    /// For so many bodies with these constants, which only mechanisms have that fit.
-    pub(super) fn new(reduced: Option<&Reduced>, n: usize) -> Self {
+    /// For so many bodies with these constants, which only mechanisms have that fit; `is_line`: of one degree
+    /// of freedom.
+    pub(super) fn new(reduced: Option<&Reduced>, n: usize, is_line: bool) -> Self {
         let row = |reduced: &Reduced, r: usize| Row {
             terms: reduced.rows[r].place.linear.clone(),
             constant: reduced.rows[r].place.constant,
@@ -64,7 +71,9 @@ impl Matrices {
             rows,
             v: [room(n * n), room(n * n)],
             schur: room(n * n),
-            whole: room(9 * n * n),
+            u: [room(n * n), room(n * n)],
+            spread: room(if is_line { 2 * n } else { 4 * n * n }),
+            is_line,
             factors: room(n),
         }
     }
@@ -114,82 +123,169 @@ impl Matrices {
         store(weakest)
     }
 
-    /// The matrix of an order, of V and S⁻¹ at hand.
+    /// U and P, of V and S⁻¹ at hand.
     #[inline(always)]
     pub(super) fn combine<W: EightLanes>(&mut self) {
-        let n = self.count;
-        let (size, [vx, vy]) = (3 * n, &self.v);
+        let (n, [vx, vy], [ux, uy]) = (self.count, &self.v, &mut self.u);
         for i in 0..n {
             for s in 0..n {
-                let (mut ux, mut uy) = (W::ZERO, W::ZERO);
+                let (mut x, mut y) = (W::ZERO, W::ZERO);
                 for j in 0..n {
                     let inverse = load::<W>(&self.schur[j * n + s]);
-                    ux = load::<W>(&vx[i * n + j]).mul_add(inverse, ux);
-                    uy = load::<W>(&vy[i * n + j]).mul_add(inverse, uy);
+                    x = load::<W>(&vx[i * n + j]).mul_add(inverse, x);
+                    y = load::<W>(&vy[i * n + j]).mul_add(inverse, y);
                 }
-                self.whole[(2 * n + s) * size + i] = store(ux);
-                self.whole[(2 * n + s) * size + n + i] = store(uy);
-                self.whole[i * size + 2 * n + s] = store(W::ZERO.sub(ux));
-                self.whole[(n + i) * size + 2 * n + s] = store(W::ZERO.sub(uy));
-                self.whole[(2 * n + i) * size + 2 * n + s] = self.schur[i * n + s];
+                (ux[i * n + s], uy[i * n + s]) = (store(x), store(y));
             }
         }
+        if self.is_line {
+            self.find_line::<W>();
+        } else {
+            self.find_plane::<W>();
+        }
+    }
+
+    /// P = W - U Vᵀ.
+    #[inline(always)]
+    fn find_plane<W: EightLanes>(&mut self) {
+        let (n, [vx, vy], [ux, uy], spread) = (self.count, &self.v, &self.u, &mut self.spread);
         for i in 0..n {
             for j in i..n {
                 let [xx, xy, yx, yy] = self.blocks[i * n + j];
                 let (mut pxx, mut pxy) = (W::splat(xx), W::splat(xy));
                 let (mut pyx, mut pyy) = (W::splat(yx), W::splat(yy));
                 for s in 0..n {
-                    let ux = load::<W>(&self.whole[i * size + 2 * n + s]);
-                    let uy = load::<W>(&self.whole[(n + i) * size + 2 * n + s]);
+                    let (ux, uy) = (load::<W>(&ux[i * n + s]), load::<W>(&uy[i * n + s]));
                     let (x, y) = (load::<W>(&vx[j * n + s]), load::<W>(&vy[j * n + s]));
-                    (pxx, pxy) = (ux.mul_add(x, pxx), ux.mul_add(y, pxy));
-                    (pyx, pyy) = (uy.mul_add(x, pyx), uy.mul_add(y, pyy));
+                    (pxx, pxy) = (ux.neg_mul_add(x, pxx), ux.neg_mul_add(y, pxy));
+                    (pyx, pyy) = (uy.neg_mul_add(x, pyx), uy.neg_mul_add(y, pyy));
                 }
                 let (pxx, pxy, pyx, pyy) = (store(pxx), store(pxy), store(pyx), store(pyy));
-                let whole = &mut self.whole;
-                (whole[i * size + j], whole[i * size + n + j]) = (pxx, pxy);
-                (whole[(n + i) * size + j], whole[(n + i) * size + n + j]) = (pyx, pyy);
-                (whole[j * size + i], whole[j * size + n + i]) = (pxx, pyx);
-                (whole[(n + j) * size + i], whole[(n + j) * size + n + i]) = (pxy, pyy);
+                let (row, other) = (2 * n * i, 2 * n * j);
+                (spread[row + j], spread[row + n + j]) = (pxx, pxy);
+                (spread[other + i], spread[other + n + i]) = (pxx, pyx);
+                let (row, other) = (2 * n * (n + i), 2 * n * (n + j));
+                (spread[row + j], spread[row + n + j]) = (pyx, pyy);
+                (spread[other + i], spread[other + n + i]) = (pxy, pyy);
             }
         }
     }
 
-    /// The product of the matrix of an order: three rows at a time in two sums each, none of which waits for another.
+    /// The vector whose square P is: its column of the largest entry on the diagonal, over that entry's root.
+    #[inline(always)]
+    fn find_line<W: EightLanes>(&mut self) {
+        let (n, [vx, vy], [ux, uy]) = (self.count, &self.v, &self.u);
+        for i in 0..n {
+            let [xx, _, _, yy] = self.blocks[i * n + i];
+            let (mut x, mut y) = (W::splat(xx), W::splat(yy));
+            for s in 0..n {
+                x = load::<W>(&ux[i * n + s]).neg_mul_add(load(&vx[i * n + s]), x);
+                y = load::<W>(&uy[i * n + s]).neg_mul_add(load(&vy[i * n + s]), y);
+            }
+            (self.spread[i], self.spread[n + i]) = (store(x), store(y));
+        }
+        let mut largest = [0; LANES];
+        let mut most = [0.0; LANES];
+        for (k, diagonal) in self.spread.iter().enumerate() {
+            for lane in 0..LANES {
+                if diagonal.0[lane] > most[lane] {
+                    (largest[lane], most[lane]) = (k, diagonal.0[lane]);
+                }
+            }
+        }
+        for s in 0..n {
+            for lane in 0..LANES {
+                let (axis, k) = (largest[lane] / n, largest[lane] % n);
+                self.factors[s].0[lane] = self.v[axis][k * n + s].0[lane];
+            }
+        }
+        let root = root(W::of(&most));
+        for i in 0..n {
+            let (mut x, mut y) = (ZERO, ZERO);
+            for lane in 0..LANES {
+                let (axis, k) = (largest[lane] / n, largest[lane] % n);
+                let block = self.blocks[i * n + k];
+                (x.0[lane], y.0[lane]) = (block[axis], block[2 + axis]);
+            }
+            let (mut x, mut y) = (load::<W>(&x), load::<W>(&y));
+            for s in 0..n {
+                let factor = load::<W>(&self.factors[s]);
+                x = load::<W>(&self.u[0][i * n + s]).neg_mul_add(factor, x);
+                y = load::<W>(&self.u[1][i * n + s]).neg_mul_add(factor, y);
+            }
+            (self.spread[i], self.spread[n + i]) = (store(x.div(root)), store(y.div(root)));
+        }
+    }
+
+    /// What comes of f and q: P f - U q, x and then y, and Uᵀ f + S⁻¹ q.
     #[inline(always)]
     pub(super) fn times<W: EightLanes>(&self, right: &[Octet], found: &mut [Octet]) {
-        let size = 3 * self.count;
-        let (right, found) = (&right[..size], &mut found[..size]);
-        let mut row = 0;
-        while row + 3 <= size {
-            let at = row * size;
-            let a = &self.whole[at..at + size];
-            let b = &self.whole[at + size..at + 2 * size];
-            let c = &self.whole[at + 2 * size..at + 3 * size];
-            let (mut p, mut q, mut r) = (W::ZERO, W::ZERO, W::ZERO);
-            let (mut s, mut t, mut u) = (W::ZERO, W::ZERO, W::ZERO);
-            let mut j = 0;
-            while j + 1 < size {
-                let (x, y) = (load::<W>(&right[j]), load::<W>(&right[j + 1]));
-                p = x.mul_add(load(&a[j]), p);
-                q = x.mul_add(load(&b[j]), q);
-                r = x.mul_add(load(&c[j]), r);
-                s = y.mul_add(load(&a[j + 1]), s);
-                t = y.mul_add(load(&b[j + 1]), t);
-                u = y.mul_add(load(&c[j + 1]), u);
-                j += 2;
+        let n = self.count;
+        self.multipliers::<W>(right, &mut found[2 * n..]);
+        let q = &right[2 * n..3 * n];
+        let mut along = W::ZERO;
+        if self.is_line {
+            let (mut x, mut y) = (W::ZERO, W::ZERO);
+            for i in 0..n {
+                x = load::<W>(&self.spread[i]).mul_add(load(&right[i]), x);
+                y = load::<W>(&self.spread[n + i]).mul_add(load(&right[n + i]), y);
             }
-            if j < size {
-                let x = load::<W>(&right[j]);
-                p = x.mul_add(load(&a[j]), p);
-                q = x.mul_add(load(&b[j]), q);
-                r = x.mul_add(load(&c[j]), r);
+            along = x.add(y);
+        }
+        for i in 0..n {
+            let (ux, uy) = (&self.u[0][i * n..(i + 1) * n], &self.u[1][i * n..(i + 1) * n]);
+            let (mut x, mut y) = (W::ZERO, W::ZERO);
+            if self.is_line {
+                x = load::<W>(&self.spread[i]).mul(along);
+                y = load::<W>(&self.spread[n + i]).mul(along);
+            } else {
+                let (row, other) = (2 * n * i, 2 * n * (n + i));
+                for j in 0..2 * n {
+                    let f = load::<W>(&right[j]);
+                    x = f.mul_add(load(&self.spread[row + j]), x);
+                    y = f.mul_add(load(&self.spread[other + j]), y);
+                }
             }
-            found[row] = store(p.add(s));
-            found[row + 1] = store(q.add(t));
-            found[row + 2] = store(r.add(u));
-            row += 3;
+            for s in 0..n {
+                let q = load::<W>(&q[s]);
+                x = q.neg_mul_add(load(&ux[s]), x);
+                y = q.neg_mul_add(load(&uy[s]), y);
+            }
+            (found[i], found[n + i]) = (store(x), store(y));
+        }
+    }
+
+    /// Uᵀ f + S⁻¹ q: four of them at a time, in sums none of which waits for another.
+    #[inline(always)]
+    fn multipliers<W: EightLanes>(&self, right: &[Octet], found: &mut [Octet]) {
+        let n = self.count;
+        let (fx, fy, q) = (&right[..n], &right[n..2 * n], &right[2 * n..3 * n]);
+        let mut s = 0;
+        while s + 4 <= n {
+            let (mut a, mut b, mut c, mut d) = (W::ZERO, W::ZERO, W::ZERO, W::ZERO);
+            for i in 0..n {
+                let at = i * n + s;
+                let (x, y, schur) = (&self.u[0][at..at + 4], &self.u[1][at..at + 4], &self.schur[at..at + 4]);
+                let (fx, fy, q) = (load::<W>(&fx[i]), load::<W>(&fy[i]), load::<W>(&q[i]));
+                a = q.mul_add(load(&schur[0]), fy.mul_add(load(&y[0]), fx.mul_add(load(&x[0]), a)));
+                b = q.mul_add(load(&schur[1]), fy.mul_add(load(&y[1]), fx.mul_add(load(&x[1]), b)));
+                c = q.mul_add(load(&schur[2]), fy.mul_add(load(&y[2]), fx.mul_add(load(&x[2]), c)));
+                d = q.mul_add(load(&schur[3]), fy.mul_add(load(&y[3]), fx.mul_add(load(&x[3]), d)));
+            }
+            (found[s], found[s + 1]) = (store(a), store(b));
+            (found[s + 2], found[s + 3]) = (store(c), store(d));
+            s += 4;
+        }
+        while s < n {
+            let (mut a, mut b, mut c) = (W::ZERO, W::ZERO, W::ZERO);
+            for i in 0..n {
+                let at = i * n + s;
+                a = load::<W>(&fx[i]).mul_add(load(&self.u[0][at]), a);
+                b = load::<W>(&fy[i]).mul_add(load(&self.u[1][at]), b);
+                c = load::<W>(&q[i]).mul_add(load(&self.schur[at]), c);
+            }
+            found[s] = store(a.add(b).add(c));
+            s += 1;
         }
     }
 
@@ -220,7 +316,8 @@ impl Matrices {
             self.onto_lengths::<W>(z, mask);
         }
         for lane in 0..LANES {
-            is_landed[lane] = is_going[lane] && is_regular(&weakest, lane) && left.0[lane] <= CLOSE;
+            let is_told = weakest.0[lane] * NEARER <= 1.0 && left.0[lane] <= CLOSE;
+            is_landed[lane] = is_going[lane] && is_told;
         }
         self.onto_rows::<W>(v, false);
         self.drifts::<W>(z, v);

@@ -7,10 +7,9 @@
 use super::{MOST, ROOM, ZERO};
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::Octet;
-use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::force;
-use crate::stepping::taylor::batch::{load, store};
+use crate::stepping::taylor::batch::{load, root, store};
 
 /// A spring and its series: D, q with its powers' numbers, s.
 #[derive(Clone, Debug)]
@@ -77,8 +76,7 @@ impl Spring {
         self.square[m] = store(square);
         self.weighted[m] = store(square.mul(W::splat(m as f64)));
         let inverse = if m == 0 {
-            let [first, second] = square.halves();
-            W::ONE.div(W::join([first.sqrt(), second.sqrt()]))
+            W::ONE.div(root(square))
         } else {
             let plain = product::<W>(&self.square, &self.inverse, 1, m);
             let weighted = product::<W>(&self.weighted, &self.inverse, 1, m);

@@ -1,7 +1,7 @@
 //! The angle between two vectors in every lane.
 
-use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::EightLanes;
+use crate::stepping::taylor::batch::root;
 
 /// The largest turn of a step that is told from one by a whole turn more or less \[rad\].
 pub const MOST: f64 = 5.0;
@@ -26,13 +26,6 @@ pub fn between<W: EightLanes>(from: [W; 2], to: [W; 2]) -> W {
         sum = sum.mul_add(square, W::splat(if k.is_multiple_of(2) { term } else { -term }));
     }
     sum.mul(eighth).mul(W::splat(8.0))
-}
-
-/// Square roots.
-#[inline(always)]
-fn root<W: EightLanes>(x: W) -> W {
-    let [first, second] = x.halves();
-    W::join([first.sqrt(), second.sqrt()])
 }
 
 #[cfg(test)]
