@@ -70,6 +70,7 @@ impl Alone {
     ) -> Result<bool, StepError> {
         let Self { problem, method, kernel } = self;
         let n = member.mechanism.coordinates();
+        member.has_left = false;
         method.get_mut().begin(&mut **problem.get_mut(), &mut member.state, until)?;
         loop {
             let from = member.state.clone();

@@ -149,7 +149,10 @@ impl Sweep {
             && !ready.plan.extended
             && match ready.plan.stabilization {
                 Stabilization::None => !ready.mechanism.has_multipliers(),
-                Stabilization::Projection => ready.mechanism.has_multipliers(),
+                // The rows are kept, so that limits on them are not looked at.
+                Stabilization::Projection => {
+                    ready.mechanism.has_multipliers() && self.limits.constraint.is_none()
+                }
                 Stabilization::Elimination => true,
                 Stabilization::Baumgarte => false,
             }

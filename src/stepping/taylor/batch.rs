@@ -98,9 +98,9 @@ impl Batch {
         Self { is_portable: kernel != Kernel::Fastest, ..self }
     }
 
-    /// The method for one trajectory alone, at the same tolerance and with the same order.
+    /// The method for one trajectory alone, at the same tolerance.
     pub(crate) fn alone(&self) -> Taylor<f64> {
-        Taylor::with_order(self.tolerance, self.order)
+        Taylor::new(Tolerance { relative: self.tolerance, absolute: self.tolerance })
     }
 
     /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
@@ -126,7 +126,8 @@ impl Batch {
     /// may end that one.
     ///
     /// Mechanisms of neither [these](Batch::takes) nor [those](Batch::takes_alike) kinds are stopped as
-    /// unsuited; those with loops may [leave](BatchMember::has_left) on the way.  The result of each does not depend on the others.
+    /// unsuited; those with loops may [leave](BatchMember::has_left) on the way.  The result of each does not
+    /// depend on the others.
     pub fn integrate(
         &self,
         members: &mut [BatchMember],

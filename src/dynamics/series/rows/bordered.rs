@@ -1,8 +1,9 @@
 //! Rows that border the inverse of M_0, and the way back onto them, for numbers with a lane for each motion.
 //!
 //! ```text
-//! K = S⁻¹,  B = M_0⁻¹ Jᵀ K,  A = M_0⁻¹ - B J M_0⁻¹:    a_m = A load_m - B c_m,   lambda_m = Bᵀ load_m + K c_m        c: what is known of the rows
-//! positions:  S x = C,          q -= M_0⁻¹ Jᵀ x                       rates:  S x = J w + C_t,   w -= M_0⁻¹ Jᵀ x
+//! K = S⁻¹,  B = M_0⁻¹ Jᵀ K,  A = M_0⁻¹ - B J M_0⁻¹;   c: what is known of the rows
+//! a_m = A load_m - B c_m,   lambda_m = Bᵀ load_m + K c_m
+//! positions:  S x = C,  q -= M_0⁻¹ Jᵀ x;   rates:  S x = J w + C_t,  w -= M_0⁻¹ Jᵀ x
 //! ```
 //!
 //! One sum stands between an order and the next.  No row is ever left out: where that would be called for,

@@ -1,12 +1,12 @@
 //! Bodies with closed loops, in natural coordinates, all lanes of equal mechanisms.
 //!
 //! The recurrence and the way back of [`looped`](super::super::looped), with the lanes over trajectories; the
-//! matrices of the step's start stand between an order and the next, of which P is the square of a vector where
-//! there is one degree of freedom:
+//! matrices of the step's start stand between an order and the next, of which P is the square of a vector
+//! where there is one degree of freedom:
 //!
 //! ```text
 //! f_m = F_m - Σ_{j<m} mu_j z_{m-j},    q_m = (m+1)(m+2)/2 Σ_{j=1..m+1} z_j·z_{m+2-j}
-//! ((m+1)(m+2) z_{m+2}, mu_m) = [[P, -U], [Uᵀ, S⁻¹]] (f_m, q_m),          V_j = W_·j z_j,  U = V S⁻¹,  P = W - U Vᵀ
+//! (m+1)(m+2) z_{m+2} = P f_m - U q_m,   mu_m = Uᵀ f_m + S⁻¹ q_m,   V_j = W_·j z_j,  U = V S⁻¹,  P = W - U Vᵀ
 //! ```
 //!
 //! A trajectory leaves the lanes where a step begins or ends near a singular position, as it leaves that
@@ -342,7 +342,8 @@ impl LoopTeam {
         }
     }
 
-    /// Angles, rates and work at the step's end; tells the longest turn, by the rates at both ends too \[rad\].
+    /// Angles, rates and work at the step's end; tells the longest turn, by the rates at both ends too
+    /// \[rad\].
     #[inline(always)]
     fn advance<W: EightLanes>(&mut self, h: W) -> Octet {
         let (n, mut work, mut longest) = (self.count, W::ZERO, W::ZERO);

@@ -1,10 +1,10 @@
-//! Hinge trees with springs, torsion springs, applied forces and motors, and mechanisms with closed loops and
-//! sliders, all lanes of equal mechanisms: the series of [`dynamics`](crate::dynamics::series) on numbers with
-//! a lane for each trajectory.
+//! Hinge trees with springs, torsion springs, applied forces and motors, and mechanisms with closed loops
+//! and sliders, all lanes of equal mechanisms: the series of [`dynamics`](crate::dynamics::series) on numbers
+//! with a lane for each trajectory.
 //!
 //! Loops and sliders are kept by multipliers, and by a projection after every step.  A trajectory leaves the
 //! lanes where a step begins or ends near a singular position, or does not end on its rows: from where that
-//! step began it is left to the code that knows what to do there.
+//! step began it has to go on alone.
 
 use super::super::terms::over;
 use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
@@ -115,8 +115,8 @@ impl TreeTeam {
         if angle.abs() <= PI { angle } else { angle - TAU * (angle / TAU).round() }
     }
 
-    /// Brings the ends of the steps back onto the rows; lanes that take no step, or do not get there, stay where
-    /// it began.
+    /// Brings the ends of the steps back onto the rows; lanes that take no step, or do not get there, stay
+    /// where it began.
     fn land(&mut self) {
         if self.kept.is_none() {
             return;

@@ -289,8 +289,8 @@ impl Matrices {
         }
     }
 
-    /// Brings unit vectors and their rates, x and then y, onto all rows; tells which lanes are there, of those
-    /// that go.
+    /// Brings unit vectors and their rates, x and then y, onto all rows; tells which lanes are there, of
+    /// those that go.
     #[inline(always)]
     pub(super) fn land<W: EightLanes>(
         &mut self,
