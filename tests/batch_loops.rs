@@ -78,7 +78,8 @@ fn loops_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
                 let fastest = exact.y[n..2 * n].iter().fold(1.0, |most: f64, rate| most.max(rate.abs()));
                 // Angles, rates and work.
                 for k in 0..=2 * n {
-                    let scale = [1.0, fastest, mechanism.energy_scale][(k / n).min(2)];
+                    let energy = mechanism.energy_scale.max(exact.y[2 * n].abs());
+                    let scale = [1.0, fastest, energy][(k / n).min(2)];
                     let error = (found.unknown(k) - exact.unknown(k)).hi.abs() / scale;
                     assert!(error < 1e-12, "{} {i}, order {order}, unknown {k}: {error:e}", scene.0);
                 }

@@ -8,39 +8,23 @@ use crate::dynamics::schur::NEAR;
 use crate::dynamics::{State, Time};
 use crate::run::build::{Problem, tangent_form};
 use crate::stabilization::Projected;
-use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage, Watch};
 use crate::stepping::{Integrator, StepError, Taylor};
 use std::cell::RefCell;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// Sees a step of a trajectory, and may end it.
-type Watch<'a> = dyn FnMut(usize, &Passage) -> Going + 'a;
-
 /// Integrates all trajectories to `until`, as [`Batch::integrate`] does.
 pub(super) fn integrate(batch: &Batch, members: &mut [BatchMember], until: Time, watch: &mut Watch) {
-    batch.integrate(members, until, watch);
-    let mut alone: Vec<(usize, Option<Box<Alone>>)> = Vec::new();
-    alone.extend((0..members.len()).filter(|&k| members[k].has_left).map(|k| (k, None)));
-    while !alone.is_empty() {
-        alone.retain_mut(|(number, code)| {
-            let member = &mut members[*number];
-            let code = code.get_or_insert_with(|| Box::new(Alone::new(batch, member)));
-            match code.go_past(member, until, &mut |passage| watch(*number, passage)) {
-                Ok(goes_on) => goes_on && member.state.time < until,
-                Err(stop) => {
-                    member.stopped = Some(stop);
-                    false
-                }
-            }
-        });
-        let mut back: Vec<BatchMember> = alone.iter().map(|(number, _)| members[*number].clone()).collect();
-        batch.integrate(&mut back, until, &mut |k, passage| watch(alone[k].0, passage));
-        for (member, (number, _)) in back.into_iter().zip(&alone) {
-            members[*number] = member;
-        }
-        alone.retain(|(number, _)| members[*number].has_left);
-    }
+    let mut all: Vec<Option<Box<Alone>>> = Vec::new();
+    all.resize_with(members.len(), || None);
+    batch.integrate_with(members, until, watch, &mut |number, member, watch| {
+        let alone = all[number].get_or_insert_with(|| Box::new(Alone::new(batch, member)));
+        alone.go_past(member, until, &mut |passage| watch(number, passage)).unwrap_or_else(|stop| {
+            member.stopped = Some(stop);
+            Going::Enough
+        })
+    });
 }
 
 /// What takes one trajectory on.
@@ -60,14 +44,14 @@ impl Alone {
         }
     }
 
-    /// Takes steps until the constraints are independent of one another again, at least one; false where
-    /// enough was seen.
+    /// Takes steps until the constraints are independent of one another again, at least one; tells whether
+    /// there is more to be seen.
     fn go_past(
         &mut self,
         member: &mut BatchMember,
         until: Time,
         watch: &mut dyn FnMut(&Passage) -> Going,
-    ) -> Result<bool, StepError> {
+    ) -> Result<Going, StepError> {
         let Self { problem, method, kernel } = self;
         let n = member.mechanism.coordinates();
         member.has_left = false;
@@ -88,12 +72,12 @@ impl Alone {
                 |body: usize| [start(body), angle_and_rate(state, &from, n, body)].map(<[f64; 2]>::from);
             let passage = Passage::new(from.time, (state.time - from.time).hi, &ends, &series);
             if watch(&passage) == Going::Enough {
-                return Ok(false);
+                return Ok(Going::Enough);
             }
             let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
             let share = kernel.independence_at(mechanism, state.time, phi, omega);
             if state.time >= until || share >= NEAR {
-                return Ok(true);
+                return Ok(Going::On);
             }
         }
     }

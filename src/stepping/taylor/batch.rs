@@ -5,6 +5,7 @@
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
 //! trajectory as soon as its last one has ended.
 
+mod crew;
 mod driven;
 mod free;
 mod laws;
@@ -16,6 +17,7 @@ mod swinging;
 mod trees;
 mod vectors;
 
+use self::crew::{Crew, LaneSlot};
 use self::driven::DrivenTeam;
 use self::free::FreeTeam;
 use self::looped::LoopTeam;
@@ -23,7 +25,6 @@ pub use self::passage::Passage;
 use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
 use self::vectors::{added, load, moved, root, store, unit};
-use super::step_size::{self, StepSize};
 use super::{JUDGES, Kernel, Taylor, stop};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
@@ -61,6 +62,12 @@ impl<'a> BatchMember<'a> {
         Self { mechanism, state, statistics: Statistics::default(), stopped: None, has_left: false }
     }
 }
+
+/// Sees a step of the trajectory of a number.
+pub type Watch<'a> = dyn FnMut(usize, &Passage) -> Going + 'a;
+
+/// Takes on a trajectory that has left, and is shown as many steps as it takes.
+pub(crate) type Alone<'a> = dyn FnMut(usize, &mut BatchMember, &mut Watch) -> Going + 'a;
 
 /// Whether a trajectory goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -128,11 +135,17 @@ impl Batch {
     /// Mechanisms of neither [these](Batch::takes) nor [those](Batch::takes_alike) kinds are stopped as
     /// unsuited; those with loops may [leave](BatchMember::has_left) on the way.  The result of each does not
     /// depend on the others.
-    pub fn integrate(
+    pub fn integrate(&self, members: &mut [BatchMember], until: Time, watch: &mut Watch) {
+        self.integrate_with(members, until, watch, &mut |_, _, _| Going::Enough);
+    }
+
+    /// The same with what takes those on that leave: where it says so, they come back.
+    pub(crate) fn integrate_with(
         &self,
         members: &mut [BatchMember],
         until: Time,
-        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+        watch: &mut Watch,
+        alone: &mut Alone,
     ) {
         let mut is_done = vec![false; members.len()];
         members.iter_mut().for_each(|member| member.has_left = false);
@@ -144,7 +157,7 @@ impl Batch {
                         let fits = |one: &Mechanism| std::ptr::eq(one, like) || <$team>::fits(one, like);
                         let fits: Vec<bool> = members.iter().map(|member| fits(member.mechanism)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
-                        self.integrate_those::<$team>(like, &fits, members, until, watch);
+                        self.integrate_those::<$team>(like, &fits, members, until, (&mut *watch, &mut *alone));
                         continue;
                     }
                 )*};
@@ -166,11 +179,11 @@ impl Batch {
         fits: &[bool],
         members: &mut [BatchMember],
         until: Time,
-        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+        (watch, alone): (&mut Watch, &mut Alone),
     ) {
         let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
         let crew = Crew::new(T::new(like, self.order, vectors), self.order, until);
-        vectors.run(Integration::<T> { crew, fits, batch: self, members, until, watch });
+        vectors.run(Integration::<T> { crew, fits, batch: self, members, until, watch, alone });
     }
 }
 
@@ -232,7 +245,8 @@ struct Integration<'a, 'b, T> {
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
-    watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
+    watch: &'a mut Watch<'a>,
+    alone: &'a mut Alone<'a>,
 }
 
 impl<T: Team> WideCode for Integration<'_, '_, T> {
@@ -251,171 +265,9 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
             let taken = self.crew.choose_steps::<W>(order);
             self.crew.team.finish::<W>(order, &taken);
             self.crew.arrive(order, self.members, self.until, self.watch);
+            self.crew.bring_back(self.batch, self.members, self.until, (self.watch, self.alone));
         }
     }
-}
-
-/// What a lane is doing.
-#[derive(Clone, Debug)]
-struct LaneSlot {
-    /// Index of its trajectory.
-    member: Option<usize>,
-    step_size: StepSize,
-    time: Time,
-    /// The mechanism's unit of time \[s\].
-    unit: f64,
-    /// What is left to go, the last step wanted and the one taken \[s\].
-    left: f64,
-    wanted: f64,
-    taken: f64,
-}
-
-impl LaneSlot {
-    /// Why the step just expanded cannot be taken, where it cannot.
-    fn failure(&self, statistics: &Statistics) -> Result<(), StepError> {
-        let hint = "look for a position without inertia";
-        let stop = |cause, what: &str| {
-            stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint)
-        };
-        if self.wanted.is_nan() {
-            Err(stop(Cause::NotFinite, "the series is not finite"))
-        } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3 * self.unit) {
-            Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
-        } else {
-            statistics.check("taylor", self.time.hi, self.taken)
-        }
-    }
-}
-
-/// Lanes, and what they do.
-struct Crew<T> {
-    slots: [LaneSlot; LANES],
-    team: Box<T>,
-}
-
-impl<T: Team> Crew<T> {
-    /// Empty lanes.
-    fn new(team: T, order: usize, until: Time) -> Self {
-        let empty = || LaneSlot {
-            member: None,
-            step_size: StepSize::new(1.0, order, 0.0),
-            time: until,
-            unit: 1.0,
-            left: 0.0,
-            wanted: 0.0,
-            taken: 0.0,
-        };
-        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(team) }
-    }
-
-    /// Puts trajectories that wait into the free lanes.
-    fn fill(
-        &mut self,
-        batch: &Batch,
-        fits: &[bool],
-        members: &[BatchMember],
-        waiting: &mut usize,
-        until: Time,
-    ) {
-        for lane in 0..LANES {
-            if self.slots[lane].member.is_none() {
-                let next = next(fits, members, waiting, until);
-                self.slots[lane].member = next;
-                match next {
-                    Some(index) => self.take_in(lane, batch, &members[index]),
-                    None => self.team.park(lane),
-                }
-            }
-            let slot = &mut self.slots[lane];
-            slot.left = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
-        }
-    }
-
-    /// Puts a trajectory into a lane.
-    fn take_in(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
-        let (longest, unit) = (self.team.take_in(lane, member, batch.order), member.mechanism.units.time);
-        let slot = &mut self.slots[lane];
-        slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
-        (slot.time, slot.unit) = (member.state.time, unit);
-    }
-
-    /// True where no lane has a trajectory.
-    fn is_idle(&self) -> bool {
-        self.slots.iter().all(|slot| slot.member.is_none())
-    }
-
-    /// The steps \[s\] that the series just expanded allow.
-    #[inline(always)]
-    fn choose_steps<W: EightLanes>(&mut self, order: usize) -> Octet {
-        let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
-        for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
-            (slot.wanted, slot.taken) = (f64::NAN, 0.0);
-            if self.team.is_finite(lane, order) && !self.team.is_leaving(lane) {
-                let mut own = [0.0; JUDGES];
-                for back in 0..JUDGES {
-                    own[back] = sizes[back].0[lane];
-                }
-                slot.wanted = slot.step_size.step_of(order, &own);
-                slot.taken = step_size::taken(slot.wanted, slot.left);
-            }
-            *taken = slot.taken;
-        }
-        taken
-    }
-
-    /// Records the steps just taken, and frees the lanes of trajectories that have ended.
-    fn arrive(
-        &mut self,
-        order: usize,
-        members: &mut [BatchMember],
-        until: Time,
-        watch: &mut dyn FnMut(usize, &Passage) -> Going,
-    ) {
-        for lane in 0..LANES {
-            let slot = &mut self.slots[lane];
-            let Some(index) = slot.member else { continue };
-            let member = &mut members[index];
-            if self.team.is_leaving(lane) {
-                (member.has_left, member.state.time) = (true, slot.time);
-                self.team.leave(lane, &mut member.state);
-                slot.member = None;
-                continue;
-            }
-            let (from, step) = (slot.time, slot.taken);
-            match slot.failure(&member.statistics) {
-                Err(stop) => member.stopped = Some(stop),
-                Ok(()) => {
-                    slot.time = if step == slot.left { until } else { from + step };
-                    member.statistics.steps += 1;
-                    member.statistics.evaluations += 1;
-                }
-            }
-            let time = slot.time;
-            let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
-            let ends = |body: usize| self.team.ends(lane, body);
-            let passage = Passage::new(from, step, &ends, &series);
-            let is_over =
-                member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until;
-            self.team.wrap(lane, &mut member.state.turns);
-            if is_over {
-                self.team.leave(lane, &mut member.state);
-                member.state.time = time;
-                self.slots[lane].member = None;
-            }
-        }
-    }
-}
-
-/// The next trajectory of this kind that has a way to go.
-fn next(fits: &[bool], members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
-    while *waiting < members.len() {
-        let (index, member) = (*waiting, &members[*waiting]);
-        *waiting += 1;
-        if fits[index] && member.state.time < until {
-            return Some(index);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

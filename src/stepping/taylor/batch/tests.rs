@@ -43,7 +43,8 @@ fn ends(vectors: Vectors) -> Vec<State> {
     let team = FreeTeam::<2, false>::new(&mechanism, batch.order, vectors);
     let crew = Crew::new(team, batch.order, until);
     let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
-    vectors.run(Integration { crew, fits, batch, members: members_here, until, watch: &mut watch });
+    let alone: &mut Alone = &mut |_, _, _| Going::Enough;
+    vectors.run(Integration { crew, fits, batch, members: members_here, until, watch: &mut watch, alone });
     members.into_iter().map(|member| member.state).collect()
 }
 
