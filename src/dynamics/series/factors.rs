@@ -228,6 +228,9 @@ impl<T: SeriesNumber> VectorFactor<T> {
     }
 }
 
+/// A row of H without its diagonal: columns and entries.
+pub(super) type Coupled<C> = Vec<(usize, Complex<C>)>;
+
 /// The series of a mechanism's bodies as factors: none of numbers that are multiplied where they stand.
 #[derive(Clone, Debug)]
 pub struct Factors<T: SeriesNumber> {
@@ -244,7 +247,7 @@ pub struct Factors<T: SeriesNumber> {
     /// derivatives; empty for numbers whose couplings are looked up in the tree.
     pub(super) coupling: Vec<Vec<(usize, T, bool)>>,
     /// H beside the diagonal, row by row, of numbers that sum products with it so: column and entry.
-    pub(super) coupled: Vec<Vec<(usize, Complex<T::Constant>)>>,
+    pub(super) coupled: Vec<Coupled<T::Constant>>,
 }
 
 impl<T: SeriesNumber> Factors<T> {

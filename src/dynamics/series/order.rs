@@ -1,7 +1,7 @@
 //! One order of the recurrence: the factored matrices, the right sides, and the solution with what it completes.
 
 use super::action;
-use super::factors::Factors;
+use super::factors::{Coupled, Factors};
 use super::polynomial::{UNROLLED, convolve, width};
 use super::{At, Series, SeriesNumber, Terms};
 use crate::arithmetic::Complex;
@@ -399,7 +399,7 @@ fn mass_terms<T: SeriesNumber, const N: usize>(
 /// The same row by row, whose sums stay in registers.
 #[inline(always)]
 fn mass_rows<T: SeriesNumber>(
-    coupled: &[Vec<(usize, Complex<T::Constant>)>],
+    coupled: &[Coupled<T::Constant>],
     off_axis: bool,
     x: &[Complex<T>],
     rest: &mut [Complex<T>],
