@@ -130,6 +130,24 @@ fn every_step_ends_on_the_constraints() {
     }
 }
 
+/// At a loose tolerance steps end far from the constraints, some farther than others.
+#[test]
+fn neighbours_do_not_matter_however_far_a_step_ends_from_the_constraints() {
+    for scene in SCENES {
+        let (all, until) = (starts(scene), Time::from(scene.4));
+        let integrated = |batch: &Batch, few: &[(Arc<Mechanism>, State)]| -> Vec<State> {
+            let mut members = members(few);
+            batch.integrate(&mut members, until, &mut |_, _| Going::On);
+            members.into_iter().map(|member| member.state).collect()
+        };
+        let together = integrated(&at(1e-3), &all);
+        assert_eq!(integrated(&at(1e-3).with_kernel(Kernel::Portable), &all), together);
+        for i in 0..all.len() {
+            assert_eq!(integrated(&at(1e-3), &all[i..=i])[0], together[i], "{} {i}", scene.0);
+        }
+    }
+}
+
 /// What trigonometry and mechanics say of the kite where its crank has an angle and a rate: the angles of
 /// coupler and rocker, their rates, and the energy \[J\].
 fn kite([crank, rate]: [f64; 2]) -> ([f64; 2], [f64; 2], f64) {
