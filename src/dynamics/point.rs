@@ -115,6 +115,17 @@ impl<C: Real> Point<C> {
         }
     }
 
+    /// Takes the force \[N·m, N\] on each element, of a force \[N\] that acts here, off what is in `rest`.
+    #[inline(always)]
+    pub fn take_off<T: Over<C>>(&self, force: Complex<T>, rest: &mut [Complex<T>]) {
+        for &(k, gamma) in &self.terms {
+            rest[k] -= force.turn(gamma.conj());
+        }
+        for &(x, share) in &self.shifts {
+            rest[x] -= force.times(T::of(share));
+        }
+    }
+
     /// P without its constant part, of one power of a series of the elements.
     #[inline(always)]
     pub fn turned<T: Over<C>>(&self, z: &[Complex<T>]) -> Complex<T> {

@@ -119,7 +119,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
                     Complex::of(*force).times(self.factor[m])
                 };
                 self.velocity[m] = point.turned(&z[(m + 1) * n..(m + 2) * n]).times(T::of((m + 1) as f64));
-                point.spread(self.force[m], |k, force| rest[k] -= force);
+                point.take_off(self.force[m], rest);
             }
             Kind::Torque { torque, base } => {
                 let torque = self.factor[m].by(*torque);

@@ -86,6 +86,8 @@ pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constan
     const HAS_INVERSE: bool = Self::HAS_COUPLINGS;
     /// True where products with couplings are summed row by row.
     const HAS_ROWS: bool = false;
+    /// True where constraint equations border that inverse, and none is ever left out.
+    const HAS_BORDER: bool = false;
 
     /// Power zero, and the laws' series.
     fn begin(series: &mut Series<Self>, t: Self::Time, u: &[Self], u_rest: &[Self], u_rate: &[Self]);

@@ -228,6 +228,9 @@ impl<T: SeriesNumber> VectorFactor<T> {
     }
 }
 
+/// A row of H without its diagonal: columns and entries.
+pub(super) type Coupled<C> = Vec<(usize, Complex<C>)>;
+
 /// The series of a mechanism's bodies as factors: none of numbers that are multiplied where they stand.
 #[derive(Clone, Debug)]
 pub struct Factors<T: SeriesNumber> {
@@ -243,6 +246,8 @@ pub struct Factors<T: SeriesNumber> {
     /// H beside the diagonal, row by row, where it is real: column, entry, and true where that has
     /// derivatives; empty for numbers whose couplings are looked up in the tree.
     pub(super) coupling: Vec<Vec<(usize, T, bool)>>,
+    /// H beside the diagonal, row by row, of numbers that sum products with it so: column and entry.
+    pub(super) coupled: Vec<Coupled<T::Constant>>,
 }
 
 impl<T: SeriesNumber> Factors<T> {
@@ -261,12 +266,21 @@ impl<T: SeriesNumber> Factors<T> {
             torque: numbers(driven),
             ahead: vec![Ahead::<T>::default(); bodies],
             coupling: Vec::new(),
+            coupled: Vec::new(),
         }
     }
 
     /// Takes the couplings of a tree.
     pub fn couple(&mut self, tree: &Tree<T::Constant>) {
         let n = tree.coordinates;
+        if T::HAS_ROWS {
+            let entry = |i: usize, j: usize| {
+                let h = tree.coupling[i.min(j) * n + i.max(j)];
+                let is_there = i != j && h != Complex::ZERO;
+                is_there.then(|| (j, if j > i { h } else { h.conj() }))
+            };
+            self.coupled = (0..n).map(|i| (0..n).filter_map(|j| entry(i, j)).collect()).collect();
+        }
         if !T::HAS_COUPLINGS || tree.off_axis || !tree.is_dense() {
             return;
         }

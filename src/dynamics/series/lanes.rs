@@ -4,8 +4,10 @@
 //! the processor and plain code give the same ones.
 
 mod factor;
+mod landing;
 mod number;
 
+use self::landing::{Land, Regularity};
 use self::number::InLanes;
 use super::{Series, Terms};
 use crate::arithmetic::eight::{LANES, Octet};
@@ -17,10 +19,31 @@ use std::fmt::Debug;
 /// The time of each lane.
 pub type Times = [Time; LANES];
 
+/// Motions at the end of a step, about to be brought back onto the constraint equations.
+#[derive(Debug)]
+pub struct Landing<'a> {
+    /// Angles and rates (2f), and what they leave out.
+    pub high: &'a mut [Octet],
+    /// See [`high`](Self::high).
+    pub low: &'a mut [Octet],
+    /// Which lanes there are motions in; the others stay where they are.
+    pub is_going: [bool; LANES],
+    /// What rates count as at least \[rad/s\].
+    pub unit: f64,
+}
+
 /// Powers of eight motions.
 pub trait SeriesInLanes: Debug {
     /// Expands the motions of a mechanism from their times, angles (leading parts and rests) and rates.
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]);
+
+    /// True where the constraint equations of a lane are independent at the start, and doubles are enough for
+    /// them: elsewhere its powers are of no use.
+    fn is_regular(&self, lane: usize) -> bool;
+
+    /// Brings motions back onto the constraint equations; tells which are on them then.  Of the powers,
+    /// [`rates`](Self::rates) and [`power`](Self::power) stay as they are.
+    fn land(&mut self, mechanism: &Mechanism, times: Times, landing: Landing) -> [bool; LANES];
 
     /// Powers 0 … P of the coordinates' rates \[rad/s^(m+1)\], coordinate by coordinate ((P+1) × f).
     fn rates(&self) -> &[Octet];
@@ -35,7 +58,8 @@ pub trait SeriesInLanes: Debug {
     fn angle_of(&self, body: usize, lane: usize) -> f64;
 }
 
-/// Room for the series of eight motions of a mechanism whose motors are eliminated.
+/// Room for the series of eight motions of a mechanism of bodies alone, in all angles where there are rows
+/// with multipliers, else in those that motors leave.
 pub fn in_lanes(mechanism: &Mechanism, order: usize, vectors: Vectors) -> Box<dyn SeriesInLanes> {
     vectors.run(Room { mechanism, order })
 }
@@ -51,13 +75,18 @@ impl WideCode for Room<'_> {
     #[inline(always)]
     fn run<W: EightLanes>(self) -> Box<dyn SeriesInLanes> {
         let terms = self.mechanism.terms();
-        let series = Series::<InLanes<W>>::of_terms(&terms, Coordinates::Independent, self.order);
+        let coordinates = match self.mechanism.has_multipliers() {
+            true => Coordinates::All,
+            false => Coordinates::Independent,
+        };
+        let series = Series::<InLanes<W>>::of_terms(&terms, coordinates, self.order);
         let f = series.coordinates();
         let room = || vec![InLanes::ZERO; f];
         Box::new(Whole {
             begin: [room(), room(), room()],
             rates: vec![Octet::default(); (self.order + 1) * f],
             power: vec![Octet::default(); self.order],
+            regularity: Regularity::new(series.rows.levers()),
             series,
         })
     }
@@ -70,6 +99,7 @@ struct Whole<W: EightLanes> {
     begin: [Vec<InLanes<W>>; 3],
     rates: Vec<Octet>,
     power: Vec<Octet>,
+    regularity: Regularity,
 }
 
 struct Expand<'a, 'b, W: EightLanes> {
@@ -84,7 +114,7 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
 
     #[inline(always)]
     fn perform(self) {
-        let Whole { series, begin: [u, rest, rate], rates, power } = self.whole;
+        let Whole { series, begin: [u, rest, rate], rates, power, regularity } = self.whole;
         let [from_u, from_rest, from_rate] = self.begin;
         for c in 0..u.len() {
             u[c] = InLanes(W::of(&from_u[c].0));
@@ -92,6 +122,9 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
             rate[c] = InLanes(W::of(&from_rate[c].0));
         }
         series.expand_terms(self.terms, self.times, u, rest, rate);
+        if !series.rows.is_empty() {
+            regularity.look(series, &self.terms.tree.diagonal);
+        }
         for i in 0..rates.len() {
             rates[i] = Octet(series.rate[i].0.array());
         }
@@ -104,6 +137,15 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
 impl<W: EightLanes> SeriesInLanes for Whole<W> {
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]) {
         W::perform(Expand { whole: self, terms: &mechanism.terms(), times, begin });
+    }
+
+    fn is_regular(&self, lane: usize) -> bool {
+        self.series.rows.is_empty() || self.regularity.holds(lane)
+    }
+
+    fn land(&mut self, mechanism: &Mechanism, times: Times, landing: Landing) -> [bool; LANES] {
+        let Self { series, begin, regularity, .. } = self;
+        W::perform(Land { series, regularity, begin, terms: &mechanism.terms(), times, landing })
     }
 
     fn rates(&self) -> &[Octet] {

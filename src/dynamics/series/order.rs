@@ -1,7 +1,8 @@
-//! One order of the recurrence: the factored matrices, the right sides, and the solution with what it completes.
+//! One order of the recurrence: the factored matrices, the right sides, and the solution with what it
+//! completes.
 
 use super::action;
-use super::factors::Factors;
+use super::factors::{Coupled, Factors};
 use super::polynomial::{UNROLLED, convolve, width};
 use super::{At, Series, SeriesNumber, Terms};
 use crate::arithmetic::Complex;
@@ -41,7 +42,7 @@ impl<T: SeriesNumber> Series<T> {
     /// The factors of M_0, and those of the rows.
     #[inline(always)]
     pub(super) fn factor<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
-        let (n, f) = (size::<N>(self.elements), self.partition.count());
+        let n = size::<N>(self.elements);
         if N == 0
             && let Some(bodywise) = &mut self.bodywise
         {
@@ -49,6 +50,19 @@ impl<T: SeriesNumber> Series<T> {
             self.rows.prepare_bodywise(&mut bodywise.evaluation, &self.z[..n]);
             return;
         }
+        self.factor_mass::<N>(terms);
+        if T::HAS_INVERSE {
+            self.invert();
+        }
+        if !self.rows.is_empty() {
+            T::perform(Part::Factors { series: self, terms });
+        }
+    }
+
+    /// The factors of M_0, where there are matrices.
+    #[inline(always)]
+    pub(super) fn factor_mass<const N: usize>(&mut self, terms: &Terms<T::Constant>) {
+        let (n, f) = (size::<N>(self.elements), self.partition.count());
         terms.tree.mass_matrix::<T, N>(&self.z[..n], &mut self.mass, &mut self.twist);
         if self.is_tied {
             self.partition.reduce(&self.mass, &mut self.reduced);
@@ -56,12 +70,6 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             self.reduced.copy_from_slice(&self.mass);
             tree::factor::<T, N>(n, &mut self.reduced, &mut self.pivot);
-        }
-        if T::HAS_INVERSE {
-            self.invert();
-        }
-        if !self.rows.is_empty() {
-            T::perform(Part::Factors { series: self, terms });
         }
     }
 
@@ -82,19 +90,17 @@ impl<T: SeriesNumber> Series<T> {
         let f = if self.is_tied { self.partition.count() } else { size::<N>(self.elements) };
         let (right, solution) = (&mut self.right[..f], &mut self.solution[..f]);
         right.copy_from_slice(solution);
-        for (c, row) in self.inverse[..f * f].chunks_exact(f.max(1)).enumerate() {
-            let mut sum = right[0] * row[0];
-            for d in 1..f {
-                sum = sum.with_product(right[d], row[d], true);
-            }
-            solution[c] = sum;
-        }
+        rows_times(&self.inverse[..f * f], right, solution);
     }
 
     /// The factors of the rows.
     #[inline(always)]
     fn factor_rows(&mut self, terms: &Terms<T::Constant>) {
         let (n, f) = (self.elements, self.partition.count());
+        if T::HAS_BORDER {
+            self.rows.factor(&self.z[..n], &self.reduced, &self.pivot);
+            return self.rows.border_inverse(&self.inverse[..f * f]);
+        }
         self.rows.prepare(&self.partition, &self.z[..n], &self.reduced, &self.pivot);
         let diagonal = &terms.structure.tree.diagonal;
         let diagonal = self.partition.independent.iter().map(|&body| diagonal[body]);
@@ -105,7 +111,11 @@ impl<T: SeriesNumber> Series<T> {
     #[inline(always)]
     fn solve_rows(&mut self, m: usize) {
         let n = self.elements;
-        self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+        if T::HAS_BORDER {
+            self.rows.solve_bordered(m, &self.z, &self.bend, &mut self.solution);
+        } else {
+            self.rows.solve(m, &self.z, &self.bend, &mut self.solution);
+        }
         self.rows.push(m, &self.z[..n], &mut self.rest[Self::row(m, n)]);
     }
 
@@ -152,7 +162,7 @@ impl<T: SeriesNumber> Series<T> {
             }
         }
         self.gravity_forces(terms, m);
-        mass_terms::<T, N>(terms.tree, &self.factors.coupling, &self.bend, &mut self.rest[Self::row(m, n)]);
+        mass_terms::<T, N>(terms.tree, &self.factors, &self.bend, &mut self.rest[Self::row(m, n)]);
         self.force(terms, m);
         let (before, rest) = self.rest.split_at_mut(Self::row(m, n).start);
         let rest = &mut rest[..n];
@@ -202,7 +212,7 @@ impl<T: SeriesNumber> Series<T> {
         }
         for (spring, series) in terms.springs.iter().zip(&mut self.springs) {
             let force = series.force(spring, m, &self.z, n, &self.factors.scale);
-            spring.span.spread(force, |k, force| rest[k] -= force);
+            spring.span.take_off(force, rest);
             if let Some(on_bodies) = &mut on_bodies {
                 let ends = spring.bodies.iter().zip([force, -force]);
                 ends.for_each(|(body, force)| body.iter().for_each(|&body| on_bodies[body] += force));
@@ -260,7 +270,10 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             self.solution[..n].copy_from_slice(&self.load[..n]);
         }
-        if T::HAS_INVERSE {
+        let is_bordered = T::HAS_BORDER && !self.rows.is_empty();
+        if is_bordered {
+            // The loads are half of a right side.
+        } else if T::HAS_INVERSE {
             self.by_inverse::<N>();
         } else if self.is_tied {
             tree::solve::<T, 0>(f, &self.reduced, &self.pivot, &mut self.solution);
@@ -308,10 +321,41 @@ impl<T: SeriesNumber> Series<T> {
         for i in 0..angles {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
-        mass_terms::<T, N>(terms.tree, &self.factors.coupling, &self.bend, rest);
+        mass_terms::<T, N>(terms.tree, &self.factors, &self.bend, rest);
         if T::HAS_CONSTANTS {
             self.factors.push(newest, omega, rest);
         }
+    }
+}
+
+/// The product of a square matrix and a vector of at least one number: four sums at a time, none of which
+/// waits for another.
+#[inline(always)]
+pub(super) fn rows_times<T: SeriesNumber>(matrix: &[T], x: &[T], product: &mut [T]) {
+    let n = x.len();
+    let product = &mut product[..n];
+    let mut c = 0;
+    while c + 4 <= n {
+        let (a, b) = (&matrix[c * n..(c + 1) * n], &matrix[(c + 1) * n..(c + 2) * n]);
+        let (d, e) = (&matrix[(c + 2) * n..(c + 3) * n], &matrix[(c + 3) * n..(c + 4) * n]);
+        let (mut p, mut q, mut r, mut s) = (x[0] * a[0], x[0] * b[0], x[0] * d[0], x[0] * e[0]);
+        for j in 1..n {
+            p = p.with_product(x[j], a[j], true);
+            q = q.with_product(x[j], b[j], true);
+            r = r.with_product(x[j], d[j], true);
+            s = s.with_product(x[j], e[j], true);
+        }
+        (product[c], product[c + 1], product[c + 2], product[c + 3]) = (p, q, r, s);
+        c += 4;
+    }
+    while c < n {
+        let row = &matrix[c * n..(c + 1) * n];
+        let mut sum = x[0] * row[0];
+        for j in 1..n {
+            sum = sum.with_product(x[j], row[j], true);
+        }
+        product[c] = sum;
+        c += 1;
     }
 }
 
@@ -319,11 +363,14 @@ impl<T: SeriesNumber> Series<T> {
 #[inline(always)]
 fn mass_terms<T: SeriesNumber, const N: usize>(
     tree: &Tree<T::Constant>,
-    rows: &[Vec<(usize, T, bool)>],
+    factors: &Factors<T>,
     x: &[Complex<T>],
     rest: &mut [Complex<T>],
 ) {
-    let n = size::<N>(tree.coordinates);
+    if T::HAS_ROWS {
+        return mass_rows(&factors.coupled, tree.off_axis, x, rest);
+    }
+    let (n, rows) = (size::<N>(tree.coordinates), &factors.coupling);
     if T::HAS_COUPLINGS && !rows.is_empty() {
         for (rest, row) in rest.iter_mut().zip(rows) {
             let mut sum = *rest;
@@ -336,9 +383,6 @@ fn mass_terms<T: SeriesNumber, const N: usize>(
         return;
     }
     let (coupling, x, rest) = (&tree.coupling[..n * n], &x[..n], &mut rest[..n]);
-    if T::HAS_ROWS {
-        return mass_rows(coupling, tree.off_axis, x, rest);
-    }
     for i in 0..n {
         for j in i + 1..n {
             let h = coupling[i * n + j];
@@ -356,27 +400,22 @@ fn mass_terms<T: SeriesNumber, const N: usize>(
 /// The same row by row, whose sums stay in registers.
 #[inline(always)]
 fn mass_rows<T: SeriesNumber>(
-    coupling: &[Complex<T::Constant>],
+    coupled: &[Coupled<T::Constant>],
     off_axis: bool,
     x: &[Complex<T>],
     rest: &mut [Complex<T>],
 ) {
-    let n = x.len();
-    for i in 0..n {
-        let mut sum = rest[i];
-        for j in 0..n {
-            let h = coupling[i.min(j) * n + i.max(j)];
-            if j == i {
-                continue;
-            }
-            sum.re = sum.re.with_constant(x[j].re, h.re);
-            sum.im = sum.im.with_constant(x[j].im, h.re);
+    for (rest, row) in rest.iter_mut().zip(coupled) {
+        let mut sum = *rest;
+        for &(j, h) in row {
+            let x = x[j];
+            sum.re = sum.re.with_constant(x.re, h.re);
+            sum.im = sum.im.with_constant(x.im, h.re);
             if off_axis {
-                let across = if j > i { h.im } else { -h.im };
-                sum.re = sum.re.with_constant(x[j].im, -across);
-                sum.im = sum.im.with_constant(x[j].re, across);
+                sum.re = sum.re.with_constant(x.im, -h.im);
+                sum.im = sum.im.with_constant(x.re, h.im);
             }
         }
-        rest[i] = sum;
+        *rest = sum;
     }
 }

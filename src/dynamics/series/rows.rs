@@ -11,6 +11,8 @@
 //! S is factored once a step; where the mechanism is evaluated body by body, in its envelope.  The products
 //! of earlier multipliers with later powers of z enter through the loads like those of any force.
 
+mod bordered;
+
 use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::{copy, zeros};
@@ -41,6 +43,15 @@ pub struct RowSeries<T: SeriesNumber> {
     metric: Metric,
     /// The row nearest to being left out at the start.
     weakest: Weakest,
+    /// The inverse of [`border_inverse`](Self::border_inverse) (r + f by as many) and a right side of it, for
+    /// numbers that have it.
+    border: Vec<T>,
+    right: Vec<T>,
+    found: Vec<T>,
+    /// Which rows do work, for these numbers.
+    works: Vec<bool>,
+    /// Where rows are to be put back to, see [`face`](Self::face).
+    goals: Vec<Complex<T>>,
     /// lambda: powers 0…P-1 (P × r).
     multiplier: Vec<T>,
 }
@@ -121,6 +132,7 @@ impl<T: SeriesNumber> RowSeries<T> {
         let base = |(k, b): (usize, f64)| partition.bodies[k].base.map(|base| (base, b));
         let levers: Vec<Levers> =
             in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
+        let works = in_force().map(ConstraintEquation::is_motor).collect();
         let metric = Metric::new(&levers, partition.count(), mechanism.assembly.redundant.len());
         let kinds: Vec<Kind<T>> = terms.constraints.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), partition.count());
@@ -135,6 +147,11 @@ impl<T: SeriesNumber> RowSeries<T> {
             scale,
             metric,
             weakest: Weakest::NONE,
+            border: zeros(if T::HAS_BORDER { (r + f) * (r + f) } else { 0 }),
+            right: zeros(if T::HAS_BORDER { r + f } else { 0 }),
+            found: zeros(if T::HAS_BORDER { r + f } else { 0 }),
+            goals: Vec::new(),
+            works,
             multiplier: zeros(order * r),
         }
     }
@@ -295,7 +312,13 @@ impl<T: SeriesNumber> RowSeries<T> {
     }
 
     /// Power m of the motors' power \[W/s^m\]; what stands still does no work.
+    #[inline(always)]
     pub fn power(&mut self, m: usize, omega: &[T]) -> T {
+        if T::HAS_BORDER { self.power_of_motors(m, omega) } else { self.power_of_rows(m, omega) }
+    }
+
+    #[inline(never)]
+    fn power_of_rows(&mut self, m: usize, omega: &[T]) -> T {
         let (r, mut power) = (self.kinds.len(), T::ZERO);
         for (i, kind) in self.kinds.iter_mut().enumerate() {
             if let Kind::Angle { body, base, speed, .. } = kind {

@@ -114,8 +114,10 @@ impl<T: SeriesNumber> SpringSeries<T> {
         n: usize,
         scale: &Scale<T>,
     ) -> Complex<T> {
-        let at = |m: usize| spring.span.turned(&z[m * n..(m + 1) * n]);
-        self.span[m] = if m == 0 { spring.span.position(z) } else { at(m) };
+        self.span[m] = match m {
+            0 => spring.span.position(z),
+            _ => spring.span.turned(&z[m * n..(m + 1) * n]),
+        };
         let mut force = -self.span[m].times(T::constant(spring.stiffness));
         if !spring.needs_length() {
             return force;
@@ -148,7 +150,7 @@ impl<T: SeriesNumber> SpringSeries<T> {
                 -known.iter().rev().zip(&square[1..]).fold(T::ZERO, |sum, (&i, &q)| sum + q * i) / square[0]
             };
             // D' at power m is (m+1) D_{m+1}.
-            let ahead = at(m + 1);
+            let ahead = spring.span.turned(&z[(m + 1) * n..(m + 2) * n]);
             let mut closing = span[0].dot(ahead).scale((m + 1) as f64);
             for l in 1..=m {
                 closing += span[l].dot(span[m - l + 1]).scale((m - l + 1) as f64);
@@ -204,7 +206,8 @@ impl<T: SeriesNumber> SpringSeries<T> {
             let ahead = spring.span.turned(&z[(m + 1) * n..(m + 2) * n]);
             let mut closing = self.span[0].dot(ahead).scale((m + 1) as f64);
             if m > 0 {
-                // Σ_{l=1..m} (m-l+1) D_l·D_{m-l+1} has every product twice, with factors that add up to m + 1.
+                // Σ_{l=1..m} (m-l+1) D_l·D_{m-l+1} has every product twice, with factors that add up to m +
+                // 1.
                 let twice = factors.span.dot(&factors.span, scale, m + 1, 1..=m);
                 closing += twice.scale(0.5 * (m + 1) as f64);
             }

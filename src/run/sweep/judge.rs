@@ -6,16 +6,15 @@
 //! between these.  Beside an integration at 1e-9 both together cost 2.2 times as much (32 points of `free`,
 //! counted instructions).
 
+use super::ensemble;
 use super::point::Ready;
 use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::elimination::Elimination;
-use crate::dynamics::{Form, State, Time};
+use crate::dynamics::{State, Time};
 use crate::run::drift::larger;
 use crate::run::plan::Plan;
 use crate::run::trust::{CAUTION, HORIZON, LEAST, Trust, crossing};
 use crate::stepping::Tolerance;
 use crate::stepping::taylor::batch::{Batch, BatchMember, Going};
-use std::sync::Arc;
 
 /// Tolerance of the second integration over that of the first, its least, and its order.
 const FINER: f64 = 100.0;
@@ -67,15 +66,9 @@ impl<'a> Judge<'a> {
         let tolerance = plan.tolerance.unwrap_or_default();
         let finer = (tolerance.relative.min(tolerance.absolute) / FINER).max(FINEST);
         let batch = Batch::new(Tolerance { relative: finer, absolute: finer }).with_order(ORDER);
-        let member = |ready: &'a Ready| {
-            let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
-            let mut member = BatchMember::new(&ready.mechanism, state);
-            member.statistics.max_evaluations = ready.plan.max_evaluations.saturating_mul(2);
-            member
-        };
         Self {
             batch,
-            members: ready.iter().map(member).collect(),
+            members: ready.iter().map(|ready| ready.member(2)).collect(),
             known: vec![Known::default(); ready.len()],
         }
     }
@@ -85,11 +78,12 @@ impl<'a> Judge<'a> {
         let Self { batch, members, known } = self;
         for (number, point) in points.iter().enumerate() {
             if point.state.time < until {
-                batch.integrate(&mut members[number..=number], point.state.time, &mut |_, _| Going::On);
+                let member = &mut members[number..=number];
+                ensemble::integrate(batch, member, point.state.time, &mut |_, _| Going::On);
                 known[number].take(&point.state, &members[number]);
             }
         }
-        batch.integrate(members, until, &mut |_, _| Going::On);
+        ensemble::integrate(batch, members, until, &mut |_, _| Going::On);
         for ((point, member), known) in points.iter().zip(members).zip(known) {
             if point.state.time >= until {
                 known.take(&point.state, member);

@@ -24,9 +24,11 @@
 //! # }
 //! ```
 
+mod ensemble;
 mod execute;
 mod grid;
 mod judge;
+mod lane;
 mod point;
 mod shard;
 #[cfg(feature = "files")]

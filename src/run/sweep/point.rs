@@ -1,24 +1,22 @@
 //! One point of a sweep, or several integrated in lanes.
 
 use super::judge::{Judge, PointTrust};
-use super::{Sweep, timed};
-use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::constraint::Posture;
+use super::lane::Lane;
+use super::{Sweep, ensemble, timed};
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::{BodyAngles, Form, Mechanism, Motion};
-use crate::run::allowance::{Allowance, EnergyLimit, Moment};
+use crate::dynamics::multiplier::Multiplier;
+use crate::dynamics::{Form, Mechanism, Motion};
 use crate::run::drift::larger;
-use crate::run::driver::MOST_TURNS;
-use crate::run::flip::{self, Flip};
+use crate::run::flip::Flip;
 use crate::run::methods::{MethodId, Stabilization};
 use crate::run::plan::{Plan, Request};
 use crate::run::running::{Run, Running};
 use crate::run::trust::Level;
 use crate::scene::{Scene, StartValue};
-use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
-use crate::stepping::{Cause, StepError};
-use std::f64::consts::PI;
+use crate::stepping::StepError;
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going};
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -67,12 +65,26 @@ pub struct Point {
 
 /// A point ready to run.
 pub(super) struct Ready {
-    point: Point,
+    pub point: Point,
     pub mechanism: Arc<Mechanism>,
     pub plan: Plan,
     pub start: Motion,
     /// What its energies are divided by \[J\].
-    scale: f64,
+    pub scale: f64,
+}
+
+impl Ready {
+    /// Its trajectory, which may take so many times the evaluations planned.
+    pub fn member(&self, times: u64) -> BatchMember<'_> {
+        let mechanism = Arc::clone(&self.mechanism);
+        let state = match mechanism.has_multipliers() {
+            true => Multiplier::<0, true>::new(mechanism).state(&self.start),
+            false => Elimination::<0>::new(mechanism).state(&self.start),
+        };
+        let mut member = BatchMember::new(&self.mechanism, state);
+        member.statistics.max_evaluations = self.plan.max_evaluations.saturating_mul(times);
+        member
+    }
 }
 
 impl Sweep {
@@ -135,7 +147,15 @@ impl Sweep {
             && self.trust != Level::Full
             && ready.plan.method == MethodId::Taylor
             && !ready.plan.extended
-            && matches!(ready.plan.stabilization, Stabilization::None | Stabilization::Elimination)
+            && match ready.plan.stabilization {
+                Stabilization::None => !ready.mechanism.has_multipliers(),
+                // The rows are kept, so that limits on them are not looked at.
+                Stabilization::Projection => {
+                    ready.mechanism.has_multipliers() && self.limits.constraint.is_none()
+                }
+                Stabilization::Elimination => true,
+                Stabilization::Baumgarte => false,
+            }
             && ready.mechanism.outputs.is_none()
             && self.has_lanes_for(&ready.mechanism)
     }
@@ -258,25 +278,15 @@ impl Sweep {
         let mut lanes: Vec<Lane> = Vec::with_capacity(ready.len());
         let mut members: Vec<BatchMember> = Vec::with_capacity(ready.len());
         for ready in &ready {
-            let state = Elimination::<0>::new(Arc::clone(&ready.mechanism)).state(&ready.start);
-            let mut member = BatchMember::new(&ready.mechanism, state);
-            member.statistics.max_evaluations = ready.plan.max_evaluations;
-            members.push(member);
+            members.push(ready.member(1));
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
-            lanes.push(Lane {
-                point: ready.point.clone(),
-                reference,
-                scale: ready.scale,
-                seen: [BodyAngles::default(), BodyAngles::default()],
-                allowance: Allowance::new(&ready.mechanism, &ready.plan),
-                limit: EnergyLimit::default(),
-            });
+            lanes.push(Lane::new(ready, reference));
         }
         let mut judge = (self.trust != Level::Off).then(|| Judge::new(&ready, &plan));
         let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
         for row in 1..=plan.rows {
-            batch.integrate(&mut members, plan.time(row), &mut |lane, passage| {
+            ensemble::integrate(&batch, &mut members, plan.time(row), &mut |lane, passage| {
                 let lane = &mut lanes[lane];
                 if lane.point.flip.is_none() {
                     lane.look(bodies, passage);
@@ -313,133 +323,4 @@ impl Sweep {
         }
         found
     }
-}
-
-/// A point integrated in a lane.
-struct Lane {
-    point: Point,
-    /// Energy at the start \[J\].
-    reference: DoubleDouble,
-    scale: f64,
-    /// Both ends of a step.
-    seen: [BodyAngles; 2],
-    /// What the tolerance explains of the energy's imbalance, and the limit that follows from it.
-    allowance: Option<Allowance>,
-    limit: EnergyLimit,
-}
-
-impl Lane {
-    /// Looks for a bar that turns over in a step.
-    fn look(&mut self, bodies: usize, passage: &Passage) {
-        if !(0..bodies).any(|bar| flip::may_pass(passage.ends(bar), passage.step)) {
-            return;
-        }
-        let body_angles = |after: f64, body_angles: &mut BodyAngles| {
-            body_angles.phi.clear();
-            body_angles.turns.clear();
-            body_angles.omega.clear();
-            for bar in 0..bodies {
-                let (winding, omega) = passage.at(bar, after);
-                // As states are wrapped: an angle of exactly π has not passed it.
-                let turns = if winding.abs() <= PI { 0.0 } else { (winding / (2.0 * PI)).round() };
-                body_angles.phi.push(winding - 2.0 * PI * turns);
-                body_angles.turns.push(turns as i64);
-                body_angles.omega.push(omega);
-            }
-        };
-        body_angles(0.0, &mut self.seen[0]);
-        body_angles(passage.step, &mut self.seen[1]);
-        let [a, b] = &self.seen;
-        if flip::can_pass(a, b, passage.step) {
-            self.point.flip = flip::search(passage.from.hi, passage.step, &self.seen, &mut |after| {
-                let mut there = BodyAngles::default();
-                body_angles(after, &mut there);
-                there
-            });
-        }
-    }
-
-    /// Takes what a member has come to; false where the point goes no further.
-    fn measure(
-        &mut self,
-        member: &BatchMember,
-        motion: &mut Motion,
-        kernel: &mut Kernel<DoubleDouble>,
-        stated: Option<f64>,
-        plan: &Plan,
-    ) -> bool {
-        let (n, state, partition) =
-            (member.mechanism.bodies.len(), &member.state, &member.mechanism.partition);
-        partition.read_angles(state, motion);
-        let coordinates = partition.count();
-        for (omega, body) in motion.omega.iter_mut().zip(&partition.bodies) {
-            *omega += body.base.map_or(DoubleDouble::ZERO, |base| state.unknown(coordinates + base));
-        }
-        let work = state.unknown(2 * coordinates);
-        let point = &mut self.point;
-        let energy = member.mechanism.energy(kernel, &motion.phi, &motion.omega).total() - work;
-        let imbalance = ((energy - self.reference).hi / self.scale).abs();
-        point.energy = larger(imbalance, point.energy);
-        point.t = state.time.hi;
-        point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
-        point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
-        point.steps = member.statistics.steps;
-        point.constraint = violation(member.mechanism, motion, point.constraint);
-        if let Some(allowance) = &self.allowance {
-            let moment = Moment {
-                omega: &point.omega,
-                translations: &[],
-                work: work.hi,
-                largest: self.scale.max(work.hi.abs()),
-                steps: point.steps,
-            };
-            self.limit.see(allowance, &moment);
-        }
-        let limit = stated.unwrap_or(self.limit.most);
-        let stop = |cause, what: String, hint: &str| StepError {
-            cause,
-            method: plan.method.to_string(),
-            t: point.t,
-            step: 0.0,
-            what,
-            hint: hint.into(),
-        };
-        let stopped = match &member.stopped {
-            Some(stopped) => Some(stopped.clone()),
-            None if point.energy.is_nan() => Some(stop(
-                Cause::NotFinite,
-                "the energy is not finite".into(),
-                "look for rates far out of proportion",
-            )),
-            None if state.turns.iter().any(|turns| turns.unsigned_abs() > MOST_TURNS) => {
-                let what = "a body has turned more often than doubles can count".into();
-                Some(stop(Cause::NotFinite, what, "look for rates far out of proportion"))
-            }
-            None if point.energy > limit => {
-                let what =
-                    format!("energy is off by {:.2e} of the scale, the limit is {limit:.1e}", point.energy);
-                Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
-            }
-            None => None,
-        };
-        if let Some(stopped) = stopped {
-            point.status = Status::Stopped(stopped);
-            return false;
-        }
-        true
-    }
-}
-
-/// The largest violation of any constraint so far, at position and velocity level; constraints are given
-/// angles.
-fn violation(mechanism: &Mechanism, motion: &Motion, before: Option<[f64; 2]>) -> Option<[f64; 2]> {
-    let mut jacobian = vec![DoubleDouble::ZERO; motion.phi.len()];
-    mechanism.constraints.iter().fold(before, |most, row| {
-        jacobian.fill(DoubleDouble::ZERO);
-        let at = Posture { phi: &motion.phi, z: &[], omega: &motion.omega };
-        let here = row.linearise(motion.time, at, &mut jacobian);
-        let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |rate, (&g, &w)| rate + g * w);
-        let [position, velocity] = most.unwrap_or_default();
-        Some([larger(here.position.hi.abs(), position), larger(rate.hi.abs(), velocity)])
-    })
 }

@@ -1,5 +1,5 @@
 //! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs or without, or of
-//! two of which one is driven; and ensembles of one mechanism, any hinge tree.
+//! two of which one is driven; and ensembles of one mechanism, any hinge tree, with closed loops or without.
 //!
 //! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
@@ -8,7 +8,10 @@
 mod driven;
 mod free;
 mod laws;
+mod looped;
+mod passage;
 mod series;
+mod slots;
 mod springs;
 mod swinging;
 mod trees;
@@ -16,11 +19,13 @@ mod vectors;
 
 use self::driven::DrivenTeam;
 use self::free::FreeTeam;
+use self::looped::LoopTeam;
+pub use self::passage::Passage;
+use self::slots::{LaneSlot, LaneSlots};
 use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
-use self::vectors::{added, load, moved, store, unit};
-use super::step_size::{self, StepSize};
-use super::{JUDGES, Kernel, stop};
+use self::vectors::{added, load, moved, root, store, unit};
+use super::{JUDGES, Kernel, Taylor, stop};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::{Mechanism, State, Time};
@@ -34,7 +39,8 @@ const BODIES: usize = 4;
 const SPRINGS: usize = 8;
 
 /// One trajectory: its mechanism, its state in the form of
-/// [`Elimination`](crate::dynamics::elimination::Elimination), and how it went.
+/// [`Elimination`](crate::dynamics::elimination::Elimination), or with loops of
+/// [`Multiplier`](crate::dynamics::multiplier::Multiplier), and how it went.
 #[derive(Clone, Debug)]
 pub struct BatchMember<'a> {
     /// What is integrated.
@@ -45,14 +51,23 @@ pub struct BatchMember<'a> {
     pub statistics: Statistics,
     /// Why it stopped, if it did.
     pub stopped: Option<StepError>,
+    /// True where it came to a step that lanes do not take, near a singular position: it stands where that
+    /// step begins, to be taken on by [`Taylor`](super::Taylor) with projection.
+    pub has_left: bool,
 }
 
 impl<'a> BatchMember<'a> {
     /// A trajectory about to start.
     pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
-        Self { mechanism, state, statistics: Statistics::default(), stopped: None }
+        Self { mechanism, state, statistics: Statistics::default(), stopped: None, has_left: false }
     }
 }
+
+/// Sees a step of the trajectory of a number.
+pub type Watch<'a> = dyn FnMut(usize, &Passage) -> Going + 'a;
+
+/// Takes on a trajectory that has left, and is shown as many steps as it takes.
+pub(crate) type Alone<'a> = dyn FnMut(usize, &mut BatchMember, &mut Watch) -> Going + 'a;
 
 /// Whether a trajectory goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,30 +76,6 @@ pub enum Going {
     On,
     /// Enough was seen.
     Enough,
-}
-
-/// A step just taken, which can be looked at anywhere.
-pub struct Passage<'a> {
-    /// Time at its start.
-    pub from: Time,
-    /// Its length \[s\].
-    pub step: f64,
-    ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
-    series: &'a dyn Fn(usize, f64) -> (f64, f64),
-}
-
-impl Passage<'_> {
-    /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued
-    /// from that at the start in [-π, π].
-    pub fn at(&self, body: usize, after: f64) -> (f64, f64) {
-        (self.series)(body, after)
-    }
-
-    /// The same at the start and at the end, as the integration has them: without a sum, and to rounding
-    /// those of [`Passage::at`].
-    pub fn ends(&self, body: usize) -> [[f64; 2]; 2] {
-        (self.ends)(body)
-    }
 }
 
 /// Integrates many trajectories of hinge trees.
@@ -114,6 +105,11 @@ impl Batch {
         Self { is_portable: kernel != Kernel::Fastest, ..self }
     }
 
+    /// The method for one trajectory alone, at the same tolerance.
+    pub(crate) fn alone(&self) -> Taylor<f64> {
+        Taylor::new(Tolerance { relative: self.tolerance, absolute: self.tolerance })
+    }
+
     /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
     /// beside gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or
     /// two bodies without springs, one of them driven from the ground by a law that is no formula.
@@ -126,7 +122,9 @@ impl Batch {
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
     /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
-    /// motors on angles, springs beside them, that are no formulas, without walls and friction.
+    /// motors on angles, springs beside them, that are no formulas, without walls and friction; and the same
+    /// with closed loops and sliders, their states in the form of
+    /// [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         trees::fits(mechanism)
     }
@@ -135,32 +133,40 @@ impl Batch {
     /// may end that one.
     ///
     /// Mechanisms of neither [these](Batch::takes) nor [those](Batch::takes_alike) kinds are stopped as
-    /// unsuited.  The result of each does not depend on the others.
-    pub fn integrate(
+    /// unsuited; those with loops may [leave](BatchMember::has_left) on the way.  The result of each does not
+    /// depend on the others.
+    pub fn integrate(&self, members: &mut [BatchMember], until: Time, watch: &mut Watch) {
+        self.integrate_with(members, until, watch, &mut |_, _, _| Going::Enough);
+    }
+
+    /// The same with what takes those on that leave: where it says so, they come back.
+    pub(crate) fn integrate_with(
         &self,
         members: &mut [BatchMember],
         until: Time,
-        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+        watch: &mut Watch,
+        alone: &mut Alone,
     ) {
         let mut is_done = vec![false; members.len()];
+        members.iter_mut().for_each(|member| member.has_left = false);
         while let Some(next) = is_done.iter().position(|is_done| !is_done) {
             let like = members[next].mechanism;
             macro_rules! try_teams {
                 ($($team:ty),*) => {$(
                     if <$team>::fits(like, like) {
-                        let fits: Vec<bool> =
-                            members.iter().map(|member| <$team>::fits(member.mechanism, like)).collect();
+                        let fits = |one: &Mechanism| std::ptr::eq(one, like) || <$team>::fits(one, like);
+                        let fits: Vec<bool> = members.iter().map(|member| fits(member.mechanism)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
-                        self.integrate_those::<$team>(like, &fits, members, until, watch);
+                        self.integrate_those::<$team>(like, &fits, members, until, (&mut *watch, &mut *alone));
                         continue;
                     }
                 )*};
             }
             try_teams!(FreeTeam<1, false>, FreeTeam<2, false>, FreeTeam<3, false>, FreeTeam<4, false>);
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
-            try_teams!(DrivenTeam, SwingingTeam, TreeTeam);
+            try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
             let (member, hint) = (&mut members[next], "integrate it by `taylor`");
-            let what = "lanes take hinge trees, whose motors and springs are no formulas".into();
+            let what = "lanes take hinge trees and loops, whose motors and springs are no formulas".into();
             member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));
             is_done[next] = true;
         }
@@ -173,11 +179,11 @@ impl Batch {
         fits: &[bool],
         members: &mut [BatchMember],
         until: Time,
-        watch: &mut dyn FnMut(usize, &Passage) -> Going,
+        (watch, alone): (&mut Watch, &mut Alone),
     ) {
         let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
-        let crew = Crew::new(T::new(like, self.order, vectors), self.order, until);
-        vectors.run(Integration::<T> { crew, fits, batch: self, members, until, watch });
+        let lanes = LaneSlots::new(T::new(like, self.order, vectors), self.order, until);
+        vectors.run(Integration::<T> { lanes, fits, batch: self, members, until, watch, alone });
     }
 }
 
@@ -208,6 +214,12 @@ trait Team {
     /// True where a lane's coefficients of this order are finite.
     fn is_finite(&self, lane: usize, order: usize) -> bool;
 
+    /// True where a lane's trajectory is better left to other code from where the present step begins: asked
+    /// after its expansion, and again after its end.
+    fn is_leaving(&self, _lane: usize) -> bool {
+        false
+    }
+
     /// Every lane's state at the end of its step \[s\].
     fn finish<W: EightLanes>(&mut self, order: usize, taken: &Octet);
 
@@ -227,13 +239,14 @@ trait Team {
 }
 
 struct Integration<'a, 'b, T> {
-    crew: Crew<T>,
+    lanes: LaneSlots<T>,
     /// Which of the members these are.
     fits: &'a [bool],
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
-    watch: &'a mut dyn FnMut(usize, &Passage) -> Going,
+    watch: &'a mut Watch<'a>,
+    alone: &'a mut Alone<'a>,
 }
 
 impl<T: Team> WideCode for Integration<'_, '_, T> {
@@ -243,174 +256,18 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
     fn run<W: EightLanes>(mut self) {
         let (order, mut waiting) = (self.batch.order, 0);
         loop {
-            self.crew.fill(self.batch, self.fits, self.members, &mut waiting, self.until);
-            if self.crew.is_idle() {
+            self.lanes.fill(self.batch, self.fits, self.members, &mut waiting, self.until);
+            if self.lanes.is_idle() {
                 return;
             }
-            self.crew.team.begin::<W>(&self.crew.slots);
-            self.crew.team.expand::<W>(order);
-            let taken = self.crew.choose_steps::<W>(order);
-            self.crew.team.finish::<W>(order, &taken);
-            self.crew.arrive(order, self.members, self.until, self.watch);
+            self.lanes.team.begin::<W>(&self.lanes.slots);
+            self.lanes.team.expand::<W>(order);
+            let taken = self.lanes.choose_steps::<W>(order);
+            self.lanes.team.finish::<W>(order, &taken);
+            self.lanes.arrive(order, self.members, self.until, self.watch);
+            self.lanes.bring_back(self.batch, self.members, self.until, (self.watch, self.alone));
         }
     }
-}
-
-/// What a lane is doing.
-#[derive(Clone, Debug)]
-struct LaneSlot {
-    /// Index of its trajectory.
-    member: Option<usize>,
-    step_size: StepSize,
-    time: Time,
-    /// The mechanism's unit of time \[s\].
-    unit: f64,
-    /// What is left to go, the last step wanted and the one taken \[s\].
-    left: f64,
-    wanted: f64,
-    taken: f64,
-}
-
-impl LaneSlot {
-    /// Why the step just expanded cannot be taken, where it cannot.
-    fn failure(&self, statistics: &Statistics) -> Result<(), StepError> {
-        let hint = "look for a position without inertia";
-        let stop = |cause, what: &str| {
-            stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint)
-        };
-        if self.wanted.is_nan() {
-            Err(stop(Cause::NotFinite, "the series is not finite"))
-        } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3 * self.unit) {
-            Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
-        } else {
-            statistics.check("taylor", self.time.hi, self.taken)
-        }
-    }
-}
-
-/// Lanes, and what they do.
-struct Crew<T> {
-    slots: [LaneSlot; LANES],
-    team: Box<T>,
-}
-
-impl<T: Team> Crew<T> {
-    /// Empty lanes.
-    fn new(team: T, order: usize, until: Time) -> Self {
-        let empty = || LaneSlot {
-            member: None,
-            step_size: StepSize::new(1.0, order, 0.0),
-            time: until,
-            unit: 1.0,
-            left: 0.0,
-            wanted: 0.0,
-            taken: 0.0,
-        };
-        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(team) }
-    }
-
-    /// Puts trajectories that wait into the free lanes.
-    fn fill(
-        &mut self,
-        batch: &Batch,
-        fits: &[bool],
-        members: &[BatchMember],
-        waiting: &mut usize,
-        until: Time,
-    ) {
-        for lane in 0..LANES {
-            if self.slots[lane].member.is_none() {
-                let next = next(fits, members, waiting, until);
-                self.slots[lane].member = next;
-                match next {
-                    Some(index) => self.take_in(lane, batch, &members[index]),
-                    None => self.team.park(lane),
-                }
-            }
-            let slot = &mut self.slots[lane];
-            slot.left = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
-        }
-    }
-
-    /// Puts a trajectory into a lane.
-    fn take_in(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
-        let (longest, unit) = (self.team.take_in(lane, member, batch.order), member.mechanism.units.time);
-        let slot = &mut self.slots[lane];
-        slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
-        (slot.time, slot.unit) = (member.state.time, unit);
-    }
-
-    /// True where no lane has a trajectory.
-    fn is_idle(&self) -> bool {
-        self.slots.iter().all(|slot| slot.member.is_none())
-    }
-
-    /// The steps \[s\] that the series just expanded allow.
-    #[inline(always)]
-    fn choose_steps<W: EightLanes>(&mut self, order: usize) -> Octet {
-        let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
-        for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
-            (slot.wanted, slot.taken) = (f64::NAN, 0.0);
-            if self.team.is_finite(lane, order) {
-                let mut own = [0.0; JUDGES];
-                for back in 0..JUDGES {
-                    own[back] = sizes[back].0[lane];
-                }
-                slot.wanted = slot.step_size.step_of(order, &own);
-                slot.taken = step_size::taken(slot.wanted, slot.left);
-            }
-            *taken = slot.taken;
-        }
-        taken
-    }
-
-    /// Records the steps just taken, and frees the lanes of trajectories that have ended.
-    fn arrive(
-        &mut self,
-        order: usize,
-        members: &mut [BatchMember],
-        until: Time,
-        watch: &mut dyn FnMut(usize, &Passage) -> Going,
-    ) {
-        for lane in 0..LANES {
-            let slot = &mut self.slots[lane];
-            let Some(index) = slot.member else { continue };
-            let member = &mut members[index];
-            let (from, step) = (slot.time, slot.taken);
-            match slot.failure(&member.statistics) {
-                Err(stop) => member.stopped = Some(stop),
-                Ok(()) => {
-                    slot.time = if step == slot.left { until } else { from + step };
-                    member.statistics.steps += 1;
-                    member.statistics.evaluations += 1;
-                }
-            }
-            let time = slot.time;
-            let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
-            let ends = |body: usize| self.team.ends(lane, body);
-            let passage = Passage { from, step, ends: &ends, series: &series };
-            let is_over =
-                member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until;
-            self.team.wrap(lane, &mut member.state.turns);
-            if is_over {
-                self.team.leave(lane, &mut member.state);
-                member.state.time = time;
-                self.slots[lane].member = None;
-            }
-        }
-    }
-}
-
-/// The next trajectory of this kind that has a way to go.
-fn next(fits: &[bool], members: &[BatchMember], waiting: &mut usize, until: Time) -> Option<usize> {
-    while *waiting < members.len() {
-        let (index, member) = (*waiting, &members[*waiting]);
-        *waiting += 1;
-        if fits[index] && member.state.time < until {
-            return Some(index);
-        }
-    }
-    None
 }
 
 #[cfg(test)]

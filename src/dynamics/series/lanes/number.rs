@@ -219,6 +219,9 @@ impl<W: EightLanes> Constants for InLanes<W> {
     }
 
     fn phase(law: &Law, times: Times) -> Phase<Self> {
+        if law.start == 0.0 && law.is_constant() {
+            return Phase { unit: Complex::new(Self::ONE, Self::ZERO), ..Phase::default() };
+        }
         let phases = times.map(|t| law.at::<f64>(t));
         let join =
             |part: fn(&Phase<f64>) -> f64| Self(W::of(&std::array::from_fn(|lane| part(&phases[lane]))));
@@ -235,6 +238,9 @@ impl<W: EightLanes> Constants for InLanes<W> {
     }
 
     fn add_law(law: &Law, sign: f64, times: Times, series: &mut [Self], first: usize, stride: usize) {
+        if law.is_constant() {
+            return;
+        }
         let rate = Self::of_times(&times, |t| law.at::<f64>(t).rate);
         let unit = |sine: &Sine| {
             let units = times.map(|t| Scalar::sin_cos(sine.argument(t).reduced().0.hi));
@@ -257,6 +263,7 @@ impl<W: EightLanes> Factored for InLanes<W> {
 impl<W: EightLanes> SeriesNumber for InLanes<W> {
     const HAS_INVERSE: bool = true;
     const HAS_ROWS: bool = true;
+    const HAS_BORDER: bool = true;
 
     #[inline(never)]
     fn perform<K: Task>(task: K) -> K::Output {

@@ -41,9 +41,10 @@ fn ends(vectors: Vectors) -> Vec<State> {
         false => Going::On,
     };
     let team = FreeTeam::<2, false>::new(&mechanism, batch.order, vectors);
-    let crew = Crew::new(team, batch.order, until);
+    let lanes = LaneSlots::new(team, batch.order, until);
     let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
-    vectors.run(Integration { crew, fits, batch, members: members_here, until, watch: &mut watch });
+    let alone: &mut Alone = &mut |_, _, _| Going::Enough;
+    vectors.run(Integration { lanes, fits, batch, members: members_here, until, watch: &mut watch, alone });
     members.into_iter().map(|member| member.state).collect()
 }
 

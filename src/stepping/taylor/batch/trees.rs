@@ -1,5 +1,10 @@
-//! Hinge trees with springs, torsion springs, applied forces and motors, all lanes of equal mechanisms: the
-//! series of [`dynamics`](crate::dynamics::series) on numbers with a lane for each trajectory.
+//! Hinge trees with springs, torsion springs, applied forces and motors, and mechanisms with closed loops
+//! and sliders, all lanes of equal mechanisms: the series of [`dynamics`](crate::dynamics::series) on numbers
+//! with a lane for each trajectory.
+//!
+//! Loops and sliders are kept by multipliers, and by a projection after every step.  A trajectory leaves the
+//! lanes where a step begins or ends near a singular position, or does not end on its rows: from where that
+//! step began it has to go on alone.
 
 use super::super::terms::over;
 use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
@@ -7,7 +12,7 @@ use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::law::Law;
-use crate::dynamics::series::lanes::{SeriesInLanes, in_lanes};
+use crate::dynamics::series::lanes::{Landing, SeriesInLanes, in_lanes};
 use crate::dynamics::{Mechanism, State, Time};
 use std::f64::consts::{PI, TAU};
 
@@ -32,28 +37,49 @@ pub(super) struct TreeTeam {
     before: Vec<Octet>,
     taken: Octet,
     times: [Time; LANES],
+    /// Which lanes hold a trajectory that stays, and which hold one that leaves.
+    is_going: [bool; LANES],
+    is_leaving: [bool; LANES],
+    /// Where the rows are kept by multipliers: unknowns where the step began, those of all lanes that do not
+    /// land.
+    kept: Option<[Vec<Octet>; 2]>,
 }
 
-/// True for hinge trees whose motors are all eliminated, with a motion left, and laws that are no formulas;
-/// not for bodies on their axes under gravity and springs alone: more of them than have lanes of their own
+/// True for hinge trees whose motors are all eliminated, with a motion left, and for mechanisms with loops or
+/// sliders whose rows are independent of one another; laws must be no formulas.
+///
+/// Not for bodies on their axes under gravity and springs alone: more of them than have lanes of their own
 /// are faster one by one.
 pub(super) fn fits(mechanism: &Mechanism) -> bool {
     (1..=BODIES).contains(&mechanism.bodies.len())
-        && !super::free::fits(mechanism)
         && mechanism.coordinates() == mechanism.bodies.len()
-        && mechanism.partition.count() > 0
         && mechanism.tree.is_dense()
-        && !mechanism.has_multipliers()
         && mechanism.forces.is_empty()
         && mechanism.contacts.is_empty()
         && mechanism.frictions.is_empty()
+        && mechanism.vibration.is_none()
         && laws(mechanism).all(|law| law.profile.is_none())
+        && (is_tree(mechanism) || is_looped(mechanism))
+}
+
+fn is_tree(mechanism: &Mechanism) -> bool {
+    !super::free::fits(mechanism) && mechanism.partition.count() > 0 && !mechanism.has_multipliers()
+}
+
+fn is_looped(mechanism: &Mechanism) -> bool {
+    mechanism.has_closed_loops()
+        && mechanism.assembly.redundant.is_empty()
+        && !mechanism.has_released()
+        && !mechanism.has_aims()
+        && !mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name))
 }
 
 /// The laws of motors and applied forces.
 fn laws(mechanism: &Mechanism) -> impl Iterator<Item = &Law> {
     let motors = mechanism.partition.bodies.iter().flat_map(|angle| angle.laws.iter().map(|(_, law)| law));
-    motors.chain(mechanism.actions.iter().filter_map(|action| action.law.as_ref()))
+    let travels = mechanism.constraints.iter().filter(|row| !row.is_angle());
+    let actions = mechanism.actions.iter().filter_map(|action| action.law.as_ref());
+    motors.chain(travels.filter_map(|row| row.law.as_ref())).chain(actions)
 }
 
 /// About the fastest rate of a mechanism from a time on \[rad/s\].
@@ -75,6 +101,9 @@ fn fastest_rate(mechanism: &Mechanism, t: f64) -> f64 {
 impl TreeTeam {
     /// The coordinate that a body's angle is, where it is not driven.
     fn coordinate(&self, body: usize) -> Option<usize> {
+        if self.kept.is_some() {
+            return Some(body);
+        }
         let dependent_angle = &self.mechanism.partition.bodies[body];
         dependent_angle.base.filter(|_| dependent_angle.laws.is_empty())
     }
@@ -85,11 +114,49 @@ impl TreeTeam {
         let angle = self.before[base].0[lane];
         if angle.abs() <= PI { angle } else { angle - TAU * (angle / TAU).round() }
     }
+
+    /// Brings the ends of the steps back onto the rows; lanes that take no step, or do not get there, stay
+    /// where it began.
+    fn land(&mut self) {
+        if self.kept.is_none() {
+            return;
+        }
+        let mut times = self.times;
+        for lane in 0..LANES {
+            times[lane] = times[lane] + self.taken.0[lane];
+            self.is_going[lane] &= self.taken.0[lane] > 0.0;
+        }
+        self.keep(&self.is_going.map(|is_going| !is_going));
+        let landing = Landing {
+            high: &mut self.high,
+            low: &mut self.low,
+            is_going: self.is_going,
+            unit: 1.0 / self.mechanism.units.time,
+        };
+        let is_landed = self.series.land(&self.mechanism, times, landing);
+        if is_landed != self.is_going {
+            let is_lost = std::array::from_fn(|lane| self.is_going[lane] && !is_landed[lane]);
+            for lane in (0..LANES).filter(|&lane| is_lost[lane]) {
+                self.is_leaving[lane] = true;
+            }
+            self.keep(&is_lost);
+        }
+    }
+
+    /// Puts some lanes back to where the step began.
+    fn keep(&mut self, is_kept: &[bool; LANES]) {
+        let Some([high, low]) = &self.kept else { return };
+        for lane in (0..LANES).filter(|&lane| is_kept[lane]) {
+            let unknowns = self.high.iter_mut().zip(high).chain(self.low.iter_mut().zip(low));
+            unknowns.for_each(|(unknown, kept)| unknown.0[lane] = kept.0[lane]);
+        }
+    }
 }
 
 impl Team for TreeTeam {
     fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self {
-        let f = like.partition.count();
+        let is_kept = like.has_multipliers();
+        let f = if is_kept { like.coordinates() } else { like.partition.count() };
         Self {
             series: in_lanes(like, order, vectors),
             mechanism: like.clone(),
@@ -101,6 +168,9 @@ impl Team for TreeTeam {
             before: vec![ZERO; f],
             taken: ZERO,
             times: [Time::default(); LANES],
+            is_going: [false; LANES],
+            is_leaving: [false; LANES],
+            kept: is_kept.then(|| [vec![ZERO; 2 * f + 1], vec![ZERO; 2 * f + 1]]),
         }
     }
 
@@ -109,12 +179,14 @@ impl Team for TreeTeam {
         let is_equal = || {
             (&mechanism.tree, &mechanism.partition, &mechanism.springs)
                 == (&like.tree, &like.partition, &like.springs)
+                && mechanism.constraints == like.constraints
                 && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
         };
         fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && is_equal())
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
+        self.park(lane);
         for (numbers, unknowns) in [(&mut self.high, &member.state.y), (&mut self.low, &member.state.low)] {
             for (number, unknown) in numbers.iter_mut().zip(unknowns) {
                 number.0[lane] = *unknown;
@@ -132,8 +204,13 @@ impl Team for TreeTeam {
 
     fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
         self.before.copy_from_slice(&self.high[..self.coordinates]);
-        for (time, slot) in self.times.iter_mut().zip(slots) {
-            *time = slot.time;
+        for (lane, slot) in slots.iter().enumerate() {
+            self.times[lane] = slot.time;
+            self.is_going[lane] = slot.member.is_some();
+        }
+        if let Some([high, low]) = &mut self.kept {
+            high.copy_from_slice(&self.high);
+            low.copy_from_slice(&self.low);
         }
     }
 
@@ -141,6 +218,14 @@ impl Team for TreeTeam {
         let f = self.coordinates;
         let (angles, rates) = self.high[..2 * f].split_at(f);
         self.series.expand(&self.mechanism, self.times, [angles, &self.low[..f], rates]);
+        for lane in 0..LANES {
+            self.is_leaving[lane] = self.is_going[lane] && !self.series.is_regular(lane);
+            self.is_going[lane] &= !self.is_leaving[lane];
+        }
+    }
+
+    fn is_leaving(&self, lane: usize) -> bool {
+        self.is_leaving[lane]
     }
 
     #[inline(always)]
@@ -206,6 +291,7 @@ impl Team for TreeTeam {
         }
         (self.high[2 * f], self.low[2 * f]) =
             added([&self.high[2 * f], &self.low[2 * f]], moved(work, h), W::ZERO);
+        self.land();
     }
 
     fn ends(&self, lane: usize, body: usize) -> [[f64; 2]; 2] {
@@ -238,8 +324,10 @@ impl Team for TreeTeam {
 
     fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64) {
         let (mut angle, mut rate) = (0.0, 0.0);
+        let (f, coordinate) = (self.coordinates, self.coordinate(body));
         for k in (0..=order).rev() {
-            let v = self.series.rate_of(k, body, lane);
+            let of = |c: usize| self.series.rates()[k * f + c].0[lane];
+            let v = coordinate.map_or_else(|| self.series.rate_of(k, body, lane), of);
             rate = rate * after + v;
             angle = angle * after + v / (k + 1) as f64;
         }

@@ -2,6 +2,7 @@
 
 use super::super::terms::add_to;
 use crate::arithmetic::eight::Octet;
+use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
 
@@ -38,4 +39,11 @@ pub(super) fn unit<W: EightLanes>(high: &Octet, low: &Octet) -> [Octet; 2] {
     let (s, c) = sincos::sin_cos::<W::Half>(high, low);
     let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
     [store(W::join([c, other_c])), store(W::join([s, other_s]))]
+}
+
+/// Square roots.
+#[inline(always)]
+pub(super) fn root<W: EightLanes>(x: W) -> W {
+    let [first, second] = x.halves();
+    W::join([first.sqrt(), second.sqrt()])
 }

@@ -1,0 +1,239 @@
+//! The way back onto the constraint equations at the end of a step, eight motions at once.
+//!
+//! As the projection of the angle form (`stabilization/projection.rs`): positions, then rates,
+//! the shortest way in the metric of the mass matrix, with the factors of the step's end.  Every motion is
+//! moved as often as it needs by itself, so that none depends on the others.
+
+use super::super::{Series, Terms};
+use super::number::InLanes;
+use super::{Landing, Times};
+use crate::arithmetic::Complex;
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::wide::{EightLanes, Task};
+use crate::dynamics::schur::NEAR;
+
+/// Rounds of one level, at most.
+const SWEEPS: usize = 6;
+/// Violation over its lever that is rounding.
+const ROUNDING: f64 = 1e-16;
+/// Violation over its lever that may be left.
+const LEFT: f64 = 1e-13;
+/// The longest turn \[rad\]: the series of its sine and cosine go as far as the fifth power.
+const FAR: f64 = 1e-3;
+/// Diagonal of M over its pivots, and pivots of S below this part of those of the rank: beyond, light members
+/// or long levers cost more digits than doubles have (see [`schur`](crate::dynamics::schur)).
+const DEEP: f64 = 1e4;
+const LOSS: f64 = 1e-3;
+
+/// How near the lanes are to where constraints lose their independence.
+#[derive(Clone, Debug, Default)]
+pub struct Regularity {
+    levers: Vec<f64>,
+    /// J D Jᵀ and its reciprocal pivots.
+    rank: Vec<Octet>,
+    /// Reciprocal shares of the weakest pivots of S and of J D Jᵀ, and M's diagonal over its pivots.
+    shares: [Octet; 3],
+}
+
+impl Regularity {
+    /// For constraints with these levers.
+    pub fn new(levers: Vec<f64>) -> Self {
+        let r = levers.len();
+        Self { rank: vec![Octet::default(); r * r], levers, ..Self::default() }
+    }
+
+    /// True where the constraints of a lane are independent, and doubles are enough for them; what is not a
+    /// number is as well: the series tells.
+    pub fn holds(&self, lane: usize) -> bool {
+        let [mass, rank, depth] = [0, 1, 2].map(|k| self.shares[k].0[lane]);
+        let is_near = mass * NEAR > 1.0 && (rank * NEAR > 1.0 || rank < LOSS * mass);
+        !is_near && depth <= DEEP
+    }
+
+    /// Looks at the factors at hand.
+    #[inline(always)]
+    pub fn look<W: EightLanes>(&mut self, series: &Series<InLanes<W>>, diagonal: &[f64]) {
+        let [mass, columns, rows] = series.rows.scales();
+        let [jacobian, pivot] = series.rows.factors();
+        let (r, f) = (mass.len(), columns.len());
+        let (mut weakest, mut deepest) = (W::ZERO, W::ZERO);
+        for i in 0..r {
+            weakest = pivot[i].0.mul(W::splat(mass[i])).larger(weakest);
+        }
+        for c in 0..f {
+            deepest = series.pivot[c].0.mul(W::splat(diagonal[c])).larger(deepest);
+        }
+        for i in 0..r {
+            for j in i..r {
+                let mut sum = W::ZERO;
+                for c in 0..f {
+                    let product = jacobian[i * f + c].0.mul(W::splat(columns[c]));
+                    sum = product.mul_add(jacobian[j * f + c].0, sum);
+                }
+                self.rank[i * r + j] = Octet(sum.array());
+            }
+        }
+        let mut dependent = W::ZERO;
+        for k in (0..r).rev() {
+            let reciprocal = W::ONE.div(W::of(&self.rank[k * r + k].0));
+            dependent = reciprocal.mul(W::splat(rows[k])).larger(dependent);
+            for i in 0..k {
+                let part = W::of(&self.rank[i * r + k].0).mul(reciprocal);
+                for j in 0..=i {
+                    let full = W::of(&self.rank[j * r + k].0);
+                    let left = full.neg_mul_add(part, W::of(&self.rank[j * r + i].0));
+                    self.rank[j * r + i] = Octet(left.array());
+                }
+            }
+        }
+        self.shares = [Octet(weakest.array()), Octet(dependent.array()), Octet(deepest.array())];
+    }
+}
+
+/// Which lanes are still to be moved.
+#[derive(Clone, Copy, Debug)]
+struct Sieve {
+    is_going: [bool; LANES],
+    last: [f64; LANES],
+}
+
+impl Sieve {
+    fn new(is_going: [bool; LANES]) -> Self {
+        Self { is_going, last: [f64::INFINITY; LANES] }
+    }
+
+    /// Keeps those whose violation is not rounding, and has fallen by half; true where there are any.
+    fn sift(&mut self, worst: &[f64; LANES], least: f64) -> bool {
+        for lane in 0..LANES {
+            let (worst, last) = (worst[lane], &mut self.last[lane]);
+            self.is_going[lane] &= worst > least && worst < 0.5 * *last;
+            *last = worst;
+        }
+        self.is_going.contains(&true)
+    }
+
+    /// One in the lanes that are to be moved, zero in the others.
+    fn mask<W: EightLanes>(&self) -> W {
+        let mut mask = [0.0; LANES];
+        for lane in 0..LANES {
+            mask[lane] = f64::from(u8::from(self.is_going[lane]));
+        }
+        W::of(&mask)
+    }
+}
+
+/// Brings angles and rates of all lanes back, which are left where they are in those that do not land.
+pub(super) struct Land<'a, 'b, W: EightLanes> {
+    pub series: &'a mut Series<InLanes<W>>,
+    pub regularity: &'a mut Regularity,
+    pub begin: &'a mut [Vec<InLanes<W>>; 3],
+    pub terms: &'a Terms<'b, f64>,
+    pub times: Times,
+    pub landing: Landing<'a>,
+}
+
+impl<W: EightLanes> Task for Land<'_, '_, W> {
+    type Output = [bool; LANES];
+
+    #[inline(always)]
+    fn perform(self) -> [bool; LANES] {
+        let Self { series, regularity, begin: [u, rest, rate], terms, times, landing } = self;
+        let f = u.len();
+        let Landing { high, low, is_going, unit } = landing;
+        for c in 0..f {
+            u[c] = InLanes(W::of(&high[c].0));
+            rest[c] = InLanes(W::of(&low[c].0));
+            rate[c] = InLanes(W::of(&high[f + c].0));
+        }
+        series.begin(times, u, rest, rate);
+        series.rows.face(times);
+        series.factor_for_rows(terms);
+        regularity.look(series, &terms.tree.diagonal);
+        let mut sieve = Sieve::new(is_going);
+        let mut turned = W::ZERO;
+        for _ in 0..SWEEPS {
+            let violations = series.rows.violations(&series.z[..f]);
+            let mut worst = W::ZERO;
+            for i in 0..violations.len() {
+                worst = violations[i].0.mul(W::splat(1.0 / regularity.levers[i])).larger(worst);
+            }
+            if !sieve.sift(&worst.array(), ROUNDING) {
+                break;
+            }
+            let (mask, way) = (sieve.mask::<W>(), series.rows.way_back());
+            for c in 0..f {
+                let turn = way[c].0.mul(mask);
+                turned = turn.larger(turned);
+                u[c] = InLanes(turn);
+            }
+            for c in 0..f {
+                let turn = u[c].0;
+                series.z[c] = turned_back(series.z[c], turn);
+                move_by(&mut high[c], &mut low[c], turn);
+            }
+        }
+        let (far, mut is_landed) = (turned.array(), [false; LANES]);
+        for lane in 0..LANES {
+            let left = sieve.last[lane];
+            is_landed[lane] = is_going[lane] && left <= LEFT && far[lane] <= FAR && regularity.holds(lane);
+        }
+        series.rows.linearise(&series.z[..f]);
+        let mut sieve = Sieve::new(is_landed);
+        for _ in 0..SWEEPS {
+            let mut fastest = W::splat(unit);
+            for c in 0..f {
+                fastest = rate[c].0.larger(fastest);
+            }
+            let slips = series.rows.slips(rate);
+            let mut worst = W::ZERO;
+            for i in 0..slips.len() {
+                worst = slips[i].0.mul(W::splat(1.0 / regularity.levers[i])).larger(worst);
+            }
+            if !sieve.sift(&worst.div(fastest).array(), ROUNDING) {
+                break;
+            }
+            let (mask, way) = (sieve.mask::<W>(), series.rows.way_back());
+            for c in 0..f {
+                let change = way[c].0.mul(mask);
+                move_by(&mut high[f + c], &mut low[f + c], change);
+                rate[c] = InLanes(W::of(&high[f + c].0));
+            }
+        }
+        for lane in 0..LANES {
+            is_landed[lane] &= sieve.last[lane] <= LEFT;
+        }
+        is_landed
+    }
+}
+
+/// A unit vector turned back by an angle up to [`FAR`].
+#[inline(always)]
+fn turned_back<W: EightLanes>(z: Complex<InLanes<W>>, turn: W) -> Complex<InLanes<W>> {
+    let square = turn.mul(turn);
+    let sine = square.mul(turn).neg_mul_add(W::splat(1.0 / 6.0), turn);
+    let less = square.mul(square.neg_mul_add(W::splat(1.0 / 24.0), W::splat(0.5)));
+    let (x, y) = (z.re.0, z.im.0);
+    let re = x.neg_mul_add(less, sine.mul_add(y, x));
+    let im = y.neg_mul_add(less, sine.neg_mul_add(x, y));
+    Complex::new(InLanes(re), InLanes(im))
+}
+
+/// Takes a change off a number in two terms.
+#[inline(always)]
+fn move_by<W: EightLanes>(high: &mut Octet, low: &mut Octet, change: W) {
+    let (from, rest) = (W::of(&high.0), W::of(&low.0).sub(change));
+    let sum = from.add(rest);
+    let part = sum.sub(from);
+    let left = from.sub(sum.sub(part)).add(rest.sub(part));
+    (*high, *low) = (Octet(sum.array()), Octet(left.array()));
+}
+
+impl<W: EightLanes> Series<InLanes<W>> {
+    /// The factors of M_0 and of the rows at unit vectors that are there already, and nothing more.
+    #[inline(always)]
+    fn factor_for_rows(&mut self, terms: &Terms<f64>) {
+        self.factor_mass::<0>(terms);
+        let n = self.elements;
+        self.rows.factor(&self.z[..n], &self.reduced, &self.pivot);
+    }
+}
