@@ -118,8 +118,10 @@ impl CompileError {
     /// one alone.
     pub fn part(&self) -> Option<(&'static [&'static str], &str)> {
         match self {
-            Self::Redundant(name) => Some((CONSTRAINTS, name)),
-            Self::Impossible { row, .. } | Self::ImpossibleRates { row, .. } => Some((CONSTRAINTS, row)),
+            // Rows of a hinge are called `A.x` and `A.y`.
+            Self::Redundant(row) | Self::Impossible { row, .. } | Self::ImpossibleRates { row, .. } => {
+                Some((CONSTRAINTS, row.split_once('.').map_or(row.as_str(), |(part, _)| part)))
+            }
             Self::Massless(bar) => Some((&["bars"], bar)),
             Self::SpringWithoutLength(spring) | Self::NotAlone { spring, .. } => Some((&["springs"], spring)),
             Self::FrictionOnCurve(wall) | Self::BehindWall { wall, .. } => Some((&["walls"], wall)),
