@@ -2,7 +2,7 @@
 
 use driftless::arithmetic::{DoubleDouble, Scalar};
 use driftless::dynamics::{Mechanism, Motion};
-use driftless::run::modes::{Equilibrium, Modes, ModesError, Stability, modes};
+use driftless::run::modes::{Equilibrium, Modes, ModesError, Stability, modes, periodic};
 use driftless::run::{Limits, MethodId, Plan, Request, Run, Running};
 use driftless::scene::{Scene, parse_scene, read_scene};
 use std::f64::consts::{PI, TAU};
@@ -300,4 +300,101 @@ fn what_has_no_equilibrium_says_why() {
     let cart = of("cart_pole").expect("a search");
     assert_eq!(cart.equilibria.len(), 2);
     assert!(cart.equilibria.iter().all(|one| one.is_family));
+}
+
+/// Where a torsion spring counts turns, positions a turn apart are two: all roots of the balance of torques are
+/// found, each as it is.
+#[test]
+fn turns_of_a_torsion_spring_are_kept() {
+    let [k, free, moment] = [1.2, 0.4, 9.81 * 0.5];
+    let scene = parsed(
+        r#"{"name": "wound", "gravity": [0, -9.81],
+            "bars": [{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.0833333333333333, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "torsion_springs": [{"name": "coil", "body": "bar", "stiffness": 1.2, "free_angle": 0.4}],
+            "start": {"bar": {"phi": 0, "omega": 0}}, "until": 1, "every": 0.1}"#,
+    );
+    let torque = |phi: f64| moment * phi.cos() + k * (phi - free);
+    let root = |mut a: f64, mut b: f64| {
+        for _ in 0..60 {
+            let middle = 0.5 * (a + b);
+            if torque(a) * torque(middle) > 0.0 { a = middle } else { b = middle }
+        }
+        a
+    };
+    let ends = (-500..500).map(|i| [0.01 * f64::from(i), 0.01 * f64::from(i + 1)]);
+    let roots: Vec<f64> =
+        ends.filter(|[a, b]| torque(*a) * torque(*b) < 0.0).map(|[a, b]| root(a, b)).collect();
+    assert!(roots.len() == 3 && roots[2] > PI, "{roots:?}");
+    let mut found: Vec<_> = found(&scene, 64).equilibria;
+    found.sort_by(|a, b| a.phi[0].total_cmp(&b.phi[0]));
+    assert_eq!(found.len(), roots.len(), "{found:?}");
+    for (one, root) in found.iter().zip(roots) {
+        assert!((one.phi[0] - root).abs() < 1e-12, "{one:?} {root}");
+        let square = (k - moment * root.sin()) / (0.0833333333333333 + 0.25);
+        assert_eq!(one.stability, if square > 0.0 { Stability::Stable } else { Stability::Unstable });
+        assert!((one.modes[0].frequency - square.abs().sqrt()).abs() < 1e-10 * square.abs().sqrt());
+    }
+}
+
+/// A spring with a free length that has none pushes in no direction: the top of its cone is no equilibrium.
+#[test]
+fn no_equilibrium_is_where_a_spring_has_no_length() {
+    let scene = parsed(
+        r#"{"name": "apex", "gravity": [0, -3],
+            "bars": [{"name": "a", "mass": 1.073, "centre": [0.289, 0], "inertia": 0.056, "length": 0.579},
+                     {"name": "b", "mass": 1.788, "centre": [0.455, 0], "inertia": 0.081, "length": 0.909}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                       {"name": "B", "between": [{"body": "a", "point": [0.579, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "springs": [{"name": "s", "between": [{"body": "ground", "point": [0.437, 0.797]}, {"body": "b", "point": [0.909, 0]}],
+                         "stiffness": 7.252, "free_length": 0.271, "damping": 0.326}],
+            "start": {"a": {"phi": -1.49, "omega": 0}, "b": {"phi": 1.536, "omega": 0}}, "until": 1, "every": 0.1}"#,
+    );
+    let potential = |a: f64, b: f64| {
+        let tip = [0.579 * a.cos() + 0.909 * b.cos(), 0.579 * a.sin() + 0.909 * b.sin()];
+        let stretch = (tip[0] - 0.437).hypot(tip[1] - 0.797) - 0.271;
+        let height = [0.289 * a.sin(), 0.579 * a.sin() + 0.455 * b.sin()];
+        3.0 * (1.073 * height[0] + 1.788 * height[1]) + 0.5 * 7.252 * stretch * stretch
+    };
+    let found = found(&scene, 64).equilibria;
+    assert!(found.len() >= 4, "{found:?}");
+    for one in found {
+        let [a, b, here] = [one.phi[0], one.phi[1], potential(one.phi[0], one.phi[1])];
+        // On either side: at the top of a cone differences over both are none.
+        for h in [1e-6, -1e-6] {
+            let slope = [potential(a + h, b) - here, potential(a, b + h) - here];
+            assert!(slope.iter().all(|slope| (slope / h).abs() < 1e-3), "{slope:?} {one:?}");
+        }
+    }
+}
+
+/// A drive that winds a spring up does not do the same in every period; one that takes along what it is coiled
+/// to does.
+#[test]
+fn a_wound_spring_is_not_periodic() {
+    let scene = |spring: &str| {
+        parsed(&format!(
+            r#"{{"name": "winch", "gravity": [0, -9.81],
+                "bars": [{{"name": "a", "mass": 1, "centre": [0.2, 0], "inertia": 0.1, "length": 0.4}},
+                         {{"name": "b", "mass": 1, "centre": [0.2, 0], "inertia": 0.1, "length": 0.4}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                           {{"name": "B", "between": [{{"body": "ground", "point": [1, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+                "torsion_springs": [{spring}],
+                "motors": [{{"name": "m", "body": "a", "law": {{"start": 0, "rate": 4}}}}],
+                "start": {{"b": {{"phi": -1.5, "omega": 0}}}}, "until": 1, "every": 0.1}}"#
+        ))
+    };
+    let found =
+        |scene: &Scene| periodic(scene, &Arc::new(Mechanism::new(scene).expect("equations")), 2, None);
+    let coil =
+        |ends: &str| format!(r#"{{"name": "coil", {ends}, "stiffness": 30, "free_angle": 0, "damping": 1}}"#);
+    match found(&scene(&coil(r#""body": "a""#))) {
+        Err(ModesError::NotPeriodic { what, .. }) => assert!(what.contains('m'), "{what}"),
+        other => panic!("{:?}", other.map(|found| found.motions)),
+    }
+    let cases = [(r#""body": "b""#, [1, 0]), (r#""body": "a", "relative_to": "b""#, [1, 1])];
+    for (ends, turns) in cases {
+        let found = found(&scene(&coil(ends))).expect("a motor that turns");
+        assert!(found.motions.iter().any(|motion| motion.turns == turns), "{:?}", found.motions);
+    }
 }

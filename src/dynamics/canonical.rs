@@ -317,11 +317,7 @@ impl<const N: usize, const WORK: bool> Form for Canonical<N, WORK> {
             scratch.drive_at(&self.mechanism, motion.time);
             unknowns.push(dot(&scratch.momentum, &scratch.drive_rate) - motion.work);
         }
-        let mut state = partition.state(motion, &unknowns);
-        if self.mechanism.is_winding() {
-            state.unwind();
-        }
-        state
+        self.mechanism.state(motion.time, &unknowns, &partition.turns(motion))
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {

@@ -7,6 +7,7 @@ pub mod exact;
 mod parts;
 mod properties;
 mod switched;
+mod turns;
 
 use super::Motion;
 use super::assembly::Assembly;
@@ -32,6 +33,7 @@ pub(super) use parts::along_wall;
 pub(super) use parts::travel_along;
 use parts::{actions, follows, give_aims, given_angles, joints, kept_angles};
 use std::sync::Arc;
+pub(crate) use turns::WholeTurns;
 
 /// The largest number of coordinates for which the matrices of the tree are made; they hold n² numbers.
 pub const DENSE_LIMIT: usize = 2000;

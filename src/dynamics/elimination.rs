@@ -259,11 +259,7 @@ impl<const N: usize> Form for Elimination<N> {
             partition.independent.iter().map(|&body| motion.phi[body]).collect();
         unknowns.extend(partition.coordinate_rates(motion));
         unknowns.push(motion.work);
-        let mut state = partition.state(motion, &unknowns);
-        if self.mechanism.is_winding() {
-            state.unwind();
-        }
-        state
+        self.mechanism.state(motion.time, &unknowns, &partition.turns(motion))
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {

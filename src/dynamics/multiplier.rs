@@ -187,15 +187,7 @@ impl<const N: usize, const WORK: bool> Form for Multiplier<N, WORK> {
                 unknowns.push(DoubleDouble::from(motion.friction));
             }
         }
-        let mut state = State::new(&unknowns, self.mechanism.bodies.len());
-        state.time = motion.time;
-        for (turns, before) in state.turns.iter_mut().zip(&motion.turns) {
-            *turns = turns.saturating_add(*before);
-        }
-        if self.mechanism.is_winding() {
-            state.unwind();
-        }
-        state
+        self.mechanism.state(motion.time, &unknowns, &motion.turns[..self.mechanism.bodies.len()])
     }
 
     fn read(&mut self, state: &State, motion: &mut Motion) {

@@ -230,14 +230,9 @@ impl CoordinatePartition {
         self.bodies.iter().flat_map(|dependent_angle| &dependent_angle.laws).all(|(_, law)| law.is_steady())
     }
 
-    /// A state whose first unknowns are the coordinates of a motion.
-    pub(super) fn state(&self, motion: &Motion, unknowns: &[DoubleDouble]) -> State {
-        let mut state = State::new(unknowns, self.turning());
-        state.time = motion.time;
-        for (turns, &body) in state.turns.iter_mut().zip(&self.independent) {
-            *turns = turns.saturating_add(motion.turns[body]);
-        }
-        state
+    /// Whole turns taken off each angle among the coordinates.
+    pub(super) fn turns(&self, motion: &Motion) -> Vec<i64> {
+        self.independent.iter().take(self.turning()).map(|&body| motion.turns[body]).collect()
     }
 
     /// Angles and turns of all bodies, and the driven share of their rates, in double-double.

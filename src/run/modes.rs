@@ -31,10 +31,15 @@ const KEPT: f64 = 1e-11;
 const ITERATIONS: usize = 200;
 /// Starts beside the scene's that slide down before Newton's method.
 const RELAXED: usize = 8;
+/// Positions at least from which it is known how large accelerations are.
+const FEWEST: usize = 16;
 /// Longest step \[rad, or units of length\].
 const LONGEST: f64 = 0.5;
 /// What is left of the accelerations over the largest there are counts as none.
 const STILL: f64 = 1e-11;
+/// What is left of the accelerations over the largest at the starts: beside a spring with a free length that has
+/// lost its length a slope is so large that any accelerations are small against it.
+const BALANCED: f64 = 1e-7;
 /// Two equilibria that differ by less are the same \[rad, or units of length\].
 const DISTINCT: f64 = 1e-6;
 /// Real parts below this share of the largest eigenvalue are rounding.
@@ -75,7 +80,7 @@ pub struct Mode {
 /// A place where a mechanism stays at rest.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Equilibrium {
-    /// Angles in (-π, π] \[rad\], then translational coordinates \[m\].
+    /// Angles in (-π, π] but where turns matter \[rad\], then translational coordinates \[m\].
     pub phi: Vec<f64>,
     /// Potential energy \[J\].
     pub potential: f64,
@@ -167,8 +172,10 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
         }
     }
     let start = mechanism.start(scene);
-    let mut search = Search::new(mechanism);
     let first: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+    let others = mechanism.other_assemblies(scene, starts);
+    let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST) } else { Vec::new() };
+    let mut search = Search::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
     if search.local.depends_on_time(&first) {
         return Err(ModesError::Forced);
     }
@@ -176,7 +183,6 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     if freedom == 0 {
         return Err(ModesError::Rigid);
     }
-    let others = mechanism.other_assemblies(scene, starts);
     let mut equilibria: Vec<Equilibrium> = Vec::new();
     let mut count = [0, 0];
     // Stable ones are few among many: some starts slide down first, the scene's before all.

@@ -1,10 +1,12 @@
 //! What a mechanism has and has not, for those that choose forms and methods.
 
 use super::{Body, Joint, Mechanism};
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::force::UserForce;
 use crate::dynamics::forest::{BodyOrigin, Hang};
 use crate::dynamics::point::Point;
+use crate::dynamics::{State, Time};
 
 impl Mechanism {
     /// Number of coordinates: the bodies' angles, and two for every origin that moves freely.
@@ -85,7 +87,7 @@ impl Mechanism {
     }
 
     /// Those aims.
-    fn aims(&self) -> impl Iterator<Item = &Aim> {
+    pub(super) fn aims(&self) -> impl Iterator<Item = &Aim> {
         let walls = self.contacts.iter().map(|contact| &contact.row);
         self.constraints.iter().chain(walls).filter_map(|row| row.aim.as_deref())
     }
@@ -163,7 +165,21 @@ impl Mechanism {
     pub fn is_winding(&self) -> bool {
         !self.torsions.is_empty()
             || self.forces.iter().any(UserForce::counts_turns)
-            || self.aims().any(|aim| aim.counts_turns)
+            || self.aims().any(|aim| aim.counted_angles().next().is_some())
+    }
+
+    /// The state of these unknowns, of which the first are angles that lack whole `turns`: a winding mechanism
+    /// gets them back.
+    pub(crate) fn state(&self, time: Time, unknowns: &[DoubleDouble], turns: &[i64]) -> State {
+        let mut state = State::new(unknowns, turns.len());
+        state.time = time;
+        for (taken, before) in state.turns.iter_mut().zip(turns) {
+            *taken = taken.saturating_add(*before);
+        }
+        if self.is_winding() {
+            state.unwind();
+        }
+        state
     }
 
     /// True where row number `row` is that of a motor, on an angle or on a slider; not where it locks an

@@ -45,8 +45,6 @@ pub struct Aim {
     pub angles: Vec<usize>,
     /// True where it depends on time.
     pub is_timed: bool,
-    /// True where whole turns matter.
-    pub counts_turns: bool,
 }
 
 impl Aim {
@@ -80,10 +78,14 @@ impl Aim {
             slopes: coordinates.into_iter().zip(slots[3..].iter().copied()).collect(),
             angles: angles.to_vec(),
             is_timed,
-            counts_turns: inputs.iter().any(|input| matches!(input, Input::Angle(_))),
             tape,
             inputs,
         })
+    }
+
+    /// The bodies whose whole turns matter to it.
+    pub(crate) fn counted_angles(&self) -> impl Iterator<Item = usize> {
+        self.inputs.iter().filter_map(|input| if let Input::Angle(k) = *input { Some(k) } else { None })
     }
 
     /// The coordinates it depends on.

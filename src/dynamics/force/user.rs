@@ -140,14 +140,18 @@ impl<C: Real> UserForce<C> {
         self.parts[1].power.is_some()
     }
 
-    /// True where a part asks for an input of this kind.
-    fn asks_for(&self, parts: &[Part], kind: impl Fn(Input) -> bool) -> bool {
-        parts.iter().flat_map(|part| part.tape.inputs()).any(|number| kind(self.inputs[number as usize]))
-    }
-
     /// True where whole turns matter to it.
     pub fn counts_turns(&self) -> bool {
-        self.asks_for(&self.parts, |input| matches!(input, Input::Angle(_)))
+        self.counted_angles().next().is_some()
+    }
+
+    /// The bodies whose whole turns matter to it.
+    pub(crate) fn counted_angles(&self) -> impl Iterator<Item = usize> {
+        let numbers = self.parts.iter().flat_map(|part| part.tape.inputs());
+        numbers.filter_map(|number| match self.inputs[number as usize] {
+            Input::Angle(k) => Some(k),
+            _ => None,
+        })
     }
 
     /// True where what is applied depends on rates, as drag does.

@@ -85,11 +85,7 @@ impl Walk {
         let (n, bodies) = (mechanism.coordinates(), mechanism.bodies.len());
         let mut unknowns: Vec<_> = start.phi.iter().chain(&start.omega).copied().collect();
         unknowns.resize(2 * n + 3, Time::default());
-        let mut state = State::new(&unknowns, bodies);
-        state.turns.iter_mut().zip(&start.turns).for_each(|(own, given)| *own += given);
-        if mechanism.is_winding() {
-            state.unwind();
-        }
+        let state = mechanism.state(Time::default(), &unknowns, &start.turns[..bodies]);
         let mut walk = Self {
             mechanism: Arc::clone(mechanism),
             kernel: Kernel::new(mechanism),

@@ -2,11 +2,12 @@
 
 use super::{DEPENDENT, DISTINCT, KEPT};
 use crate::arithmetic::Scalar;
+use crate::dynamics::compile::WholeTurns;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::{Mechanism, State, Time};
+use crate::dynamics::{Mechanism, Time};
 use crate::stabilization::projection::{project, unit as row_unit};
 use nalgebra::{DMatrix, DVector};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Scratch space for positions on the constraints.
 pub(in crate::run) struct Local<'a> {
@@ -14,6 +15,8 @@ pub(in crate::run) struct Local<'a> {
     pub(super) kernel: Kernel<f64>,
     /// Units of the coordinates \[rad, m\].
     pub(in crate::run) unit: Vec<f64>,
+    /// Whole turns that nothing feels.
+    pub(super) turns: WholeTurns,
     /// The least singular value of the rows that is not zero over the largest, where the last tangent was
     /// taken.
     pub(super) conditioning: f64,
@@ -27,6 +30,7 @@ impl<'a> Local<'a> {
             mechanism,
             kernel: Kernel::new(mechanism),
             unit: (0..mechanism.coordinates()).map(unit).collect(),
+            turns: WholeTurns::of(mechanism),
             conditioning: 1.0,
         }
     }
@@ -81,10 +85,8 @@ impl<'a> Local<'a> {
         }
         let mut unknowns: Vec<Time> = phi.iter().chain(omega).map(|&x| Time::of(x)).collect();
         unknowns.resize(2 * n + 3, Time::default());
-        let mut state = State::new(&unknowns, self.mechanism.bodies.len());
-        if self.mechanism.is_winding() {
-            state.unwind();
-        }
+        let turns = vec![0; self.mechanism.bodies.len()];
+        let mut state = self.mechanism.state(Time::default(), &unknowns, &turns);
         project(self.mechanism, &mut self.kernel, &mut state, KEPT).ok()?;
         let turned = |k: usize| state.turns.get(k).map_or(0.0, |&turns| TAU * turns as f64);
         let phi = (0..n).map(|k| state.unknown(k).hi + turned(k)).collect();
@@ -96,26 +98,10 @@ impl<'a> Local<'a> {
         (tangent * y).iter().zip(phi).zip(&self.unit).map(|((y, phi), unit)| phi + y * unit).collect()
     }
 
-    /// True where two positions are the same but for whole turns.
+    /// True where two positions are the same but for whole turns that nothing feels.
     pub(in crate::run) fn is_same(&self, a: &[f64], b: &[f64]) -> bool {
-        let bodies = self.mechanism.bodies.len();
-        a.iter().zip(b).zip(&self.unit).enumerate().all(|(k, ((a, b), unit))| {
-            let apart = (a - b) / unit;
-            let apart = if k < bodies { apart - TAU * (apart / TAU).round() } else { apart };
-            apart.abs() < DISTINCT
-        })
-    }
-
-    /// Coordinates with their angles in (-π, π].
-    pub(in crate::run) fn wrapped(&self, phi: &[f64]) -> Vec<f64> {
-        let wrapped = |(k, phi): (usize, &f64)| {
-            if k >= self.mechanism.bodies.len() {
-                return *phi;
-            }
-            let angle = phi - TAU * (phi / TAU).round();
-            // Upside down is π, on whichever side rounding has it.
-            if angle < -PI + 1e-9 { angle + TAU } else { angle }
-        };
-        phi.iter().enumerate().map(wrapped).collect()
+        let mut apart: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+        self.turns.take_off(&mut apart);
+        apart.iter().zip(&self.unit).all(|(apart, unit)| (apart / unit).abs() < DISTINCT)
     }
 }

@@ -54,7 +54,7 @@ const SETTLING: usize = 50;
 /// A motion that repeats itself.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PeriodicMotion {
-    /// Coordinates at t = 0, angles in (-π, π] \[rad, m\].
+    /// Coordinates at t = 0, angles in (-π, π] but where turns matter \[rad, m\].
     pub phi: Vec<f64>,
     /// Rates there \[rad/s, m/s\].
     pub omega: Vec<f64>,
@@ -224,7 +224,7 @@ fn check_period(
             let [now, then] = [share * period, (1.0 + share) * period].map(Time::of);
             let [rate, later] = [now, then].map(|t| law.rates::<f64>(t).0);
             let travel = (angle(law, then) - angle(law, now)).hi;
-            let turns = if row.is_angle() { (travel / TAU).round() } else { 0.0 };
+            let turns = if local.turns.is_of_row(&row.measure) { (travel / TAU).round() } else { 0.0 };
             let scale = rate.abs().max(later.abs()).max(TAU / period);
             if (rate - later).abs() > SAME * scale || (travel - turns * TAU).abs() > SAME * scale * period {
                 return Err(differs(format!("`{}`", row.name())));
@@ -304,13 +304,10 @@ impl Shooting<'_> {
 
     /// Differences of two states without whole turns, in the units of coordinates and rates.
     fn apart(&self, from: &[Vec<f64>; 2], to: &[Vec<f64>; 2]) -> [DVector<f64>; 2] {
-        let bodies = self.whole.bodies.len();
+        let mut phi: Vec<f64> = to[0].iter().zip(&from[0]).map(|(to, from)| to - from).collect();
+        self.local.turns.take_off(&mut phi);
         let n = self.local.unit.len();
-        let phi = DVector::from_fn(n, |k, _| {
-            let apart = to[0][k] - from[0][k];
-            let turns = if k < bodies { (apart / TAU).round() } else { 0.0 };
-            (apart - TAU * turns) / self.local.unit[k]
-        });
+        let phi = DVector::from_fn(n, |k, _| phi[k] / self.local.unit[k]);
         let omega = |k: usize| (to[1][k] - from[1][k]) / (self.local.unit[k] * self.unit_rate);
         [phi, DVector::from_fn(n, |k, _| omega(k))]
     }
@@ -410,7 +407,7 @@ impl Shooting<'_> {
             Stability::Stable
         };
         Some(PeriodicMotion {
-            phi: self.local.wrapped(&base.state[0]),
+            phi: self.local.turns.principal(&base.state[0]),
             turns: (base.state[0].iter().zip(&end[0]).take(self.whole.bodies.len()))
                 .map(|(from, to)| ((to - from) / TAU).round() as i64)
                 .collect(),

@@ -1,7 +1,7 @@
 //! The search for equilibria, and the linearization about them.
 
 use super::local::Local;
-use super::{CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability};
+use super::{BALANCED, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability};
 use crate::dynamics::jacobian::Jacobian;
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::{Mechanism, Time};
@@ -11,11 +11,15 @@ use nalgebra::{Complex, DMatrix, DVector};
 pub(super) struct Search<'a> {
     pub(super) local: Local<'a>,
     jacobian: Jacobian,
+    /// The largest acceleration at rest where the search starts.
+    usual: f64,
 }
 
 impl<'a> Search<'a> {
-    pub(super) fn new(mechanism: &'a Mechanism) -> Self {
-        Self { local: Local::new(mechanism), jacobian: Jacobian::new(mechanism) }
+    pub(super) fn new<'b>(mechanism: &'a Mechanism, starts: impl Iterator<Item = &'b Vec<f64>>) -> Self {
+        let mut local = Local::new(mechanism);
+        let usual = starts.map(|phi| local.pull(phi, 0.0).amax()).fold(0.0, f64::max);
+        Self { local, jacobian: Jacobian::new(mechanism), usual }
     }
 
     /// T' A_q T and T' A_w T.
@@ -70,7 +74,8 @@ impl<'a> Search<'a> {
             if left.amax() <= STILL * scale.max(f64::MIN_POSITIVE) {
                 // Once more: Newton's method squares what is left.
                 let last = slope.lu().solve(&-&left).map(|y| self.local.moved(&phi, &tangent, &y));
-                return last.and_then(|there| self.local.projected(&there)).or(Some(phi));
+                let last = last.and_then(|there| self.local.projected(&there)).unwrap_or(phi);
+                return self.is_balanced(&last).then_some(last);
             }
             // Levenberg and Marquardt: Newton's step, shortened where it does not help.
             let squares = slope.transpose() * &slope;
@@ -100,12 +105,18 @@ impl<'a> Search<'a> {
                 damping = f64::max(10.0 * damping, 1e-6);
             }
             let Some(taken) = step else {
-                return (left.amax() <= 100.0 * STILL * scale).then_some(phi);
+                return (left.amax() <= 100.0 * STILL * scale && self.is_balanced(&phi)).then_some(phi);
             };
             (phi, tangent, left) = taken;
             damping = if damping < 1e-9 { 0.0 } else { 0.1 * damping };
         }
         None
+    }
+
+    /// True where what is left of the accelerations is small beside others too.
+    fn is_balanced(&mut self, phi: &[f64]) -> bool {
+        let left = self.local.tangent(phi).transpose() * self.local.pull(phi, 0.0);
+        left.amax() <= BALANCED * self.usual
     }
 
     /// Stability and modes of an equilibrium.
@@ -137,9 +148,9 @@ impl<'a> Search<'a> {
         let modes = listed.into_iter().map(|value| {
             let frequency = value.norm();
             Mode {
-                eigenvalue: [value.re, value.im],
+                eigenvalue: [value.re + 0.0, value.im + 0.0],
                 frequency,
-                damping_ratio: if frequency > 0.0 { -value.re / frequency } else { 0.0 },
+                damping_ratio: if frequency > 0.0 { 0.0 - value.re / frequency } else { 0.0 },
                 shape: self.shape(value, &stiffness, &damping, &tangent),
             }
         });
@@ -147,7 +158,7 @@ impl<'a> Search<'a> {
         let potential = self.potential(&phi);
         Equilibrium {
             potential,
-            phi: self.local.wrapped(&phi),
+            phi: self.local.turns.principal(&phi),
             stability,
             modes,
             from_start,

@@ -1,0 +1,82 @@
+//! Of which bodies whole turns matter, and between which.
+
+use super::Mechanism;
+use crate::dynamics::constraint::Measure;
+use crate::dynamics::force::UserForce;
+use std::f64::consts::{PI, TAU};
+
+/// For every body the first of those with which it may make whole turns and all is as before; `None` where a
+/// turn of it is felt: by a torsion spring on the ground, by a formula with its angle.
+#[derive(Clone, Debug)]
+pub(crate) struct WholeTurns {
+    with: Vec<Option<usize>>,
+}
+
+impl WholeTurns {
+    /// Those of a mechanism: springs hold bodies to one another, formulas to the ground.
+    pub fn of(mechanism: &Mechanism) -> Self {
+        let ground = mechanism.bodies.len();
+        let mut group: Vec<usize> = (0..=ground).collect();
+        let mut join = |a: usize, b: usize| {
+            let [from, to] = [group[a], group[b]];
+            group.iter_mut().filter(|one| **one == from).for_each(|one| *one = to);
+        };
+        for spring in mechanism.torsions.iter().filter(|spring| spring.stiffness != 0.0) {
+            join(spring.body, spring.base.unwrap_or(ground));
+        }
+        let aims = mechanism.aims().flat_map(|aim| aim.counted_angles());
+        for body in mechanism.forces.iter().flat_map(UserForce::counted_angles).chain(aims) {
+            join(body, ground);
+        }
+        let first = |k: usize| group.iter().position(|one| *one == group[k]);
+        let with = (0..ground).map(|k| if group[k] == group[ground] { None } else { first(k) }).collect();
+        Self { with }
+    }
+
+    /// Takes whole turns off a difference of two positions: those that leave least of it.
+    pub fn take_off(&self, apart: &mut [f64]) {
+        let turns: Vec<f64> =
+            self.with.iter().map(|with| with.map_or(0.0, |k| (apart[k] / TAU).round())).collect();
+        apart.iter_mut().zip(turns).for_each(|(apart, turns)| *apart -= TAU * turns);
+    }
+
+    /// A position with principal values, in (-π, π], of the angles that whole turns leave as they are: upside
+    /// down is π, on whichever side rounding has it.
+    pub fn principal(&self, phi: &[f64]) -> Vec<f64> {
+        let mut principal = phi.to_vec();
+        for (k, with) in self.with.iter().enumerate() {
+            let Some(first) = *with else { continue };
+            let turns = (phi[first] / TAU).round();
+            principal[k] -= TAU * turns;
+            if phi[first] - TAU * turns < 1e-9 - PI {
+                principal[k] += TAU;
+            }
+        }
+        principal
+    }
+
+    /// True where the angle a row measures may change by a whole turn.
+    pub fn is_of_row(&self, measure: &Measure) -> bool {
+        let Measure::Angle { body, base } = *measure else { return false };
+        self.with[body] != base.and_then(|base| self.with[base])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A chain of four: a spring to the ground, one between the next two, and a last one that is free.
+    #[test]
+    fn bodies_turn_with_those_that_feel_it() {
+        let turns = WholeTurns { with: vec![None, Some(1), Some(1), Some(3)] };
+        let mut apart = [9.0, 1.0 + TAU, -9.0, 4.0 * TAU, 8.0];
+        turns.take_off(&mut apart);
+        assert_eq!(apart, [9.0, 1.0, -9.0 - TAU, 0.0, 8.0]);
+        let upside_down = turns.principal(&[9.0, 0.5, 9.0, -PI]);
+        assert_eq!(upside_down, [9.0, 0.5, 9.0, PI]);
+        let measures = |body, base| turns.is_of_row(&Measure::Angle { body, base });
+        assert!(!measures(0, None) && !measures(2, Some(1)));
+        assert!(measures(1, None) && measures(3, Some(2)) && measures(2, Some(0)));
+    }
+}
