@@ -32,7 +32,7 @@ fn by(method: MethodId, until: f64, every: f64, rtol: f64) -> Request {
 }
 
 /// A run, and all its samples.
-fn watched(scene: &Scene, request: &Request) -> (Outcome, Vec<Sample>) {
+pub fn watched(scene: &Scene, request: &Request) -> (Outcome, Vec<Sample>) {
     let mechanism = compile(scene);
     let plan = Plan::new(scene, &mechanism, request).expect("a sensible pairing");
     let start = mechanism.start(scene);

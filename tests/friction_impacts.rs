@@ -1,8 +1,9 @@
 //! Impacts at several walls at once, with dry friction and without: against closed forms.
 
+use super::contact::watched;
 use super::formulas::{adaptive, run, scene};
 use driftless::Mechanism;
-use driftless::run::{MethodId, Outcome};
+use driftless::run::{MethodId, Outcome, Sample};
 
 const G: f64 = 9.81;
 
@@ -286,4 +287,43 @@ fn one_wall_alone_is_met_as_by_rouths_method() {
         if single.omega[1].abs() < 1e-9 { stuck += 1 } else { slid += 1 }
     }
     assert!(slid > 30 && stuck > 30, "{slid} slide on, {stuck} stick");
+}
+
+/// A bar on a hinge comes to rest on a rough wall, along which it cannot slide: the speed with which it came moves it
+/// along, and is gone. A bar hung on it swings about a fixed pivot from then on.
+#[test]
+fn a_hinged_bar_comes_to_rest_on_a_rough_wall() {
+    let scene = scene(
+        r#"{"name": "rest", "gravity": [0, -9.81], "bars": [
+            {"name": "a", "mass": 0.7, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6},
+            {"name": "b", "mass": 0.6, "centre": [0.2, 0.1], "inertia": 0.014, "length": 0.5}],
+            "hinges": [
+            {"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "a", "point": [0.4, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "walls": [{"name": "floor", "body": "a", "point": [0.6, 0.02], "restitution": 0.4, "friction": {"kinetic": 0.3},
+                       "line": {"through": [0, -0.25], "normal": [0.1, 1]}}],
+            "start": {"a": {"phi": 0.1, "omega": 0}, "b": {"phi": -1, "omega": -1.5}},
+            "until": 0.9, "every": 0.1}"#,
+    );
+    let energy = |sample: &Sample| {
+        let height = 0.2 * sample.phi[1].sin() + 0.1 * sample.phi[1].cos();
+        0.5 * (0.014 + 0.6 * 0.05) * sample.omega[1].powi(2) + 0.6 * G * height
+    };
+    let mut ends: Vec<f64> = Vec::new();
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        for tolerance in [1e-9, 1e-11, 1e-13] {
+            let (outcome, samples) = watched(&scene, &adaptive(method, tolerance));
+            assert!(outcome.stop.is_none(), "{method} {tolerance:e}: {:?}", outcome.stop);
+            let resting: Vec<&Sample> = samples.iter().filter(|sample| sample.t > 0.45).collect();
+            for sample in &resting {
+                let left = [sample.omega[0], energy(sample) - energy(resting[0])];
+                assert!(
+                    left.iter().all(|left| left.abs() < tolerance.max(1e-12)),
+                    "{method} {tolerance:e}: {left:?}"
+                );
+            }
+            ends.push(resting[4].phi[1]);
+        }
+    }
+    assert!(ends.iter().all(|end| (end - ends[2]).abs() < 2e-9), "{ends:?}");
 }

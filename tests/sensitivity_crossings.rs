@@ -227,3 +227,31 @@ fn derivatives_through_random_crossings_agree_with_differences_of_references() {
     println!("{count} derivatives, {outside} outside; refused: {refused:?}");
     assert!(outside * 50 <= count, "{outside} of {count} outside");
 }
+
+/// A bar that comes to rest on a wall with the last of its rebounds left out, and a bar hung on it that feels how
+/// the speed left is taken off.
+#[test]
+fn coming_to_rest_is_derived_with_the_speed_it_takes_off() {
+    let text = |friction: &str| {
+        format!(
+            r#"{{"name": "rest", "gravity": [0, -9.81], "bars": [
+                {{"name": "a", "mass": 0.7, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6}},
+                {{"name": "b", "mass": 0.6, "centre": [0.2, 0.1], "inertia": 0.014, "length": 0.5}}],
+                "hinges": [
+                {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                {{"name": "B", "between": [{{"body": "a", "point": [0.4, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+                "walls": [{{"name": "floor", "body": "a", "point": [0.6, 0.02], "restitution": 0.4{friction},
+                            "line": {{"through": [0, -0.25], "normal": [0.1, 1]}}}}],
+                "start": {{"a": {{"phi": 0.1, "omega": 0}}, "b": {{"phi": -1, "omega": -1.5}}}},
+                "until": 1.2, "every": 0.1}}"#
+        )
+    };
+    for friction in ["", r#", "friction": {"kinetic": 0.3}"#] {
+        let template = template(&text(friction));
+        let found = compared(&template, &["bars.b.mass", "a.phi"], 0.9).expect("derivatives");
+        for (path, off, doubt) in found {
+            println!("{path}: {off:.1e}, known to {doubt:.1e}");
+            assert!(off < 2e-8 && doubt < 1e-8, "{friction} {path}: {off:e} {doubt:e}");
+        }
+    }
+}

@@ -8,9 +8,10 @@
 //! ```
 //!
 //! g is the gap of a wall, the event function of a switch, or that of a place with friction: the relative
-//! velocity of what slides, `(mu0 N)² - tau²` of what sticks.  I is the law of impact, or what a joint that
-//! closes does to the rates.  p are numbers that the mechanism depends on; neighbouring mechanisms tell what
-//! they do.  Derivatives along a column are central differences of the fourth order.
+//! velocity of what slides, `(mu0 N)² - tau²` of what sticks.  I is the law of impact, what a joint that closes
+//! does to the rates, or what is taken off them where a point comes to rest on a wall.  p are numbers that the
+//! mechanism depends on; neighbouring mechanisms tell what they do.  Derivatives along a column are central
+//! differences of the fourth order.
 //!
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
 //! Solitons & Fractals 5 (1995).
@@ -24,7 +25,8 @@ use super::contact::{Jump, Switch};
 use super::event::SwitchFunction;
 use super::friction::FrictionWatch;
 use super::latch::plastic;
-use crate::dynamics::friction::Mode;
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::friction::{Mode, Normal};
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -179,6 +181,10 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
                     follow(passage, k, jump, column)?;
                     close_at(jump, late, column)?;
                 }
+            }
+            if is_hold(jump) && jump.before.omega != jump.after.omega {
+                follow(passage, k, jump, column)?;
+                hold_at(mechanism, jump, late, column)?;
             }
         }
         shift(column.entries, -late, &there);
@@ -349,6 +355,28 @@ fn close_at(jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
         |of: &Arc<Mechanism>, motion: &Motion| plastic(&striking(of, held), motion).map(|(rates, ..)| rates);
     change(&closing, &Side::resting(&jump.before), [late, f64::INFINITY], column, &rates)
         .ok_or_else(|| "what closes leaves neighbouring motions no rates".into())
+}
+
+/// True where only what is held or let go changes.
+fn is_hold(jump: &Jump) -> bool {
+    jump.contact.is_none() && jump.switch.is_none() && jump.friction.is_none()
+}
+
+/// The rates of a column after contacts are held, which takes off what speed the last impact has left.
+fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
+    let is_new = |normal| matches!(normal, Normal::Contact(contact) if !before.held.contains(&contact));
+    let is_rubbed = jump.mechanism.sliding().any(|(friction, _)| is_new(friction.normal));
+    let rates = |of: &Arc<Mechanism>, motion: &Motion| {
+        let mut motion = motion.clone();
+        if is_rubbed {
+            let [phi, omega] = plain(&motion);
+            let rates = of.without_normal_rates(motion.time, &phi, &omega)?;
+            motion.omega = rates.into_iter().map(DoubleDouble::from).collect();
+        }
+        plastic(of, &motion).map(|(rates, ..)| rates)
+    };
+    change(&jump.mechanism, &Side::resting(&jump.before), [late, f64::INFINITY], column, &rates)
+        .ok_or_else(|| "what is held leaves neighbouring motions no rates".into())
 }
 
 /// The rates of a column after they have become others.

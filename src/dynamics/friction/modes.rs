@@ -95,6 +95,7 @@ impl Mechanism {
         let mut found: Option<(Modes, Vec<f64>)> = None;
         let mut looked_at = 0;
         for closed in subsets(staying, touching) {
+            let rates = self.rates_beside(at, &closed, &rates);
             let mut options = self.options(at, before, &rates, &closed, (&pushed, transition));
             let resting = options.iter().filter(|of| of.len() > 1).count();
             let count = |options: &[Vec<Mode>]| {

@@ -12,7 +12,7 @@
 use super::super::Mechanism;
 use super::super::constraint::Posture;
 use super::super::contact::metric::{Gradient, Metric};
-use super::{Mode, Moment, Transition};
+use super::{Mode, Moment, Normal, Transition};
 
 /// Acceleration, over that without constraints, up to which the rest leaves a place still.
 const STILL: f64 = 1e-10;
@@ -61,6 +61,18 @@ impl<'a> Room<'a> {
         })
     }
 
+    /// True where a place that is held has no velocity once that of the rest is as constraints and contacts
+    /// have it.
+    fn stands(&self, place: usize) -> bool {
+        self.metric.as_ref().is_some_and(|metric| {
+            let Gradient { row, along } = self.gradient(place);
+            let (column, velocity) = (metric.column(&along), metric.velocity(self.at.omega));
+            let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time;
+            let size = column.norm() * velocity.norm() + row.drive.abs() + own;
+            (column.dot(&metric.kept(&velocity)) + row.drive).abs() <= STILL * size
+        })
+    }
+
     /// How far a push at one place moves another one: positive where both move alike.
     fn moved(&self, places: [usize; 2]) -> f64 {
         self.metric.as_ref().map_or(0.0, |metric| {
@@ -87,6 +99,25 @@ impl Mechanism {
         let mut others = modes.to_vec();
         others[place] = Mode::Open;
         Room::new(self, at, contacts, &others)
+    }
+
+    /// Relative velocities of all places, zero of those at closed contacts that are held there: the speed with
+    /// which a point has come to its wall, and moves along it as well, is taken off.
+    pub(super) fn rates_beside(&self, at: Moment, closed: &[usize], rates: &[f64]) -> Vec<f64> {
+        let mut rates = rates.to_vec();
+        let may_stand = |(number, rate): (usize, &f64)| match self.frictions[number].normal {
+            Normal::Contact(contact) if closed.contains(&contact) && *rate != 0.0 => Some(number),
+            _ => None,
+        };
+        let may_stand: Vec<usize> = rates.iter().enumerate().filter_map(may_stand).collect();
+        if may_stand.is_empty() {
+            return rates;
+        }
+        let room = Room::new(self, at, closed, &vec![Mode::Open; rates.len()]);
+        for place in may_stand.into_iter().filter(|&place| room.is_held(place) && room.stands(place)) {
+            rates[place] = 0.0;
+        }
+        rates
     }
 
     /// The signs in which places are pushed to slide: the one that cannot stick any more, and those at their

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::arithmetic::Scalar;
+use crate::arithmetic::lanes::Portable;
 use crate::arithmetic::lanes::wide::{EightLanes, Single, Task, Vectors, WideCode};
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::series::slots::InSlots;
@@ -11,6 +12,9 @@ use crate::scene::exact::Watched;
 use std::sync::Arc;
 
 const ORDER: usize = 16;
+
+/// The reference is made in these alone: in all vectors it is half of the code of these tests.
+type Plain = InSlots<[Portable; 2]>;
 
 /// A mechanism whose constants have derivatives, and where it starts.
 fn mechanism(name: &str, numbers: &[&'static str]) -> (ExactMechanism<Number>, Vec<Number>, Vec<Number>) {
@@ -93,10 +97,9 @@ impl Both<'_> {
             let (m, c) = (i / f, i % f);
             Number::new(tangent.value(m, c), tangent.slope(m, c).array())
         });
-        let mut whole = Series::<InSlots<S>>::of_terms(&self.terms, self.coordinates, ORDER);
+        let mut whole = Series::<Plain>::of_terms(&self.terms, self.coordinates, ORDER);
         let (t, u, rest, rate) = self.begin;
-        let [u, rest, rate] =
-            [u, rest, rate].map(|all| all.iter().map(InSlots::<S>::load).collect::<Vec<_>>());
+        let [u, rest, rate] = [u, rest, rate].map(|all| all.iter().map(Plain::load).collect::<Vec<_>>());
         whole.expand_terms(&self.terms, t, &u, &rest, &rate);
         let expected = whole.rate[..(ORDER + 1) * f].iter().map(|rate| rate.store());
         [found.collect(), expected.collect()]
