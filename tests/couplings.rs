@@ -214,3 +214,27 @@ fn what_aims_cannot_be_is_refused_with_what_to_do() {
     let plan = Plan::new(&scene, &mechanism, &Request::default()).expect("a plan by default");
     assert!(matches!(plan.method, MethodId::Dp8 | MethodId::Dop853 | MethodId::Radau(_)), "{}", plan.method);
 }
+
+/// Where the follower starts, and how fast, is what the cam's piece there says, whether the scene gives it or not.
+#[test]
+fn a_cam_starts_on_its_piece() {
+    for (given, law) in
+        [("", "if(a.phi > 1, 2*(a.phi-1)^3, 0)"), (r#", "b": {"phi": 2}"#, "if(a.phi < 1, 0, 2*(a.phi-1)^3)")]
+    {
+        let scene = scene(&format!(
+            r#"{{"name": "cam", "gravity": [0, -9.81],
+                "bars": [{{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}},
+                         {{"name": "b", "mass": 1, "centre": [0.1, 0], "inertia": 0.2, "length": 1}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                           {{"name": "B", "between": [{{"body": "ground", "point": [2, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+                "motors": [{{"name": "cam", "body": "b", "law": "{law}"}}],
+                "start": {{"a": {{"phi": 2, "omega": -0.5}}{given}}}, "until": 2, "every": 0.1}}"#
+        ));
+        let start = Mechanism::new(&scene).unwrap_or_else(|error| panic!("{error}")).start(&scene);
+        near(start.phi[1].hi, 2.0, "angle of the follower");
+        near(start.omega[1].hi, -3.0, "its rate");
+        let outcome = run(&scene, &adaptive(MethodId::Dp8, 1e-12));
+        assert!(outcome.stop.is_none(), "{law}: {:?}", outcome.stop);
+        assert!(outcome.drift.energy.max < 1e-10, "{law}: {:e}", outcome.drift.energy.max);
+    }
+}

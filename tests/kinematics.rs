@@ -336,3 +336,43 @@ fn the_rate_of_a_turn_follows_the_motor_and_other_motors_follow_time() {
         assert!((at.omega[1] - 1.5 * (3.0 * t).cos()).abs() < 1e-13, "{at:?}");
     }
 }
+
+/// Laws of force are on their branches at every position: a motor holds a torque of three pieces, one of them off
+/// where the mechanism starts, and a cam's second piece moves what it moves.
+#[test]
+fn loads_are_those_of_the_branches_at_each_position() {
+    let scene = parse_scene(
+        r#"{"name": "branches", "gravity": [0, 0],
+            "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1},
+                     {"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.2, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                       {"name": "B", "between": [{"body": "ground", "point": [2, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "torques": [{"name": "T", "body": "a", "torque": "1*if(a.phi > 1.5, 7, if(a.phi > 0.7, -a.phi, 3*a.phi))"}],
+            "motors": [{"name": "m", "body": "a", "law": {"start": 0, "rate": 1}},
+                       {"name": "cam", "body": "b", "law": "if(a.phi > 2, 4*(a.phi-2)^3, 0)"}],
+            "until": 3, "every": 0.25}"#,
+        "scene.json",
+        &[],
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
+    let found = over(&scene, "m=0..3", 25);
+    let mut beyond = 0;
+    for Position { drive, phi, alpha, force, .. } in &found.positions {
+        let a = *drive;
+        let torque = if a > 1.5 {
+            7.0
+        } else if a > 0.7 {
+            -a
+        } else {
+            3.0 * a
+        };
+        let past = (a - 2.0).max(0.0);
+        let [angle, rate, bend] = [4.0 * past.powi(3), 12.0 * past * past, 24.0 * past];
+        assert!((phi[1] - angle).abs() < 1e-9 && (alpha[1] - bend).abs() < 1e-8, "{a}: {phi:?} {alpha:?}");
+        // The cam's torque on b comes from a: power is kept.
+        let expected = 0.2 * bend * rate - torque;
+        assert!((force - expected).abs() < 1e-7, "{a}: {force} and not {expected}");
+        beyond += usize::from(a > 2.0);
+    }
+    assert!(beyond > 5 && found.limits.is_empty());
+}

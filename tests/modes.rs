@@ -294,6 +294,15 @@ fn what_has_no_equilibrium_says_why() {
     held.motors[0].law = driftless::scene::Law::default();
     let mechanism = Arc::new(Mechanism::new(&held).expect("equations"));
     assert!(matches!(modes(&held, &mechanism, 8), Err(ModesError::Rigid)));
+    let later = parsed(
+        r#"{"name": "later", "gravity": [0, -9.81],
+            "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+            "torques": [{"name": "T", "body": "a", "torque": "1*if(t > 0.3, 2, 0)"}],
+            "start": {"a": {"phi": 0.1, "omega": 0}}, "until": 1, "every": 0.1}"#,
+    );
+    let mechanism = Arc::new(Mechanism::new(&later).expect("equations"));
+    assert!(matches!(modes(&later, &mechanism, 8), Err(ModesError::Forced)));
     // Two bodies that attract one another find no rest.
     assert!(of("kepler").expect("a search").equilibria.is_empty());
     // A cart may stand anywhere: one of a family, not dozens.
@@ -396,5 +405,26 @@ fn a_wound_spring_is_not_periodic() {
     for (ends, turns) in cases {
         let found = found(&scene(&coil(ends))).expect("a motor that turns");
         assert!(found.motions.iter().any(|motion| motion.turns == turns), "{:?}", found.motions);
+    }
+}
+
+/// Laws of force are on the branches of the positions looked at, not on those of the start.
+#[test]
+fn equilibria_are_found_on_every_branch_of_a_law() {
+    let scene = parsed(
+        r#"{"name": "branches", "gravity": [0, 0],
+            "bars": [{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+            "torsion_springs": [{"name": "coil", "body": "a", "stiffness": 2, "free_angle": 0}],
+            "torques": [{"name": "T", "body": "a", "torque": "1*if(a.phi > 0.6, 2 - a.phi, if(a.phi < -1, -4, 0))"}],
+            "start": {"a": {"phi": 0.1, "omega": 0}}, "until": 1, "every": 0.1}"#,
+    );
+    let mut found = found(&scene, 32).equilibria;
+    found.sort_by(|a, b| a.phi[0].total_cmp(&b.phi[0]));
+    let expected = [(-2.0, 2.0), (0.0, 2.0), (2.0 / 3.0, 3.0)];
+    assert_eq!(found.len(), expected.len(), "{found:?}");
+    for (one, (phi, stiffness)) in found.iter().zip(expected) {
+        assert!((one.phi[0] - phi).abs() < 1e-12, "{one:?}");
+        assert!((one.modes[0].frequency - (stiffness / 0.5_f64).sqrt()).abs() < 1e-12, "{one:?}");
     }
 }

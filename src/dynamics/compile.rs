@@ -181,7 +181,7 @@ impl Mechanism {
         }
         let mut kept = kept_angles(scene);
         kept.retain(|&row| acting.constraints[row].is_angle());
-        let mut mechanism = acting.assembled(scene, &kept)?;
+        let mut mechanism = acting.assembled_on_branches(scene, &kept)?;
         mechanism.vibrates(scene)?;
         mechanism.choose_form();
         if let Some(recursion) = mechanism
@@ -203,12 +203,8 @@ impl Mechanism {
         if scene.inactive.is_empty() {
             return Ok(mechanism);
         }
-        let unknown =
-            |part| CompileError::Unsound(format!("inactive: no part that can be switched is `{part}`"));
         mechanism.put_back(&unassembled);
-        let mut acting = mechanism.without(&scene.inactive).map_err(unknown)?;
-        acting.whole = Some((Arc::new(mechanism), scene.inactive.clone()));
-        Ok(acting)
+        mechanism.acting(&scene.inactive)
     }
     /// A scene's bodies and joints without a start: all that drawing it in a given position takes.
     pub(crate) fn unassembled(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {

@@ -31,6 +31,8 @@ const KEPT: f64 = 1e-11;
 const ITERATIONS: usize = 200;
 /// Starts beside the scene's that slide down before Newton's method.
 const RELAXED: usize = 8;
+/// Branches of laws that are tried from one start.
+const BRANCHES: usize = 8;
 /// Positions at least from which it is known how large accelerations are.
 const FEWEST: usize = 16;
 /// Longest step \[rad, or units of length\].
@@ -191,12 +193,16 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
         others.iter().take(RELAXED).filter_map(|phi| search.relaxed(phi)).collect();
     for (k, phi) in [&slid, &first].into_iter().chain(&others_slid).chain(&others).enumerate() {
         count[0] += 1;
-        let Some(phi) = search.settle(phi) else { continue };
+        let Some((phi, branch)) = search.settle_on_branches(phi) else { continue };
         count[1] += 1;
         if equilibria.iter().any(|known| search.local.is_same(&known.phi, &phi)) {
             continue;
         }
-        let found = search.linearize(phi, k < 2 && equilibria.is_empty(), freedom);
+        let from_start = k < 2 && equilibria.is_empty();
+        let found = match &branch {
+            Some(branch) => search.on(branch).linearize(phi, from_start, freedom),
+            None => search.linearize(phi, from_start, freedom),
+        };
         // Of a family one is enough.
         if !found.is_family || equilibria.iter().all(|known| !known.is_of_family(&found)) {
             equilibria.push(found);

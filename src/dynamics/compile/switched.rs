@@ -1,9 +1,14 @@
 //! Parts that events let act or rest: motors, locks and joints are released and put back.
 
-use super::{CompileError, Mechanism, Switches};
+use super::{CompileError, Laws, Mechanism, Switches};
+use crate::dynamics::Motion;
 use crate::dynamics::constraint::Measure;
 use crate::dynamics::quadratic::Quadratic;
 use crate::scene::Scene;
+use std::sync::Arc;
+
+/// Branches of laws that are tried at the start.
+const BRANCHES: usize = 8;
 
 impl Mechanism {
     /// The mechanism without some of its springs, torsion springs, applied forces, torques, motors, locks and
@@ -63,6 +68,55 @@ impl Mechanism {
             laws.parameters = parameters;
         }
         Ok(mechanism)
+    }
+
+    /// Without the parts that do not act at the start.
+    ///
+    /// # Errors
+    /// One of them is no part.
+    pub(super) fn acting(self, inactive: &[String]) -> Result<Self, CompileError> {
+        let unknown =
+            |part| CompileError::Unsound(format!("inactive: no part that can be switched is `{part}`"));
+        let mut acting = self.without(inactive).map_err(unknown)?;
+        acting.whole = Some((Arc::new(self), inactive.to_vec()));
+        Ok(acting)
+    }
+
+    /// Assembled with the laws of motors and walls on their branches at the start that is found.
+    ///
+    /// # Errors
+    /// See [`Self::assembled`].
+    pub(super) fn assembled_on_branches(self, scene: &Scene, kept: &[usize]) -> Result<Self, CompileError> {
+        if !self.laws.as_ref().is_some_and(|laws| laws.formulas.drives() && !laws.modes.is_empty()) {
+            return self.assembled(scene, kept);
+        }
+        let given = self.start_as_given(scene);
+        let mut next = self.on_branches_of(&given)?.unwrap_or(self);
+        for _ in 0..BRANCHES {
+            let found = next.clone().assembled(scene, kept)?;
+            match next.on_branches_of(&found.start(scene))? {
+                Some(other) => next = other,
+                None => return Ok(found),
+            }
+        }
+        next.assembled(scene, kept)
+    }
+
+    /// The mechanism with its laws on their branches at a motion; `None` where they are on them.
+    ///
+    /// # Errors
+    /// See [`Self::on_branch`].
+    pub(crate) fn on_branches_of(&self, motion: &Motion) -> Result<Option<Self>, CompileError> {
+        let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Ok(None) };
+        if modes.is_empty() {
+            return Ok(None);
+        }
+        let there = self.seen(motion, |at| formulas.modes(at, parameters));
+        match &self.whole {
+            _ if there == *modes => Ok(None),
+            Some((whole, inactive)) => whole.on_branch(parameters.clone(), there)?.acting(inactive).map(Some),
+            None => self.on_branch(parameters.clone(), there).map(Some),
+        }
     }
 
     /// The mechanism with all its parts, whatever acts at the start.

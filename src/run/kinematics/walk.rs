@@ -5,7 +5,7 @@ use super::{FOUND, KinematicsError, Limit, Position};
 use crate::arithmetic::Scalar;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
-use crate::dynamics::{Mechanism, State, Time};
+use crate::dynamics::{Mechanism, Motion, State, Time};
 use crate::scene::Scene;
 use crate::stabilization::projection::project;
 use nalgebra::DMatrix;
@@ -22,6 +22,8 @@ const STEEP: f64 = 1e3;
 pub(super) const IN_LINE: f64 = 1e-4;
 /// The same at a limit, which is come near to only.
 const NEARLY_IN_LINE: f64 = 1e-2;
+/// Branches of laws that are tried at a position.
+const BRANCHES: usize = 4;
 /// Up to so many coordinates the sign of det G is watched.
 const WATCHED: usize = 40;
 
@@ -104,6 +106,26 @@ impl Walk {
         Ok(walk)
     }
 
+    /// Takes the laws to their branches at the state; false where they are on them.
+    fn follow(&mut self) -> Result<bool, (String, f64)> {
+        if self.mechanism.laws.as_ref().is_none_or(|laws| laws.modes.is_empty()) {
+            return Ok(false);
+        }
+        let n = self.alpha.len();
+        let of = |from: usize| (from..from + n).map(|k| self.state.unknown(k)).collect();
+        let mut motion = Motion { time: self.state.time, phi: of(0), omega: of(n), ..Motion::default() };
+        motion.turns.clone_from(&self.state.turns);
+        motion.turns.resize(n, 0);
+        let row = || (self.mechanism.constraints[self.row].name().into(), f64::NAN);
+        let next = self.mechanism.on_branches_of(&motion).map_err(|_| row())?;
+        if let Some(next) = next {
+            self.kernel = Kernel::new(&next);
+            self.mechanism = Arc::new(next);
+            return Ok(true);
+        }
+        Ok(false)
+    }
+
     /// Accelerations and multipliers of the state.
     fn accelerate(&mut self) {
         let (mechanism, n) = (&*self.mechanism, self.alpha.len());
@@ -115,7 +137,12 @@ impl Walk {
 
     /// Solves the rows at both levels, then accelerations and multipliers.
     fn settle(&mut self) -> Result<(), (String, f64)> {
-        project(&self.mechanism, &mut self.kernel, &mut self.state, KEPT)?;
+        for _ in 0..BRANCHES {
+            project(&self.mechanism, &mut self.kernel, &mut self.state, KEPT)?;
+            if !self.follow()? {
+                break;
+            }
+        }
         // Projected again, rates answer for the positions found.
         self.accelerate();
         let mechanism = &*self.mechanism;
@@ -156,6 +183,8 @@ impl Walk {
     fn restore(&mut self, there: &Solved) {
         self.state.clone_from(&there.state);
         self.usual = there.usual;
+        // Where it was solved its branches were found.
+        let _ = self.follow();
         self.accelerate();
     }
 
@@ -178,6 +207,7 @@ impl Walk {
             return true;
         }
         self.state.clone_from(&self.before);
+        let _ = self.follow();
         self.accelerate();
         false
     }

@@ -4,7 +4,7 @@ use super::{DEPENDENT, DISTINCT, KEPT};
 use crate::arithmetic::Scalar;
 use crate::dynamics::compile::WholeTurns;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::{Mechanism, Time};
+use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stabilization::projection::{project, unit as row_unit};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -42,10 +42,21 @@ impl<'a> Local<'a> {
         DVector::from_iterator(phi.len(), self.kernel.load.iter().zip(&self.unit).map(|(a, unit)| a / unit))
     }
 
+    /// The same with the laws on their branches at that time.
+    pub(super) fn pull_on_branches(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
+        let (time, still) = (Time::of(t), vec![Time::default(); phi.len()]);
+        let at: Vec<Time> = phi.iter().map(|&phi| Time::of(phi)).collect();
+        let motion = Motion { time, phi: at, omega: still, turns: vec![0; phi.len()], ..Motion::default() };
+        match self.mechanism.on_branches_of(&motion) {
+            Ok(Some(mechanism)) => Local::new(&mechanism).pull(phi, t),
+            _ => self.pull(phi, t),
+        }
+    }
+
     pub(in crate::run) fn depends_on_time(&mut self, phi: &[f64]) -> bool {
-        let now = self.pull(phi, 0.0);
+        let now = self.pull_on_branches(phi, 0.0);
         [0.37, 1.9].iter().any(|&t| {
-            let then = self.pull(phi, t);
+            let then = self.pull_on_branches(phi, t);
             (&then - &now).amax() > 1e-9 * now.amax().max(then.amax())
         })
     }

@@ -232,7 +232,7 @@ fn check_period(
         }
     }
     for share in LOOKED_AT {
-        let [now, then] = [share * period, (1.0 + share) * period].map(|t| local.pull(phi, t));
+        let [now, then] = [share * period, (1.0 + share) * period].map(|t| local.pull_on_branches(phi, t));
         if (&now - &then).amax() > SAME * now.amax().max(then.amax()) {
             return Err(differs("the scene's forces".into()));
         }

@@ -1,11 +1,15 @@
 //! The search for equilibria, and the linearization about them.
 
 use super::local::Local;
-use super::{BALANCED, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability};
+use super::{
+    BALANCED, BRANCHES, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability,
+};
+use crate::arithmetic::Scalar;
 use crate::dynamics::jacobian::Jacobian;
 use crate::dynamics::kernel::Bias;
-use crate::dynamics::{Mechanism, Time};
+use crate::dynamics::{Mechanism, Motion, Time};
 use nalgebra::{Complex, DMatrix, DVector};
+use std::sync::Arc;
 
 /// A search for equilibria.
 pub(super) struct Search<'a> {
@@ -20,6 +24,35 @@ impl<'a> Search<'a> {
         let mut local = Local::new(mechanism);
         let usual = starts.map(|phi| local.pull(phi, 0.0).amax()).fold(0.0, f64::max);
         Self { local, jacobian: Jacobian::new(mechanism), usual }
+    }
+
+    /// The same search with the laws on other branches.
+    pub(super) fn on<'b>(&self, mechanism: &'b Mechanism) -> Search<'b> {
+        Search { local: Local::new(mechanism), jacobian: Jacobian::new(mechanism), usual: self.usual }
+    }
+
+    /// The equilibrium that is reached from a position with the laws on their branches there, and the
+    /// mechanism on these where they are not those of the start.
+    pub(super) fn settle_on_branches(&mut self, phi: &[f64]) -> Option<(Vec<f64>, Option<Arc<Mechanism>>)> {
+        let of = |mechanism: &Mechanism, phi: &[f64]| {
+            let phi: Vec<Time> = phi.iter().map(|&phi| Time::of(phi)).collect();
+            let (omega, turns) = (vec![Time::default(); phi.len()], vec![0; phi.len()]);
+            let next = mechanism.on_branches_of(&Motion { phi, omega, turns, ..Motion::default() }).ok()?;
+            Some(next.map(Arc::new))
+        };
+        let mut phi = phi.to_vec();
+        let mut own = of(self.local.mechanism, &phi)?;
+        for _ in 0..BRANCHES {
+            phi = match &own {
+                Some(own) => self.on(own).settle(&phi)?,
+                None => self.settle(&phi)?,
+            };
+            match of(own.as_deref().unwrap_or(self.local.mechanism), &phi)? {
+                Some(next) => own = Some(next),
+                None => return Some((phi, own)),
+            }
+        }
+        None
     }
 
     /// T' A_q T and T' A_w T.
