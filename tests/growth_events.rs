@@ -63,7 +63,7 @@ fn a_rotors_differences_go_through_the_corner_of_its_law() {
 /// Random scenes: within a factor of three in 95 %, and never a hundred off.
 #[test]
 fn growth_through_events_is_that_of_runs_from_neighbouring_starts() {
-    let (count, first) = (number("COUNT", 25), number("SEED", 0));
+    let (count, first) = (number("COUNT", 12), number("SEED", 0));
     let mut tally = Tally::default();
     for seed in first..first + count {
         let (made, kind) = scene(seed);
@@ -75,7 +75,7 @@ fn growth_through_events_is_that_of_runs_from_neighbouring_starts() {
 /// The same of events that set numbers, and of motors with aims.
 #[test]
 fn growth_through_numbers_that_are_set_is_that_of_runs_from_neighbouring_starts() {
-    let (count, first) = (number("COUNT", 25), number("SEED", 0));
+    let (count, first) = (number("COUNT", 12), number("SEED", 0));
     let mut tally = Tally::default();
     for seed in first..first + count {
         let (made, kind) = scene_of_numbers(seed);
