@@ -427,4 +427,20 @@ fn equilibria_are_found_on_every_branch_of_a_law() {
         assert!((one.phi[0] - phi).abs() < 1e-12, "{one:?}");
         assert!((one.modes[0].frequency - (stiffness / 0.5_f64).sqrt()).abs() < 1e-12, "{one:?}");
     }
+    // Beyond four radians the torque is off: a turn on is another position there.
+    let scene = parsed(
+        r#"{"name": "off", "gravity": [0, -9.81],
+            "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+            "torques": [{"name": "T", "body": "a", "torque": "1*if(a.phi > 4, 0, 1)"}],
+            "start": {"a": {"phi": 4.3, "omega": 0}}, "until": 1, "every": 0.1}"#,
+    );
+    let found = self::found(&scene, 32).equilibria;
+    for one in &found {
+        let phi = one.phi[0];
+        let torque = if phi > 4.0 { 0.0 } else { 1.0 };
+        assert!((torque - 4.905 * phi.cos()).abs() < 1e-9, "{one:?}");
+    }
+    let at = |phi: f64| found.iter().any(|one| (one.phi[0] - phi).abs() < 1e-9);
+    assert!(at(1.5 * PI) && at((1.0_f64 / 4.905).acos()) && at(-(1.0_f64 / 4.905).acos()), "{found:?}");
 }

@@ -25,7 +25,8 @@ impl WholeTurns {
             join(spring.body, spring.base.unwrap_or(ground));
         }
         let aims = mechanism.aims().flat_map(|aim| aim.counted_angles());
-        for body in mechanism.forces.iter().flat_map(UserForce::counted_angles).chain(aims) {
+        let formulas = mechanism.laws.iter().flat_map(|laws| laws.formulas.counted_angles());
+        for body in mechanism.forces.iter().flat_map(UserForce::counted_angles).chain(aims).chain(formulas) {
             join(body, ground);
         }
         let first = |k: usize| group.iter().position(|one| *one == group[k]);

@@ -397,6 +397,18 @@ impl Formulas {
         self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
     }
 
+    /// The bodies whose whole turns matter to them, on whichever branches.
+    pub fn counted_angles(&self) -> impl Iterator<Item = usize> {
+        let meanings = self.switched().flat_map(|expression| &expression.meanings);
+        meanings
+            .flat_map(|meaning| match *meaning {
+                Meaning::Angle(body) => [Some(body), None],
+                Meaning::RelativeAngle(body, base) => [Some(body), base],
+                _ => [None; 2],
+            })
+            .flatten()
+    }
+
     /// The signals on the branches that hold at a configuration.
     fn signals_there(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
         let mut signals = Vec::with_capacity(self.signals.len());

@@ -119,6 +119,9 @@ impl Walk {
         let row = || (self.mechanism.constraints[self.row].name().into(), f64::NAN);
         let next = self.mechanism.on_branches_of(&motion).map_err(|_| row())?;
         if let Some(next) = next {
+            if next.is_winding() && !self.state.is_winding {
+                self.state.unwind();
+            }
             self.kernel = Kernel::new(&next);
             self.mechanism = Arc::new(next);
             return Ok(true);
