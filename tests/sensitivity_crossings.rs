@@ -255,3 +255,22 @@ fn coming_to_rest_is_derived_with_the_speed_it_takes_off() {
         }
     }
 }
+
+/// An impact that turns the sign of a drag makes it change at that very moment, and with the moment.
+#[test]
+fn what_an_impact_switches_is_derived_with_the_impact() {
+    let template = template(
+        r#"{"name": "drag", "gravity": [0, -9.81],
+            "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+            "torsion_springs": [{"name": "drag", "body": "a", "torque": "0.4*rate*abs(rate)"}],
+            "walls": [{"name": "floor", "body": "a", "point": [1, 0], "restitution": 0.7,
+                       "line": {"through": [0, -0.5], "normal": [0, 1]}}],
+            "start": {"a": {"phi": 0.3, "omega": -0.5}}, "until": 1, "every": 0.1}"#,
+    );
+    let found = compared(&template, &["a.phi", "a.omega", "bars.a.mass"], 0.7).expect("derivatives");
+    assert_eq!(found.len(), 3);
+    for (path, off, doubt) in found {
+        assert!(off < 1e-8 && doubt < 1e-9, "{path}: {off:e} {doubt:e}");
+    }
+}

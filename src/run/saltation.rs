@@ -33,6 +33,8 @@ use std::sync::Arc;
 /// Normal velocity over that of the point's parts, or over a usual one where these are nearly at rest, below
 /// which a wall is grazed, and neighbours may miss it.
 const GRAZED: f64 = 1e-7;
+/// Share of the mechanism's own time by which the search for a zero is off at most.
+const SUDDEN: f64 = 1e-8;
 /// Share of the approach that a difference may take off.
 const SHARE: f64 = 0.05;
 
@@ -62,6 +64,9 @@ pub(super) struct Passage<'a> {
     pub set: &'a [usize],
     /// The neighbours of a column, by number, as they are after a jump.
     pub follow: &'a Follow<'a>,
+    /// How much later \[s\] each column comes to what has happened before at this very moment, if anything has:
+    /// what a jump makes happen at once, as a sign that an impact turns, comes with it.
+    pub earlier: Option<&'a [f64]>,
 }
 
 /// What came of it beside the columns.
@@ -69,6 +74,8 @@ pub(super) struct Passage<'a> {
 pub(super) struct Passed {
     /// The walls that were met, and how much later \[s\] for each column.
     pub walls: Vec<(usize, Vec<f64>)>,
+    /// How much later \[s\] it happens, for each column.
+    pub late: Vec<f64>,
     /// Parameters that events set, for each column, where this one sets some.
     pub set: Option<Vec<Vec<f64>>>,
 }
@@ -162,8 +169,8 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
     let there = Side::new(&last.mechanism, &last.after);
     let late = match cause {
         Jump { contact: Some(contact), .. } => late_at_wall(mechanism, *contact, &here, columns)?,
-        Jump { switch: Some(switch), .. } => late_at_switch(mechanism, switch, &here, columns)?,
-        Jump { friction, .. } => late_at_friction(mechanism, *friction, &here, columns)?,
+        Jump { switch: Some(switch), .. } => late_at_switch(passage, switch, &here, columns)?,
+        Jump { friction, .. } => late_at_friction(passage, *friction, &here, columns)?,
     };
     for (k, (column, &late)) in columns.iter_mut().zip(&late).enumerate() {
         shift(column.entries, late, &here);
@@ -189,7 +196,8 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
         }
         shift(column.entries, -late, &there);
     }
-    passed.walls.extend(cause.contact.map(|contact| (contact, late)));
+    passed.walls.extend(cause.contact.map(|contact| (contact, late.clone())));
+    passed.late = late;
     Ok(passed)
 }
 
@@ -223,7 +231,7 @@ fn late_at_wall(
 
 /// How much later \[s\] an event happens that switches parts or branches, column by column.
 fn late_at_switch(
-    mechanism: &Arc<Mechanism>,
+    passage: &Passage,
     switch: &Switch,
     here: &Side,
     columns: &[Column],
@@ -231,26 +239,45 @@ fn late_at_switch(
     if !switch.keeps_motion {
         return Err("an event from outside sets the motion, which is not followed".into());
     }
-    late_at_zero(mechanism, here, columns, &|mechanism, motion| {
+    late_with(passage, here, columns, &|mechanism, motion| {
         Some(vec![event_value(mechanism, switch.at, motion)?])
     })
 }
 
 /// How much later \[s\] a place with friction begins to stick or to slide, column by column.
 fn late_at_friction(
-    mechanism: &Arc<Mechanism>,
+    passage: &Passage,
     place: Option<usize>,
     here: &Side,
     columns: &[Column],
 ) -> Result<Vec<f64>, String> {
-    let own = FrictionWatch::new(mechanism);
-    late_at_zero(mechanism, here, columns, &|of, motion| {
-        let values = match Arc::ptr_eq(of, mechanism) {
+    let own = FrictionWatch::new(passage.mechanism);
+    late_with(passage, here, columns, &|of, motion| {
+        let values = match Arc::ptr_eq(of, passage.mechanism) {
             true => own.as_ref()?.values(motion),
             false => FrictionWatch::new(of)?.values(motion),
         };
         Some(vec![*values.get(place?)?])
     })
+}
+
+/// How much later \[s\] a function of the motion is zero, or a jump at this moment has taken it across, column
+/// by column.
+fn late_with(
+    passage: &Passage,
+    here: &Side,
+    columns: &[Column],
+    value: Function,
+) -> Result<Vec<f64>, String> {
+    let Passage { mechanism, earlier, .. } = *passage;
+    if let (Some(earlier), Some(off)) = (earlier, value(mechanism, &here.motion)) {
+        let rate = here.slope(&here.ahead(), 1.0, f64::INFINITY, &mut |motion| value(mechanism, motion));
+        let passed = rate.map_or(0.0, |rate| SUDDEN * mechanism.units.time * rate[0].abs());
+        if off[0].abs() > passed {
+            return Ok(earlier.to_vec());
+        }
+    }
+    late_at_zero(mechanism, here, columns, value)
 }
 
 /// How much later \[s\] a function of the motion is zero, column by column.

@@ -100,8 +100,15 @@ impl Variation {
         let entries = columns.iter_mut().map(Vec::as_mut_slice);
         let mut list: Vec<Column> = entries.zip(&self.neighbours).map(column).collect();
         let (mechanism, set) = (&self.mechanism, &self.set.numbers[..]);
-        let passed = cross(&Passage { mechanism, jumps, set, follow: &follow }, &mut list);
+        let moment = jumps.first().map(|jump| jump.before.time);
+        let earlier = self.moment.as_ref().filter(|(at, _)| Some(*at) == moment).map(|(_, late)| &late[..]);
+        let passed = cross(&Passage { mechanism, jumps, set, follow: &follow, earlier }, &mut list);
         self.columns = columns;
+        if let (Ok(passed), Some(moment)) = (&passed, moment)
+            && !passed.late.is_empty()
+        {
+            self.moment = Some((moment, passed.late.clone()));
+        }
         passed
     }
 

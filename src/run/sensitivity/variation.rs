@@ -63,6 +63,8 @@ pub(in crate::run) struct Variation {
     jacobian: Jacobian,
     pub ground: Option<Ground>,
     pub jumps: JumpLog,
+    /// When columns were taken through something last, and how much later \[s\] each comes to it.
+    pub(super) moment: Option<(Time, Vec<f64>)>,
     method: Collocation,
     pull: Vec<f64>,
     forcing: Vec<Vec<f64>>,
@@ -136,6 +138,7 @@ impl Variation {
             expanded: None,
             impacts: Vec::new(),
             jumps: JumpLog::with_switches(),
+            moment: None,
             method: Collocation::new(),
             pull: Vec::new(),
             forcing,

@@ -110,6 +110,10 @@ pub(super) struct Path {
     stride: u64,
     seen: u64,
     reach: f64,
+    /// When columns were taken through something last, and how much later \[s\] each comes to it: while that
+    /// moment lasts, and no checkpoint is within one.
+    #[serde(skip)]
+    moment: Option<(Time, Vec<f64>)>,
     /// Why the flow ended.
     lost: Option<String>,
 }

@@ -66,20 +66,28 @@ impl Tangent {
         self.keep();
         self.evaluate();
         if self.normalise() {
+            self.path.moment = None;
             self.prepare();
         }
     }
 
     /// Takes columns of all coordinates, rates and parameters that events set through what happens at one
     /// moment.
-    fn cross(&self, jumps: &[Jump], all: &mut [Vec<f64>]) -> Result<(), String> {
+    fn cross(&mut self, jumps: &[Jump], all: &mut [Vec<f64>]) -> Result<(), String> {
         let n = self.mechanism.coordinates();
+        let moment = jumps.first().map(|jump| jump.before.time);
         let given: Vec<Vec<f64>> = all.iter().map(|column| column[2 * n..].to_vec()).collect();
         let passage = Passage {
             mechanism: &self.mechanism,
             jumps,
             set: &self.set,
             follow: &|k, jump| self.neighbours_at(&jump.mechanism, &given[k]),
+            earlier: self
+                .path
+                .moment
+                .as_ref()
+                .filter(|(at, _)| Some(*at) == moment)
+                .map(|(_, late)| &late[..]),
         };
         let mut columns: Vec<Column> = (all.iter_mut().zip(&given))
             .map(|(column, given)| Column {
@@ -88,6 +96,7 @@ impl Tangent {
             })
             .collect();
         let passed = cross(&passage, &mut columns)?;
+        self.path.moment = moment.zip((!passed.late.is_empty()).then_some(passed.late));
         let Some(set) = passed.set else { return Ok(()) };
         let drives = self.mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.drives());
         if drives && set.iter().flatten().any(|slope| *slope != 0.0) {
