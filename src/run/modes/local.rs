@@ -44,10 +44,7 @@ impl<'a> Local<'a> {
 
     /// The same with the laws on their branches at that time.
     pub(super) fn pull_on_branches(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
-        let (time, still) = (Time::of(t), vec![Time::default(); phi.len()]);
-        let at: Vec<Time> = phi.iter().map(|&phi| Time::of(phi)).collect();
-        let motion = Motion { time, phi: at, omega: still, turns: vec![0; phi.len()], ..Motion::default() };
-        match self.mechanism.on_branches_of(&motion) {
+        match self.mechanism.on_branches_of(&at_rest(phi, t)) {
             Ok(Some(mechanism)) => Local::new(&mechanism).pull(phi, t),
             _ => self.pull(phi, t),
         }
@@ -115,4 +112,11 @@ impl<'a> Local<'a> {
         self.turns.take_off(&mut apart);
         apart.iter().zip(&self.unit).all(|(apart, unit)| (apart / unit).abs() < DISTINCT)
     }
+}
+
+/// A position at rest at a time.
+pub(super) fn at_rest(phi: &[f64], t: f64) -> Motion {
+    let of = |values: &[f64]| values.iter().map(|&value| Time::of(value)).collect();
+    let (omega, turns) = (vec![Time::default(); phi.len()], vec![0; phi.len()]);
+    Motion { time: Time::of(t), phi: of(phi), omega, turns, ..Motion::default() }
 }

@@ -1,13 +1,12 @@
 //! The search for equilibria, and the linearization about them.
 
-use super::local::Local;
+use super::local::{Local, at_rest};
 use super::{
     BALANCED, BRANCHES, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability,
 };
-use crate::arithmetic::Scalar;
 use crate::dynamics::jacobian::Jacobian;
 use crate::dynamics::kernel::Bias;
-use crate::dynamics::{Mechanism, Motion, Time};
+use crate::dynamics::{Mechanism, Time};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::sync::Arc;
 
@@ -35,10 +34,7 @@ impl<'a> Search<'a> {
     /// mechanism on these where they are not those of the start.
     pub(super) fn settle_on_branches(&mut self, phi: &[f64]) -> Option<(Vec<f64>, Option<Arc<Mechanism>>)> {
         let of = |mechanism: &Mechanism, phi: &[f64]| {
-            let phi: Vec<Time> = phi.iter().map(|&phi| Time::of(phi)).collect();
-            let (omega, turns) = (vec![Time::default(); phi.len()], vec![0; phi.len()]);
-            let next = mechanism.on_branches_of(&Motion { phi, omega, turns, ..Motion::default() }).ok()?;
-            Some(next.map(Arc::new))
+            Some(mechanism.on_branches_of(&at_rest(phi, 0.0)).ok()?.map(Arc::new))
         };
         let mut phi = phi.to_vec();
         let mut own = of(self.local.mechanism, &phi)?;
