@@ -193,9 +193,8 @@ impl Mechanism {
         }
         mechanism.check_mass(scene)?;
         let start = mechanism.start(scene);
-        if let Some(laws) = mechanism.laws.clone() {
-            let modes = mechanism.seen(&start, |at| laws.formulas.modes(at, &laws.parameters));
-            mechanism = mechanism.on_branch(laws.parameters, modes)?;
+        if let Some(next) = mechanism.on_branches_of(&start)? {
+            mechanism = next;
         }
         mechanism.energy_scale = mechanism.scale_of_energy(&start);
         mechanism.scale_contacts(&start);
@@ -206,6 +205,7 @@ impl Mechanism {
         mechanism.put_back(&unassembled);
         mechanism.acting(&scene.inactive)
     }
+
     /// A scene's bodies and joints without a start: all that drawing it in a given position takes.
     pub(crate) fn unassembled(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
         if let Some(fault) = scene.fault() {

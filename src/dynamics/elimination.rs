@@ -264,12 +264,7 @@ impl<const N: usize> Form for Elimination<N> {
 
     fn read(&mut self, state: &State, motion: &mut Motion) {
         let f = self.mechanism.partition.count();
-        self.mechanism.partition.read_angles(state, motion);
-        for (omega, dependent_angle) in motion.omega.iter_mut().zip(&self.mechanism.partition.bodies) {
-            if let Some(base) = dependent_angle.base {
-                *omega += state.unknown(f + base);
-            }
-        }
+        self.mechanism.partition.read(state, motion);
         motion.work = state.unknown(2 * f);
     }
 

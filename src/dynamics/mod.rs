@@ -397,6 +397,16 @@ impl Motion {
         self.turns.resize(coordinates, 0);
     }
 
+    /// Takes time, turns, coordinates and rates of a state that begins with all of so many coordinates.
+    pub(crate) fn follow(&mut self, state: &State, coordinates: usize) {
+        self.resize(coordinates);
+        self.time = state.time;
+        self.turns[..state.turns.len()].copy_from_slice(&state.turns);
+        for k in 0..coordinates {
+            (self.phi[k], self.omega[k]) = (state.unknown(k), state.unknown(coordinates + k));
+        }
+    }
+
     /// The winding angle of a body \[rad\].
     pub fn unwrapped(&self, body: usize) -> f64 {
         angle::unwrapped(self.phi[body], self.turns[body])

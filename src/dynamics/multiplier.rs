@@ -192,13 +192,7 @@ impl<const N: usize, const WORK: bool> Form for Multiplier<N, WORK> {
 
     fn read(&mut self, state: &State, motion: &mut Motion) {
         let n = self.mechanism.coordinates();
-        motion.resize(n);
-        motion.time = state.time;
-        motion.turns[..state.turns.len()].copy_from_slice(&state.turns);
-        for k in 0..n {
-            motion.phi[k] = state.unknown(k);
-            motion.omega[k] = state.unknown(n + k);
-        }
+        motion.follow(state, n);
         if WORK {
             motion.work = state.unknown(2 * n);
             motion.stabilizer = state.y[2 * n + 1];

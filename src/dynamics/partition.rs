@@ -235,8 +235,18 @@ impl CoordinatePartition {
         self.independent.iter().take(self.turning()).map(|&body| motion.turns[body]).collect()
     }
 
+    /// Angles, turns and rates of all bodies, of a state of coordinates and their rates.
+    pub(crate) fn read(&self, state: &State, motion: &mut Motion) {
+        self.read_angles(state, motion);
+        for (omega, dependent_angle) in motion.omega.iter_mut().zip(&self.bodies) {
+            if let Some(base) = dependent_angle.base {
+                *omega += state.unknown(self.count() + base);
+            }
+        }
+    }
+
     /// Angles and turns of all bodies, and the driven share of their rates, in double-double.
-    pub(crate) fn read_angles(&self, state: &State, motion: &mut Motion) {
+    pub(super) fn read_angles(&self, state: &State, motion: &mut Motion) {
         motion.resize(self.bodies.len());
         motion.time = state.time;
         for (k, dependent_angle) in self.bodies.iter().enumerate() {

@@ -111,11 +111,8 @@ impl Walk {
         if self.mechanism.laws.as_ref().is_none_or(|laws| laws.modes.is_empty()) {
             return Ok(false);
         }
-        let n = self.alpha.len();
-        let of = |from: usize| (from..from + n).map(|k| self.state.unknown(k)).collect();
-        let mut motion = Motion { time: self.state.time, phi: of(0), omega: of(n), ..Motion::default() };
-        motion.turns.clone_from(&self.state.turns);
-        motion.turns.resize(n, 0);
+        let mut motion = Motion::default();
+        motion.follow(&self.state, self.alpha.len());
         let row = || (self.mechanism.constraints[self.row].name().into(), f64::NAN);
         let next = self.mechanism.on_branches_of(&motion).map_err(|_| row())?;
         if let Some(next) = next {
@@ -127,6 +124,12 @@ impl Walk {
             return Ok(true);
         }
         Ok(false)
+    }
+
+    /// At a state that was solved, where its branches were found.
+    fn stand(&mut self) {
+        let _ = self.follow();
+        self.accelerate();
     }
 
     /// Accelerations and multipliers of the state.
@@ -186,9 +189,7 @@ impl Walk {
     fn restore(&mut self, there: &Solved) {
         self.state.clone_from(&there.state);
         self.usual = there.usual;
-        // Where it was solved its branches were found.
-        let _ = self.follow();
-        self.accelerate();
+        self.stand();
     }
 
     /// Steps to another time; false, and still here, where the solution there is not on this branch for
@@ -210,8 +211,7 @@ impl Walk {
             return true;
         }
         self.state.clone_from(&self.before);
-        let _ = self.follow();
-        self.accelerate();
+        self.stand();
         false
     }
 

@@ -141,20 +141,11 @@ impl Lane {
 fn read(mechanism: &Mechanism, state: &State, motion: &mut Motion) -> usize {
     let (n, partition) = (mechanism.coordinates(), &mechanism.partition);
     if mechanism.has_multipliers() {
-        motion.resize(n);
-        motion.time = state.time;
-        motion.turns[..state.turns.len()].copy_from_slice(&state.turns);
-        for k in 0..n {
-            (motion.phi[k], motion.omega[k]) = (state.unknown(k), state.unknown(n + k));
-        }
+        motion.follow(state, n);
         return n;
     }
-    partition.read_angles(state, motion);
-    let coordinates = partition.count();
-    for (omega, body) in motion.omega.iter_mut().zip(&partition.bodies) {
-        *omega += body.base.map_or(DoubleDouble::ZERO, |base| state.unknown(coordinates + base));
-    }
-    coordinates
+    partition.read(state, motion);
+    partition.count()
 }
 
 /// The largest violation of any constraint so far, at position and velocity level, at the motion's unit
