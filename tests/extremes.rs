@@ -313,14 +313,44 @@ fn places_beyond_rounding_are_refused_or_met() {
 fn turns_beyond_counting_are_a_typed_stop() {
     let text = r#"{"name": "fast", "gravity": [0, 0], "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1}],
         "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
-        "motors": [{"name": "motor", "body": "bar", "law": {"start": 0, "rate": 1e10}}], "until": 1e12, "every": 1e6}"#;
+        "motors": [{"name": "motor", "body": "bar", "law": {"start": 0, "rate": 1e14}}], "until": 1e8, "every": 100}"#;
     let scene = driftless::scene::parse_scene(text, "fast.json", &[]).expect("a scene");
     for method in [MethodId::Dop853, MethodId::Dp8, MethodId::Taylor, MethodId::Gauss(8)] {
-        let step = (!method.is_adaptive()).then_some(1e6);
+        let step = (!method.is_adaptive()).then_some(100.0);
         let outcome = run(&scene, &Request { method: Some(method), step, ..Request::default() });
         let stop = outcome.stop.expect("a stop");
         assert!(stop.cause == Cause::NotFinite && stop.what.contains("turned"), "{method}: {stop}");
-        assert_eq!(outcome.last.t, 6e6, "{method}");
+        assert_eq!(outcome.last.t, 600.0, "{method}");
+    }
+}
+
+/// A driven linkage carries two points of its rods towards walls that leave less and less room between them:
+/// each moment there is of hundreds of impacts, and all of them are counted.
+#[test]
+fn a_linkage_squeezed_between_walls_stops_soon() {
+    let text = r#"{"name": "squeezed", "gravity": [0, 0],
+        "bars": [{"name": "outer", "mass": 0.94, "centre": [0.47, 0], "inertia": 0.04, "length": 0.82},
+            {"name": "middle", "mass": 2.12, "centre": [0.3, 0], "inertia": 0.12, "length": 0.55},
+            {"name": "inner", "mass": 1.19, "centre": [0.15, 0.03], "inertia": 0.03, "length": 0.45}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "inner", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "inner", "point": [0.45, 0]}, {"body": "middle", "point": [0, 0]}]},
+            {"name": "C", "between": [{"body": "middle", "point": [0.55, 0]}, {"body": "outer", "point": [0, 0]}]}],
+        "motors": [{"name": "first", "body": "outer", "law": {"start": -2.41, "rate": -2.91, "acceleration": -0.66}},
+            {"name": "second", "body": "outer", "relative_to": "middle",
+                "law": {"start": -5.47, "rate": -2.75, "acceleration": -0.85}}],
+        "walls": [{"name": "left", "body": "middle", "point": [0.21, 0], "restitution": 0.3,
+                "line": {"through": [-0.48, 0.51], "normal": [-0.97, 0.25]}},
+            {"name": "right", "body": "outer", "point": [0.82, 0], "restitution": 1,
+                "line": {"through": [-1.58, -0.18], "normal": [0.93, -0.36]}}],
+        "start": {"inner": {"phi": 2.54, "omega": -0.65}, "middle": {"phi": 3.06, "omega": -0.16},
+            "outer": {"phi": -2.41, "omega": -2.91}}, "until": 2, "every": 0.1}"#;
+    let scene = driftless::scene::parse_scene(text, "squeezed.json", &[]).expect("a scene");
+    for method in [MethodId::Dp8, MethodId::Taylor] {
+        let outcome = run(&scene, &Request { method: Some(method), ..Request::default() });
+        let stop = outcome.stop.expect("a stop");
+        assert!(stop.what.contains("impacts") && stop.hint.contains("between walls"), "{method}: {stop}");
+        assert!((0.04..0.06).contains(&outcome.last.t), "{method}: {}", outcome.last.t);
+        assert!((9_000..12_000).contains(&outcome.impact_count), "{method}: {}", outcome.impact_count);
     }
 }
 

@@ -60,7 +60,8 @@ pub struct PersistentContact {
 
 /// Impacts, and holds, kept by name; the rest are counted.
 const KEPT: usize = 1000;
-/// Impacts and releases between two output times beyond which a run goes nowhere.
+/// Impacts and releases between two output times beyond which a run goes nowhere; a point that is squeezed
+/// between two walls meets them hundreds of times at one moment.
 const EVENTS_MOST: usize = 10_000;
 /// Holds between two output times beyond which a point chatters.
 const HOLDS_MOST: usize = 1000;
@@ -244,6 +245,7 @@ impl ContactDriver {
             let watch = Watch { flips: self.flips.as_mut(), monitor: lent(&mut monitor), steps };
             let halt = self.driver.advance(until, horizon, watch, pause);
             self.record_events(outcome);
+            let impacts_before = outcome.impact_count;
             match halt {
                 Ok(Halt::Until) => return Ok(true),
                 Ok(Halt::Cut) => {
@@ -277,10 +279,12 @@ impl ContactDriver {
                 }
                 Err(stop) => return Err(stop),
             }
-            self.events_in_row += 1;
+            self.events_in_row += 1.max((outcome.impact_count - impacts_before) as usize);
         }
         let what = format!("more than {EVENTS_MOST} impacts and releases before the next output time");
-        Err(self.stopped(&outcome.plan, what, "shorten the output interval, or lower the restitution"))
+        let hint = "shorten the output interval, lower the restitution, or look for a point that motors squeeze \
+                    between walls";
+        Err(self.stopped(&outcome.plan, what, hint))
     }
 
     /// The present motion.
