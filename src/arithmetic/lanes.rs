@@ -211,25 +211,25 @@ impl Lanes for Portable {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(driftless_portable)))]
 mod hardware;
 pub mod row;
 pub mod wide;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(driftless_portable)))]
 pub use hardware::Hardware;
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(driftless_portable)))]
 pub(crate) use hardware::Vector;
 
 /// The widest vectors there is code for.
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), driftless_portable))]
 pub(crate) type Vector = Portable;
 
 /// The proof that the processor has instructions there is code for; never, on this architecture.
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), driftless_portable))]
 #[derive(Clone, Copy, Debug)]
 pub enum Hardware {}
 
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), driftless_portable))]
 impl Hardware {
     /// None.
     pub fn ask() -> Option<Self> {

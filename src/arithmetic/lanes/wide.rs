@@ -3,7 +3,7 @@
 use super::{Arithmetic, Hardware, Lanes, Portable, hardware, is_disabled, sum};
 use std::marker::PhantomData;
 
-#[cfg(target_arch = "x86_64")]
+#[cfg(all(target_arch = "x86_64", not(driftless_portable)))]
 pub use super::hardware::WideHardware;
 
 /// Up to eight doubles.
@@ -204,11 +204,11 @@ pub trait WideCode {
 }
 
 /// The proof that the processor has AVX-512; never, on this architecture.
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), driftless_portable))]
 #[derive(Clone, Copy, Debug)]
 pub enum WideHardware {}
 
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), driftless_portable))]
 impl WideHardware {
     /// None.
     pub fn ask() -> Option<Self> {
