@@ -50,6 +50,7 @@ mod friction_shared;
 mod gauss;
 mod identities;
 mod impact;
+mod jump_events;
 mod kinematics;
 mod latches;
 mod laws;

@@ -151,6 +151,9 @@ impl ContactDriver {
         let modes = latch::modes(&free, &self.mechanism.modes, &held);
         self.mechanism = in_modes(&free, &held, &modes);
         if let Some(events) = &mut self.events {
+            if keeps_motion && keeps_parameters {
+                events.jump([&before, &after]);
+            }
             events.watch_friction(&self.mechanism);
         }
         self.free = free;

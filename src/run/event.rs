@@ -53,7 +53,8 @@ pub trait Event: Send + Sync {
     /// Name in records.
     fn name(&self) -> &str;
 
-    /// The event function: a smooth function of time, positions and rates, whose zero is the event.
+    /// The event function: a smooth function of time, positions and rates, whose zero is the event; so is its
+    /// way past zero where an impact, or a joint that closes, makes the rates jump.
     fn value(&self, at: &Configuration<f64>) -> f64;
 
     /// Which passages count; both unless said otherwise.

@@ -157,11 +157,14 @@ impl ContactDriver {
 
     /// Tells of an impact where somebody asks, and of the contacts that touch where several take part in it.
     pub(super) fn tell_impact(
-        &self,
+        &mut self,
         contact: Option<usize>,
         together: &[usize],
         [before, after]: [Motion; 2],
     ) {
+        if let Some(events) = &mut self.events {
+            events.jump([&before, &after]);
+        }
         if let Some(jumps) = &self.jumps {
             let (together, mechanism) = (together.to_vec(), Arc::clone(&self.mechanism));
             jumps.push(Jump { contact, together, switch: None, friction: None, before, after, mechanism });

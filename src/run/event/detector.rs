@@ -1,8 +1,9 @@
 //! The events of a run: which functions there are, what they belong to, and what is done at their zeros.
 
-use super::search::Passage;
+use super::search::{NO_VALUE, Passage};
 use super::{Action, Change, Direction, Event, EventRecord};
 use crate::dynamics::compile::Laws;
+use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::friction::FrictionWatch;
 use crate::run::inside::{Inside, StepWatcher};
@@ -28,7 +29,7 @@ pub(in crate::run) struct EventMemory {
     /// The events of the moment at which one happened last.
     pub(super) last: Vec<(usize, Time)>,
     /// Events of that moment which are still to happen, and whether their functions rise: the step was cut
-    /// short by another one.
+    /// short by another one, or a jump of the rates has carried the function across zero.
     due: Vec<(usize, bool)>,
     /// What is to be done at the end of the step.
     pub pending: Option<(usize, Action)>,
@@ -281,18 +282,41 @@ impl EventDetector {
         std::mem::take(&mut self.count)
     }
 
-    /// Values of all event functions at a motion.
+    /// Values of the functions of events, the scene's and those from outside.
+    fn event_values(&self, at: &Configuration<f64>) -> Vec<f64> {
+        let of_the_scene = self.laws.iter().flat_map(|Laws { formulas, parameters, .. }| {
+            (0..formulas.events.len()).map(|event| formulas.event_value(event, at, parameters))
+        });
+        of_the_scene.chain(self.events.iter().map(|event| event.value(at))).collect()
+    }
+
+    /// Remembers the events whose functions a jump of the rates has carried across zero: they happen where the
+    /// next step begins, unless another jump at this moment carries them back.
+    pub fn jump(&mut self, [before, after]: [&Motion; 2]) {
+        let [before, after] =
+            [before, after].map(|motion| self.mechanism.seen(motion, |at| self.event_values(at)));
+        let EventMemory { largest, resting, due, .. } = &mut self.memory;
+        for (event, (before, after)) in before.into_iter().zip(after).enumerate() {
+            let is_clear = before.abs().min(after.abs()) > NO_VALUE * largest[event];
+            if !is_clear || (before > 0.0) == (after > 0.0) || resting.contains(&event) {
+                continue;
+            }
+            let rises = after > 0.0;
+            match due.iter().position(|due| *due == (event, !rises)) {
+                Some(place) => drop(due.remove(place)),
+                None => due.push((event, rises)),
+            }
+        }
+    }
+
+    /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
         let mut values: Vec<f64> = self.mechanism.seen(motion, |at| {
-            let from_outside = self.events.iter().map(|event| event.value(at));
-            let Some(Laws { formulas, parameters, modes }) = &self.laws else {
-                return from_outside.collect();
-            };
-            (0..formulas.events.len())
-                .map(|event| formulas.event_value(event, at, parameters))
-                .chain(from_outside)
-                .chain(formulas.condition_values(at, parameters, modes))
-                .collect()
+            let mut values = self.event_values(at);
+            if let Some(Laws { formulas, parameters, modes }) = &self.laws {
+                values.extend(formulas.condition_values(at, parameters, modes));
+            }
+            values
         });
         values.extend(self.friction.iter().flat_map(|watch| watch.values(motion)));
         values
@@ -314,6 +338,7 @@ impl StepWatcher for EventDetector {
             passage.t = self.polished(inside, passage.event, passage.t);
         }
         let due = std::mem::take(&mut self.memory.due).into_iter();
+        let due = due.filter(|&(event, rises)| self.counts(event, rises));
         passages.extend(due.map(|(event, rises)| Passage { t: begin, event, rises }));
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for (number, &Passage { t, event, .. }) in passages.iter().enumerate() {

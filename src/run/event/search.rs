@@ -21,7 +21,7 @@ const SLOPE: f64 = 1e-3;
 const LEAVES: f64 = 1e-5;
 /// Share of the largest value, of a condition within the step, of an event so far, up to which a function is
 /// at its zero.
-const NO_VALUE: f64 = 1e-12;
+pub(super) const NO_VALUE: f64 = 1e-12;
 /// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a
 /// side, and the part of a step within which that is looked for: at a zero of a higher order it takes a
 /// while.

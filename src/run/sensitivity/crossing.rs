@@ -63,6 +63,9 @@ impl Variation {
         let before = Arc::clone(&self.mechanism);
         self.met_several |= passed.walls.len() > 1;
         let t = last.before.time.hi;
+        if jumps[0].before.omega != last.after.omega && !passed.late.is_empty() {
+            self.jumped.push((t, passed.late));
+        }
         let crossing = |(wall, slopes): (usize, Vec<f64>)| {
             let wall = before.contacts[wall].row.name.clone();
             Crossing { wall, t, slopes }

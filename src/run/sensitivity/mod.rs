@@ -347,6 +347,14 @@ fn taken(
     let t = asked.t.clone()?;
     let at = seen.iter().find(|seen| seen.t == t).ok_or("")?;
     let Some(output) = asked.output else {
+        // An event that a jump of the rates makes happen comes when that does.
+        let jumped = variation
+            .jumped
+            .iter()
+            .find(|(jumped, _)| *jumped == t && matches!(asked.measure, Measure::Event(_)));
+        if let Some((_, slopes)) = jumped {
+            return Ok((t, t, slopes.clone()));
+        }
         let slopes = at.times.iter().find(|(measure, _)| *measure == number);
         let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
         return Ok((t, t, slopes));

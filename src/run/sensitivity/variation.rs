@@ -60,6 +60,8 @@ pub(in crate::run) struct Variation {
     pub(super) expanded: Option<Expanded>,
     /// Impacts so far.
     pub impacts: Vec<Crossing>,
+    /// Times \[s\] at which rates have jumped, with their derivatives, column by column.
+    pub jumped: Vec<(f64, Vec<f64>)>,
     jacobian: Jacobian,
     pub ground: Option<Ground>,
     pub jumps: JumpLog,
@@ -137,6 +139,7 @@ impl Variation {
             neighbours,
             expanded: None,
             impacts: Vec::new(),
+            jumped: Vec::new(),
             jumps: JumpLog::with_switches(),
             moment: None,
             method: Collocation::new(),

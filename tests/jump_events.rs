@@ -1,0 +1,102 @@
+//! Events whose functions pass zero in a jump: of an impact, or of a joint that closes; against closed forms.
+
+use crate::formulas::{adaptive, run, scene};
+use crate::sensitivity::{assert_near, derived, template};
+use driftless::run::{MethodId, Outcome, Request};
+
+fn methods() -> [Request; 4] {
+    [
+        adaptive(MethodId::Dp5, 1e-11),
+        adaptive(MethodId::Dp8, 1e-12),
+        adaptive(MethodId::Taylor, 1e-13),
+        adaptive(MethodId::Radau(5), 1e-12),
+    ]
+}
+
+/// A ball that is dropped from 1 m at 10 m/s², with 0.6 of its speed left after each impact.
+fn ball(events: &str) -> String {
+    format!(
+        r#"{{"name": "ball", "gravity": [0, -10],
+        "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 1}}],
+        "points": [{{"name": "p", "body": "ball", "point": [0, 0]}}],
+        "walls": [{{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0.6,
+                   "line": {{"through": [0, 0], "normal": [0, 1]}}}}],
+        "events": [{events}], "until": 1.4, "every": 1.4,
+        "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}}}}}"#
+    )
+}
+
+fn times(outcome: &Outcome, name: &str) -> Vec<f64> {
+    outcome.events.iter().filter(|event| event.name == name).map(|event| event.t).collect()
+}
+
+/// It flies 2 e v/g after an impact of speed v, and is highest half-way.
+#[test]
+fn a_ball_turns_around_at_its_impacts_and_between_them() {
+    let (fall, e) = (0.2_f64.sqrt(), 0.6);
+    let flights = [2.0 * e * fall, 2.0 * e * e * fall];
+    let text = ball(
+        r#"{"name": "up", "when": "p.vy", "direction": "rising"},
+        {"name": "down", "when": "p.vy", "direction": "falling"},
+        {"name": "fast", "when": "p.vy - 2", "direction": "rising"}"#,
+    );
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+        let ups = [fall, fall + flights[0], fall + flights[0] + flights[1]];
+        let downs = [fall + 0.5 * flights[0], ups[1] + 0.5 * flights[1]];
+        // The second impact leaves 1.6 m/s.
+        for (name, expected) in [("up", &ups[..]), ("down", &downs), ("fast", &ups[..1])] {
+            let found = times(&outcome, name);
+            assert_eq!(found.len(), expected.len(), "{:?}: {name} at {found:?}", request.method);
+            found.iter().zip(expected).for_each(|(t, expected)| assert_near(*t, *expected, 1e-9, name));
+        }
+    }
+}
+
+#[test]
+fn what_an_impact_makes_happen_ends_the_run_and_is_derived_with_it() {
+    let text = ball(r#"{"name": "up", "when": "p.vy", "direction": "rising", "action": "stop"}"#);
+    let fall = 0.2_f64.sqrt();
+    for request in methods() {
+        let outcome = run(&scene(&text), &request);
+        assert_eq!(outcome.ended_by.as_deref(), Some("up"), "{:?}", request.method);
+        assert_near(outcome.last.t, fall, 1e-9, "end");
+        assert_near(outcome.events[0].omega[0], 0.0, 1e-12, "rate");
+    }
+    let text = ball(r#"{"name": "up", "when": "p.vy - 1", "direction": "rising"}"#);
+    let to = ["start.ball.origin[1]", "gravity[1]", "walls.floor.restitution"];
+    let found = derived(&template(&text), &["event:up", "impact:floor"], &to, 1.0);
+    assert_eq!(found.lost, None);
+    let expected = [0.5 * fall, 0.05 * fall, 0.0];
+    for measure in &found.measures {
+        assert_near(measure.value, fall, 1e-10, &measure.name);
+        let slopes = measure.slopes.iter().zip(expected);
+        slopes.for_each(|(found, expected)| assert_near(*found, expected, 1e-9, &measure.name));
+    }
+}
+
+/// Rotors of 2 and 3 kg·m² at 4 and -1 rad/s turn at 1 rad/s together.
+#[test]
+fn a_clutch_makes_events_happen_when_it_closes() {
+    let text = r#"{"name": "clutch", "gravity": [0, 0], "parameters": {"when": 0.5},
+        "bars": [{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 2}, {"name": "b", "mass": 1, "centre": [0, 0], "inertia": 3}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "locks": [{"name": "clutch", "body": "b", "relative_to": "a"}], "inactive": ["clutch"],
+        "events": [{"name": "in", "when": "t - when", "on": ["clutch"]},
+            {"name": "turned", "when": "b.omega", "direction": "rising"},
+            {"name": "slow", "when": "a.omega - 2", "direction": "falling"},
+            {"name": "faster", "when": "a.omega - 3", "direction": "rising"}],
+        "start": {"a": {"phi": 0, "omega": 4}, "b": {"phi": 1, "omega": -1}}, "until": 2, "every": 2}"#;
+    for request in methods() {
+        let outcome = run(&scene(text), &request);
+        assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+        let found: Vec<_> = outcome.events.iter().map(|event| (event.name.as_str(), event.t)).collect();
+        assert_eq!(found, [("in", 0.5), ("turned", 0.5), ("slow", 0.5)], "{:?}", request.method);
+    }
+    let found = derived(&template(text), &["event:turned", "a.phi"], &["parameters.when"], 1.0);
+    assert_eq!(found.lost, None);
+    assert_near(found.measures[0].slopes[0], 1.0, 1e-12, "turned");
+    assert_near(found.measures[1].slopes[0], 3.0, 1e-9, "a.phi");
+}
