@@ -393,6 +393,23 @@ mod command {
     }
 
     #[test]
+    fn one_that_used_up_its_evaluations_goes_on_where_more_are_allowed() {
+        let program = Program::with_scenes(&["free"]);
+        program
+            .run(&format!("{RUN} -q --max-evaluations 1000"))
+            .exits(4)
+            .says(&["--max-evaluations", "resume"]);
+        let short = program.read(&format!("{FOLDER}/trajectory.csv"));
+        program.run(&format!("resume {FOLDER} -q")).exits(4).says(&["maximum of 1000 evaluations"]);
+        assert!(program.read(&format!("{FOLDER}/trajectory.csv")) == short);
+        program.run(&format!("resume {FOLDER} -q --max-evaluations 100000000")).exits(0);
+        let whole = Program::with_scenes(&["free"]);
+        whole.run(&format!("{RUN} -q --max-evaluations 100000000")).exits(0);
+        assert!(run_results(&program) == run_results(&whole));
+        program.run(&format!("resume {FOLDER}")).exits(6).says(&["finished"]);
+    }
+
+    #[test]
     fn killed_again_and_again_it_comes_out_the_same() {
         let program = Program::with_scenes(&["free"]);
         let mut child = started(&program, RUN);

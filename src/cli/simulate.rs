@@ -16,7 +16,7 @@ use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::run::async_writer::AsyncWriter;
-use crate::run::files::{RECORD, TRAJECTORY};
+use crate::run::files::{EVENTS, RECORD, TRAJECTORY};
 use crate::run::table::Table;
 use crate::run::trust::Level;
 use crate::run::{
@@ -24,11 +24,9 @@ use crate::run::{
     wall_clock,
 };
 use crate::scene::{Override, Scene, Template, read_text, source_name};
+use crate::stepping::Cause;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// The table of a run's events.
-const EVENTS: &str = "events.csv";
 
 /// Every file a run may leave; those of an earlier run in the same folder go with it.
 const FILES: &[&str] = &[
@@ -215,7 +213,10 @@ impl Task<'_> {
             let is_left = checkpoints.has_any() && failure.exit != Exit::Interrupted;
             if is_left { failure.with_checkpoint(folder.path()) } else { failure }
         })?;
-        checkpoints.remove()?;
+        // A run that has used up its evaluations goes on where `resume` allows more.
+        if outcome.stop.as_ref().is_none_or(|stop| stop.cause != Cause::EffortExhausted) {
+            checkpoints.remove()?;
+        }
         let failure = outcome.stop.clone().map(Failure::from);
         Ok(Done { outcome, folder, failure })
     }

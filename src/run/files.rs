@@ -25,6 +25,8 @@ use tempfile::NamedTempFile;
 pub const TRAJECTORY: &str = "trajectory.csv";
 /// Settings and results.
 pub const RECORD: &str = "run.json";
+/// The events of a run.
+pub const EVENTS: &str = "events.csv";
 /// The points of a sweep.
 pub const SWEEP: &str = "sweep.csv";
 /// Settings and totals of a sweep.

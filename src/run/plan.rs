@@ -317,6 +317,9 @@ fn usual_max_evaluations(method: MethodId, until: f64) -> u64 {
         .min(MOST_EVALUATIONS[usize::from(method == MethodId::Taylor)]) as u64
 }
 
+/// How a note ends that says that the evaluations allowed may not do.
+pub(super) const MORE_IS_ALLOWED: &str = "--max-evaluations allows more, with `resume` too";
+
 /// What there is to say of a horizon \[s\] that lies beyond what the evaluations allowed can reach, where the
 /// scene's rates go up to `rate` \[rad/s\].
 fn cut_short(
@@ -331,7 +334,7 @@ fn cut_short(
     (reached < until).then(|| {
         format!(
             "{until} s take {method} up to {steps:.0e} steps, and {max_evaluations:.0e} evaluations are allowed: it may stop from about {reached:.0e} s on; \
-             --max-evaluations allows more, with `resume` too"
+             {MORE_IS_ALLOWED}"
         )
     })
 }

@@ -3,7 +3,7 @@
 use super::super::contact::{ContactDriver, ContactDriverState};
 use super::super::custom::Custom;
 use super::super::drift::Limits;
-use super::super::plan::Plan;
+use super::super::plan::{MORE_IS_ALLOWED, Plan};
 use super::super::sample::Sample;
 use super::super::trust::{ErrorEstimator, Kept};
 use super::{Outcome, Running};
@@ -67,7 +67,9 @@ impl Snapshot {
 
     /// Bounds the evaluations of the whole run anew, those made so far counted in.
     pub fn allow(&mut self, max_evaluations: u64) {
-        self.outcome.plan.max_evaluations = max_evaluations;
+        let plan = &mut self.outcome.plan;
+        plan.max_evaluations = max_evaluations;
+        plan.notes.retain(|note| !note.ends_with(MORE_IS_ALLOWED));
     }
 
     /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or
