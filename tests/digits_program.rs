@@ -55,3 +55,25 @@ fn what_makes_no_sense_is_refused_and_leaves_no_files() {
     }
     assert!(program.files().iter().all(|file| !file.contains("trajectory") && !file.contains("unfinished")));
 }
+
+/// Events have a table of their own, with the digits to which both runs agree.
+#[test]
+fn events_are_written_with_their_agreement() {
+    let program = Program::with_scenes(&["free"]);
+    let text = program.read("free.json").trim_end().strip_suffix('}').expect("an object").to_owned()
+        + r#", "events": [{"name": "level", "when": "bar1.sin"}, {"name": "enough", "when": "t - 1.25", "action": "stop"}]}"#;
+    program.write("events.json", &text);
+    let ran = program.run("run events.json --trusted-until 2 --every 0.5 --json").exits(0);
+    let object = ran.object();
+    assert_eq!(object["events"]["ended_by"], "enough");
+    assert_eq!(object["final"]["t"], 1.25);
+    let count = object["events"]["count"].as_u64().expect("a number") as usize;
+    let table = program.read("output/free/taylor-trusted/events.csv");
+    assert_eq!(table.lines().count(), count + 1, "{table}");
+    assert!(table.starts_with("event,t [s],bar1.phi [rad],"), "{table}");
+    for line in table.lines().skip(1) {
+        let agreement: f64 = line.split(',').next_back().and_then(|cell| cell.parse().ok()).expect("digits");
+        assert!(agreement > 3.0, "{line}");
+    }
+    program.run("run events.json --digits 30 --until 1 --every 0.5").exits(0).shows(&["level: at t = "]);
+}

@@ -27,7 +27,7 @@ pub fn source(text: &str, set: &[&str], until: &str, every: &str) -> Source {
     }
 }
 
-fn shipped(name: &str) -> String {
+pub fn shipped(name: &str) -> String {
     let path = format!("{}/examples/scenes/{name}.json", env!("CARGO_MANIFEST_DIR"));
     std::fs::read_to_string(path).expect("a shipped scene")
 }

@@ -61,6 +61,7 @@ mod looped;
 #[cfg(feature = "digits")]
 mod many_digits;
 #[cfg(feature = "digits")]
+mod many_digits_events;
 mod many_digits_walls;
 mod metamorphic;
 mod modes;

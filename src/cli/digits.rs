@@ -12,7 +12,7 @@ use crate::run::digits::{
     Forecast, LongError, Pair, Precision, Progress as Reached, Row, Saved as LongSaved, Source, forecast,
     planned,
 };
-use crate::run::files::{RECORD, TRAJECTORY};
+use crate::run::files::{EVENTS, RECORD, TRAJECTORY};
 use crate::run::{Checkpoints, Folder, Refusal, Stream};
 use crate::scene::{Template, read_text, source_name};
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 /// Files of such a run.
-const FILES: &[&str] = &[TRAJECTORY, RECORD];
+const FILES: &[&str] = &[TRAJECTORY, RECORD, EVENTS];
 /// Attempts at a proof; each takes the growth that the one before has met.
 const ATTEMPTS: u32 = 6;
 
@@ -346,13 +346,18 @@ impl<'a> Task<'a> {
             folder.clear(&FILES[1..])?;
         }
         let hash = folder.keep(stream)?;
+        let events = pair.events();
         let shown = report::Shown {
             source: &self.source,
             pair,
             layout: &layout,
             summary: &summary,
             within: self.within,
+            events: &events,
         };
+        if crate::report::events::has_any(self.mechanism()) {
+            folder.write(EVENTS, report::events(&shown).as_bytes())?;
+        }
         folder.write(RECORD, format!("{:#}\n", report::record(&shown, &hash)).as_bytes())?;
         checkpoints.remove()?;
         let failure = summary.parted.map(|t| {

@@ -58,8 +58,10 @@ use self::friction::FrictionSeries;
 use self::polynomial::{Fractions, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
+pub use self::user::FormulaSeries;
 use self::user::{At, UserSeries};
 use super::Coordinates;
+use super::force::UserForce;
 use super::partition::CoordinatePartition;
 use super::schur::Weakest;
 use super::tree::size;
@@ -125,6 +127,17 @@ pub struct Series<T: SeriesNumber> {
 }
 
 impl<T: SeriesNumber> Series<T> {
+    /// The powers of a formula in the motion this is of, from a time and angles on.
+    pub fn formula<'a>(
+        &self,
+        formula: &UserForce<T::Constant>,
+        series: &'a mut FormulaSeries<T>,
+        (time, phi): (T, &[T]),
+    ) -> &'a [T] {
+        let at = At { time, phi, z: &self.z, omega: &self.omega, n: self.elements };
+        series.values(formula, self.order, at)
+    }
+
     /// Room for series of the terms of a mechanism in some coordinates up to this power of the rates, at
     /// least
     /// 2.

@@ -1,9 +1,10 @@
 //! How a run in many digits went: its table, its record, its page.
 
 use super::page::{Page, counted, figure, magnitude};
+use crate::arithmetic::Real;
 use crate::arithmetic::digits::Layout as Decimals;
 use crate::dynamics::Mechanism;
-use crate::run::digits::{Forecast, Pair, Row, Source, Wide};
+use crate::run::digits::{Forecast, LongEvent, Pair, Row, Source, Wide};
 use crate::run::files::sha256;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -54,6 +55,23 @@ impl Layout {
 /// Numbers as decimal text.
 fn decimal(number: &Wide, digits: usize) -> String {
     number.to_decimal(digits, Decimals::Free)
+}
+
+/// All events as a table, with their numbers to as many digits as runs agree to.
+pub fn events(shown: &Shown) -> String {
+    let Shown { source, layout, events, within, .. } = shown;
+    let mut text = super::events::header(&source.mechanism);
+    text += if within.is_some() { ",agreement [digits]\n" } else { "\n" };
+    for (event, agreement) in *events {
+        let digits = layout.digits(*agreement);
+        let numbers = event.phi.iter().zip(&event.omega).flat_map(|(phi, omega)| [phi, omega]);
+        let mut cells = vec![event.name.clone(), decimal(&event.t, digits)];
+        cells.extend(numbers.map(|number| decimal(number, digits)));
+        cells.extend(agreement.map(|agreement| format!("{agreement:.1}")));
+        text += &cells.join(",");
+        text.push('\n');
+    }
+    text
 }
 
 /// The trajectory as CSV.
@@ -176,6 +194,15 @@ pub struct Shown<'a> {
     pub summary: &'a Summary,
     /// How near runs must be \[rad\].
     pub within: Option<f64>,
+    /// Events, with the digits to which runs agree.
+    pub events: &'a [(LongEvent, Option<f64>)],
+}
+
+impl Shown<'_> {
+    /// The event that has ended the run.
+    fn ended_by(&self) -> Option<&str> {
+        self.pair.runs().last().and_then(|run| run.ended_by())
+    }
 }
 
 /// What a proof will take, before it begins.
@@ -193,7 +220,7 @@ pub fn forecast(forecast: &Forecast, until: f64) -> String {
 
 /// The report as one JSON object; numbers of many digits are texts.
 pub fn object(shown: &Shown) -> Value {
-    let Shown { source, pair, layout, summary, within } = shown;
+    let Shown { source, pair, layout, summary, within, events } = shown;
     let digits = layout.digits(summary.agreement);
     let bodies: Map<String, Value> = (layout.names.iter().zip(summary.last()))
         .map(|(name, numbers)| {
@@ -208,7 +235,13 @@ pub fn object(shown: &Shown) -> Value {
         json!({"digits": precision.digits, "order": precision.order, "steps": steps, "impacts": impacts})
     };
     let runs: Vec<Value> = pair.runs().iter().map(|one| run(&**one)).collect();
-    json!({
+    let first: Vec<Value> = (events.iter().take(super::events::NAMED))
+        .map(|(event, agreement)| {
+            let t = decimal(&event.t, layout.digits(*agreement));
+            json!({"name": event.name, "t": t, "agreement_digits": agreement})
+        })
+        .collect();
+    let mut object = json!({
         "scene": source.scene.name,
         "method": "taylor",
         "settings": runs.first(),
@@ -232,7 +265,11 @@ pub fn object(shown: &Shown) -> Value {
             "runs": runs,
             "how": "two runs with other digits and orders, compared at every row",
         })),
-    })
+    });
+    if super::events::has_any(&source.mechanism) {
+        object["events"] = json!({"count": events.len(), "ended_by": shown.ended_by(), "first": first});
+    }
+    object
 }
 
 /// The record of a run: the report, the scene, versions; what depends on the clock stands apart.
@@ -252,7 +289,7 @@ pub fn record(shown: &Shown, trajectory: &str) -> Value {
 
 /// The report as a page.
 pub fn text(shown: &Shown) -> String {
-    let Shown { source, pair, layout, summary, within } = shown;
+    let Shown { source, pair, layout, summary, within, events } = shown;
     let mut page = Page::new(&source.scene.name, &source.scene.description);
     for run in pair.runs() {
         let ([steps, impacts], precision) = (run.counts(), run.precision());
@@ -300,6 +337,11 @@ pub fn text(shown: &Shown) -> String {
     if !source.mechanism.constraints.is_empty() {
         let [position, velocity] = summary.residual.map(magnitude);
         page.entry("constraints", &format!("{position} rad or m and {velocity} rad/s or m/s at most"));
+    }
+    let times: Vec<_> = events.iter().map(|(event, _)| (event.name.as_str(), event.t.value())).collect();
+    super::events::describe_times(&mut page, &source.mechanism, &times);
+    if let Some(event) = shown.ended_by() {
+        page.entry("ended by", event);
     }
     page.into_text()
 }

@@ -7,15 +7,15 @@ use serde_json::{Value, json};
 use std::fmt::Write;
 
 /// Events that the record names; the table has all that were kept.
-const NAMED: usize = 100;
+pub(super) const NAMED: usize = 100;
 
 /// True where a scene has events.
 pub fn has_any(mechanism: &Mechanism) -> bool {
     !mechanism.event_names().is_empty()
 }
 
-/// All events as a table: name, time, angles and rates of all bodies, translational coordinates.
-pub fn table(mechanism: &Mechanism, outcome: &Outcome) -> String {
+/// What stands above the table: name, time, angles and rates of all bodies, translational coordinates.
+pub(super) fn header(mechanism: &Mechanism) -> String {
     let n = mechanism.bodies.len();
     let mut text = "event,t [s]".to_owned();
     for body in &mechanism.bodies {
@@ -24,7 +24,12 @@ pub fn table(mechanism: &Mechanism, outcome: &Outcome) -> String {
     for k in n..mechanism.coordinates() {
         let _ = write!(text, ",{} [m],{} [m/s]", mechanism.coordinate_name(k), mechanism.rate_name(k));
     }
-    text.push('\n');
+    text
+}
+
+/// All events as a table.
+pub fn table(mechanism: &Mechanism, outcome: &Outcome) -> String {
+    let mut text = header(mechanism) + "\n";
     for event in &outcome.events {
         let _ = write!(text, "{},{:?}", event.name, event.t);
         for (phi, omega) in event.phi.iter().zip(&event.omega) {
@@ -49,22 +54,27 @@ pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> 
     })
 }
 
-/// What the page says.
-pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
+/// When events have happened, on the page: by their names and times.
+pub(super) fn describe_times(page: &mut Page, mechanism: &Mechanism, events: &[(&str, f64)]) {
     let names = mechanism.event_names();
     for (number, name) in names.iter().enumerate().take(10) {
-        let times: Vec<&f64> =
-            outcome.events.iter().filter(|event| event.name == *name).map(|event| &event.t).collect();
+        let times: Vec<f64> = events.iter().filter(|event| event.0 == *name).map(|event| event.1).collect();
         let when = match times[..] {
             [] => "never".to_owned(),
-            [only] => format!("at t = {} s", figure(*only)),
+            [only] => format!("at t = {} s", figure(only)),
             [first, .., last] => {
                 let count = counted(times.len() as u64, "time", "times");
-                format!("{count}, t = {} s to {} s", figure(*first), figure(*last))
+                format!("{count}, t = {} s to {} s", figure(first), figure(last))
             }
         };
         page.entry(if number == 0 { "events" } else { "" }, &format!("{name}: {when}"));
     }
+}
+
+/// What the page says.
+pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
+    let events: Vec<_> = outcome.events.iter().map(|event| (event.name.as_str(), event.t)).collect();
+    describe_times(page, mechanism, &events);
     if let Some(event) = &outcome.ended_by {
         page.entry("ended by", &format!("{event}, before the horizon of {} s", figure(outcome.plan.until)));
     }

@@ -35,7 +35,7 @@ impl Template {
     /// As [`Template::scene`]; a number whose digits do not tell all of it, or a part that is not known
     /// exactly.
     pub fn exact<C: Decimal>(&self, typed: &[String]) -> Result<(Scene<C>, Times<C>), SceneError> {
-        self.exact_with(typed, &[], Watched::All)
+        self.exact_with(typed, &[], Watched::Here)
     }
 
     /// The same where the numbers at some paths are these.
@@ -79,10 +79,10 @@ impl Template {
 /// Who watches for the events of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watched {
-    /// Nobody: scenes with events are refused.
-    All,
-    /// Another run beside: those are refused that change what acts.
-    Changes,
+    /// Whoever runs the scene: they are part of it.
+    Here,
+    /// Another run, which this one goes beside.
+    Beside,
 }
 
 /// A number as people type them on a command line, exactly; see [`number`](super::number).
@@ -171,12 +171,8 @@ impl<'a, C: Decimal> Reader<'a, C> {
     fn refuse_parts(&self, scene: &Scene) -> Result<(), SceneError> {
         let changes =
             |event: &SceneEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
-        let has_events = match self.watched {
-            Watched::All => !scene.events.is_empty(),
-            Watched::Changes => scene.events.iter().any(changes),
-        };
         let parts = [
-            ("events", has_events, "events change what acts"),
+            ("events", scene.events.iter().any(changes), "events change what acts"),
             ("inactive", !scene.inactive.is_empty(), "events change what acts"),
         ];
         for (key, is_there, why) in parts {

@@ -12,7 +12,7 @@ use crate::dynamics::kernel::dot;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::series::{Constants, Terms};
 use crate::dynamics::tree::{self, Tree};
-use crate::scene::{Decimal, Scene};
+use crate::scene::{Decimal, Direction, Scene, SceneEvent};
 use std::sync::Arc;
 
 /// Constants of a mechanism in numbers of the kind `C`, and where it starts.
@@ -36,12 +36,27 @@ pub struct ExactMechanism<C> {
     pub actions: Vec<Action<C>>,
     /// Forces by formulas.
     pub forces: Vec<UserForce<C>>,
+    /// Events.
+    pub events: Vec<ExactEvent<C>>,
     /// Constraint equations.
     pub constraints: Vec<ConstraintEquation<C>>,
     /// The gap of each wall, and its restitution.
     pub walls: Vec<(ConstraintEquation<C>, C)>,
     /// Energy of gravity of the masses if they were at the ground points they hang from \[J\].
     ground_energy: C,
+}
+
+/// An event that only tells when it happens, or ends the run.
+#[derive(Clone, Debug)]
+pub struct ExactEvent<C> {
+    /// Name.
+    pub name: String,
+    /// Which zeros of its function count.
+    pub direction: Direction,
+    /// True where the run ends there.
+    pub stop: bool,
+    /// Its function, recorded as a torque.
+    pub function: UserForce<C>,
 }
 
 /// Positions and rates of all coordinates at the start, and which of the angles and rates the scene gives.
@@ -81,9 +96,17 @@ impl<C: Decimal> ExactMechanism<C> {
             .map_err(|error| error.to_string())?;
         parts::joints(scene, &forest, &mut constraints);
         constraints.extend(parts::guides(scene, &forest));
-        let forces = match Formulas::of(scene, &forest).map_err(|error| error.to_string())? {
-            Some(formulas) => formulas.record(&formulas.parameters, &[]),
-            None => Ok(Vec::new()),
+        let formulas = Formulas::of(scene, &forest).map_err(|error| error.to_string())?;
+        let (forces, functions) = match &formulas {
+            Some(formulas) => (formulas.record(&formulas.parameters, &[]), formulas.record_events()),
+            None => (Ok(Vec::new()), Ok(Vec::new())),
+        };
+        let functions = functions.map_err(|error| error.to_string())?;
+        let event = |(event, function): (&SceneEvent, UserForce<C>)| ExactEvent {
+            name: event.name.clone(),
+            direction: event.direction,
+            stop: event.stop,
+            function,
         };
         let ground_energy = (bodies.iter().zip(&forest.roots()))
             .fold(C::ZERO, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
@@ -95,6 +118,7 @@ impl<C: Decimal> ExactMechanism<C> {
             torsions: parts::torsions(scene),
             actions: parts::actions(scene, &forest),
             forces: forces.map_err(|error| error.to_string())?,
+            events: scene.events.iter().zip(functions).map(event).collect(),
             walls: (scene.walls.iter())
                 .map(|wall| {
                     let normal = Complex::new(wall.normal[0], wall.normal[1]);

@@ -106,7 +106,7 @@ impl<C: Real> Expression<C> {
 pub(crate) struct FormulaEvent<C = f64> {
     /// Name.
     pub name: String,
-    when: Expression<C>,
+    pub(super) when: Expression<C>,
     /// Which zeros count.
     pub direction: Direction,
     /// True where the run ends there.

@@ -1,6 +1,6 @@
 //! A law of a scene as it is recorded: on the branches of some modes, with some parameters.
 
-use super::formula::{Expression, Formulas, span};
+use super::formula::{Expression, FormulaEvent, Formulas, span};
 use super::span::SpanLaw;
 use super::{Loads, UserForce};
 use crate::arithmetic::Scalar;
@@ -64,6 +64,21 @@ pub(super) struct Recorded<'a, C> {
     pub formulas: &'a Formulas<C>,
     pub parameters: &'a [C],
     pub modes: &'a [bool],
+}
+
+impl<C: Decimal> Formulas<C> {
+    /// Records the functions of its events, which have no branches: each as a torque on the first body.
+    ///
+    /// # Errors
+    /// None: they are no potentials.
+    pub fn record_events(&self) -> Result<Vec<UserForce<C>>, CompileError> {
+        let record = |event: &FormulaEvent<C>| {
+            let place = Acts::Torque { body: 0, base: None, torque: event.when.clone() };
+            let law = Law { name: event.name.clone(), potential: None, place };
+            Recorded { law: &law, formulas: self, parameters: &self.parameters, modes: &[] }.record()
+        };
+        self.events.iter().map(record).collect()
+    }
 }
 
 impl<C: Decimal> Recorded<'_, C> {

@@ -12,6 +12,27 @@ use crate::dynamics::force::user::{Input, Part};
 #[derive(Clone, Debug)]
 pub struct UserSeries<T: SeriesNumber>([PartSeries<T>; 2]);
 
+/// The series of a formula that is recorded as a torque, powers 0 to P.
+#[derive(Clone, Debug)]
+pub struct FormulaSeries<T>(TapeSeries<T>);
+
+impl<T: SeriesNumber> FormulaSeries<T> {
+    /// Room for powers up to `order`.
+    pub fn new(formula: &UserForce<T::Constant>, order: usize) -> Self {
+        Self(TapeSeries::new(&formula.parts[1].tape, order))
+    }
+
+    /// Its powers in a motion that is expanded, as many as there is room for; none where it is 0.
+    pub fn values(&mut self, formula: &UserForce<T::Constant>, order: usize, at: At<T>) -> &[T] {
+        let part = &formula.parts[1];
+        for m in 0..=order {
+            let input = |number: u32| at.power(formula, formula.inputs[number as usize], m);
+            self.0.advance(&part.tape, m, input);
+        }
+        part.torques.first().map_or(&[], |&(_, slot)| self.0.of(slot))
+    }
+}
+
 /// Those of what its potential does, or of what it applies beside.
 #[derive(Clone, Debug)]
 enum PartSeries<T: SeriesNumber> {

@@ -5,6 +5,7 @@
 //! they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
 mod confirm;
+mod events;
 mod growth;
 mod keep;
 mod motion;
@@ -17,6 +18,7 @@ pub use self::growth::{Forecast, forecast, planned};
 pub use self::pair::{Pair, Progress};
 pub use self::precision::{DIGITS, Precision};
 
+use self::events::Happened;
 use self::motion::{LongState, Motion};
 use super::plan::Refusal;
 use crate::arithmetic::digits::{Digits, MOST};
@@ -88,6 +90,19 @@ impl Row {
     }
 }
 
+/// An event of a run in many digits.
+#[derive(Clone, Debug)]
+pub struct LongEvent {
+    /// Its name.
+    pub name: String,
+    /// Time \[s\].
+    pub t: Wide,
+    /// Angles of all bodies, not wrapped, then positions of origins \[rad, m\].
+    pub phi: Vec<Wide>,
+    /// Their rates \[rad/s, m/s\].
+    pub omega: Vec<Wide>,
+}
+
 /// Where a run in many digits is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
@@ -96,6 +111,11 @@ pub struct Saved {
     steps: u64,
     impacts: u64,
     radius: Option<f64>,
+    /// Events with the numbers of each, and the sides of zero their formulas are on.
+    happened: Vec<(usize, Vec<Vec<u64>>)>,
+    sides: Vec<i8>,
+    /// The last row, where an event has ended the run.
+    ended: Option<u64>,
 }
 
 impl Saved {
@@ -132,8 +152,14 @@ pub trait LongRun: Send {
     /// Time at the end of the last step \[s\].
     fn time(&self) -> f64;
 
-    /// The horizon \[s\].
+    /// The horizon \[s\], or the time of the event that has ended the run.
     fn last_time(&self) -> f64;
+
+    /// The events up to the last row that was asked for.
+    fn events(&self) -> Vec<LongEvent>;
+
+    /// The event that has ended the run.
+    fn ended_by(&self) -> Option<&str>;
 }
 
 /// A run of a scene in so many digits.
@@ -190,6 +216,10 @@ struct Runner<const W: usize> {
     rows: Rows<W>,
     /// Energy at the start \[J\].
     energy: Digits<W>,
+    /// Time of the last row that was asked for \[s\].
+    seen: Digits<W>,
+    /// True where an event has ended the run there.
+    has_ended: bool,
 }
 
 impl<const W: usize> Runner<W> {
@@ -214,7 +244,8 @@ impl<const W: usize> Runner<W> {
         let posture = motion.state_posture();
         let z = motion.mechanism.elements(&posture.phi);
         let [kinetic, potential] = motion.mechanism.energy(&posture.phi, &posture.omega, &z);
-        Ok(Self { motion, rows, energy: kinetic + potential })
+        let seen = Digits::of(-1.0);
+        Ok(Self { motion, rows, energy: kinetic + potential, seen, has_ended: false })
     }
 }
 
@@ -228,10 +259,15 @@ impl<const W: usize> LongRun for Runner<W> {
     }
 
     fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<Row>, StepError> {
-        let t = self.rows.time(number);
+        let mut t = self.rows.time(number);
         if !self.motion.reach(t, pause)? {
             return Ok(None);
         }
+        if let Some((_, end)) = self.motion.end().filter(|(_, end)| *end <= t) {
+            (t, self.has_ended) = (end, true);
+            self.rows = Rows { until: end, last: number, ..self.rows };
+        }
+        self.seen = t;
         let posture = self.motion.at(t);
         let mechanism = &self.motion.mechanism;
         let z = mechanism.elements(&posture.phi);
@@ -256,15 +292,42 @@ impl<const W: usize> LongRun for Runner<W> {
         let LongState { t, u, rate, work, impact_energy, steps, impacts, radius } = self.motion.state();
         let numbers = [t, work, impact_energy].into_iter().chain(u).chain(rate);
         let words = numbers.map(Digits::to_words).collect();
-        Saved { precision: self.precision(), words, steps: *steps, impacts: *impacts, radius: *radius }
+        let happened = self.motion.watch.happened.iter().map(|Happened { event, t, phi, omega }| {
+            (*event, std::iter::once(t).chain(phi).chain(omega).map(Digits::to_words).collect())
+        });
+        Saved {
+            precision: self.precision(),
+            words,
+            steps: *steps,
+            impacts: *impacts,
+            radius: *radius,
+            happened: happened.collect(),
+            sides: self.motion.watch.sides.clone(),
+            ended: self.has_ended.then_some(self.rows.last),
+        }
     }
 
     fn resume(&mut self, saved: &Saved) -> bool {
-        let Some(numbers) =
-            saved.words.iter().map(|words| Digits::from_words(words)).collect::<Option<Vec<_>>>()
-        else {
-            return false;
+        let numbers = |words: &[Vec<u64>]| {
+            words.iter().map(|words| Digits::from_words(words)).collect::<Option<Vec<_>>>()
         };
+        let n = self.motion.mechanism.structure.coordinates();
+        let happened = |(event, words): &(usize, Vec<Vec<u64>>)| {
+            let numbers = numbers(words).filter(|numbers| numbers.len() == 1 + 2 * n)?;
+            let (phi, omega) = numbers[1..].split_at(n);
+            let is_known = *event < self.motion.mechanism.events.len();
+            is_known.then(|| Happened {
+                event: *event,
+                t: numbers[0],
+                phi: phi.to_vec(),
+                omega: omega.to_vec(),
+            })
+        };
+        let happened: Option<Vec<Happened<W>>> = saved.happened.iter().map(happened).collect();
+        let (Some(numbers), Some(happened)) = (numbers(&saved.words), happened) else { return false };
+        if saved.sides.len() != self.motion.watch.sides.len() {
+            return false;
+        }
         let f = self.motion.state().u.len();
         let (&[t, work, impact_energy], rest) = match numbers.split_first_chunk::<3>() {
             Some(split) if split.1.len() == 2 * f && saved.precision == self.precision() => split,
@@ -281,6 +344,10 @@ impl<const W: usize> LongRun for Runner<W> {
             impacts: saved.impacts,
             radius: saved.radius,
         });
+        (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
+        if let Some(last) = saved.ended {
+            self.rows.last = last;
+        }
         true
     }
 
@@ -294,5 +361,22 @@ impl<const W: usize> LongRun for Runner<W> {
 
     fn last_time(&self) -> f64 {
         self.rows.until.value()
+    }
+
+    fn events(&self) -> Vec<LongEvent> {
+        let motion = &self.motion;
+        let resized = |numbers: &[Digits<W>]| numbers.iter().map(|number| number.resized()).collect();
+        let event = |Happened { event, t, phi, omega }: Happened<W>| LongEvent {
+            name: motion.mechanism.events[event].name.clone(),
+            t: t.resized(),
+            phi: resized(&phi),
+            omega: resized(&omega),
+        };
+        motion.watch.until(motion, self.seen).into_iter().map(event).collect()
+    }
+
+    fn ended_by(&self) -> Option<&str> {
+        let ended = self.motion.end().filter(|_| self.has_ended);
+        ended.map(|(event, _)| self.motion.mechanism.events[event].name.as_str())
     }
 }

@@ -11,6 +11,7 @@
 //! (module `wall`).
 
 use super::confirm::{Probe, confirmed};
+use super::events::Watch;
 use super::keep::Keeper;
 use super::precision::Precision;
 use super::wall;
@@ -71,6 +72,8 @@ pub struct Motion<const W: usize> {
     pub(super) keeper: Keeper<W>,
     /// What confirms steps, where laws may be flat.
     pub(super) probe: Option<Probe<W>>,
+    /// Watches for events.
+    pub(super) watch: Watch<W>,
     /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends
     /// on.
     step: Option<(Digits<W>, Option<usize>)>,
@@ -109,6 +112,7 @@ impl<const W: usize> Motion<W> {
             series,
             keeper,
             probe: Probe::of(&mechanism, coordinates),
+            watch: Watch::new(&mechanism, precision.order),
             step: None,
             radius: None,
             longest: until,
@@ -187,6 +191,7 @@ impl<const W: usize> Motion<W> {
             state: self.state.clone(),
             keeper: self.keeper.clone(),
             probe: self.probe.clone(),
+            watch: self.watch.clone(),
             zeros: self.zeros.clone(),
             kept: self.kept.clone(),
             step: None,
@@ -214,23 +219,31 @@ impl<const W: usize> Motion<W> {
         &self.state
     }
 
-    /// Makes steps until the one that holds `until` is the next; pauses after a step where `pause` is true.
-    /// True where it is there.
+    /// Makes steps until the one that holds `until`, or an event that ends the run, is the next; pauses after a
+    /// step where `pause` is true.  True where it is there.
     ///
     /// # Errors
     /// The series is not finite, steps become too small, or a point stays on its wall.
     pub fn reach(&mut self, until: Digits<W>, pause: &mut dyn FnMut() -> bool) -> Result<bool, StepError> {
         loop {
             let (step, wall) = self.ready()?;
-            if until <= self.state.t + step {
+            if until <= self.state.t + step || self.end().is_some() {
                 return Ok(true);
             }
+            let mut watch = std::mem::take(&mut self.watch);
+            watch.pass(self, step);
+            self.watch = watch;
             self.advance(step)?;
             wall.map_or(Ok(()), |wall| wall::impact(self, wall))?;
             if pause() {
                 return Ok(false);
             }
         }
+    }
+
+    /// The event that ends the run within the step that is next, and its time \[s\].
+    pub fn end(&self) -> Option<(usize, Digits<W>)> {
+        self.watch.stop(&self.mechanism).map(|(event, after)| (event, self.state.t + after))
     }
 
     /// All coordinates at a time inside the step that is next.
@@ -266,6 +279,11 @@ impl<const W: usize> Motion<W> {
             return Ok(step);
         }
         let wanted = self.expand();
+        let mut watch = std::mem::take(&mut self.watch);
+        watch.expand(self);
+        let allowed = watch.allows(wanted, self.precision.tolerance());
+        self.watch = watch;
+        let wanted = if allowed < wanted { short(allowed) } else { wanted };
         let step = confirmed(self, wanted);
         let seconds = self.state.t.value();
         if step.is_nan() {
@@ -285,6 +303,9 @@ impl<const W: usize> Motion<W> {
             Some((wall, length)) => (length, Some(wall)),
             None => (Digits::of(step), None),
         };
+        let mut watch = std::mem::take(&mut self.watch);
+        watch.look(self, step.0.value());
+        self.watch = watch;
         self.step = Some(step);
         Ok(step)
     }

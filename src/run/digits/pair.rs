@@ -1,6 +1,6 @@
 //! Runs side by side, from row to row: one, or two with other digits and orders that prove each other.
 
-use super::{LongError, LongRun, Row, Saved, Source, long_run};
+use super::{LongError, LongEvent, LongRun, Row, Saved, Source, Wide, long_run};
 use crate::arithmetic::Real;
 use crate::stepping::StepError;
 use std::time::{Duration, Instant};
@@ -64,6 +64,32 @@ impl Pair {
         self.runs.first().map_or(0, |run| run.last_row())
     }
 
+    /// The events of the run with the most digits, with the digits to which all agree.
+    pub fn events(&self) -> Vec<(LongEvent, Option<f64>)> {
+        let mut found: Vec<Vec<LongEvent>> = self.runs.iter().map(|run| run.events()).collect();
+        let best = found.pop().unwrap_or_default();
+        let most = self.most();
+        let with_agreement = |(i, event): (usize, LongEvent)| {
+            let digits = |other: &Vec<LongEvent>| match other.get(i) {
+                Some(other) if other.name == event.name => {
+                    let numbers = |event: &LongEvent| -> Vec<Wide> {
+                        std::iter::once(&event.t).chain(&event.phi).chain(&event.omega).copied().collect()
+                    };
+                    agreed(&numbers(other), &numbers(&event)).min(most)
+                }
+                _ => 0.0,
+            };
+            let least = found.iter().map(digits).reduce(f64::min);
+            (event, least)
+        };
+        best.into_iter().enumerate().map(with_agreement).collect()
+    }
+
+    /// Where all digits are the same, there are no more than the runs have.
+    fn most(&self) -> f64 {
+        self.runs.iter().map(|run| run.precision().digits as f64).fold(f64::INFINITY, f64::min)
+    }
+
     /// The runs.
     pub fn runs(&self) -> &[Box<dyn LongRun>] {
         &self.runs
@@ -81,7 +107,15 @@ impl Pair {
         let last = self.last_row().min(first + self.rows - 1);
         let begin = Instant::now();
         let gather = |run: &mut Box<dyn LongRun>| -> Result<Option<Vec<Row>>, StepError> {
-            (first..=last).map(|number| run.row(number, &mut || pause())).collect()
+            let mut rows = Vec::new();
+            // An event may end the run on the way.
+            for number in first..=last {
+                if number <= run.last_row() {
+                    let Some(row) = run.row(number, &mut || pause())? else { return Ok(None) };
+                    rows.push(row);
+                }
+            }
+            Ok(Some(rows))
         };
         let found: Vec<_> = match &mut self.runs[..] {
             [only] => vec![gather(only)],
@@ -98,7 +132,7 @@ impl Pair {
             return Ok(Progress::Paused);
         };
         self.saved = self.runs.iter().map(|run| run.save()).collect();
-        self.next = last + 1;
+        self.next = self.last_row().min(last) + 1;
         let spent = begin.elapsed();
         self.rows = if spent < LONGEST / 4 {
             2 * self.rows
@@ -109,10 +143,10 @@ impl Pair {
         };
         self.rows = self.rows.clamp(1, MOST);
         let best = found.pop().unwrap_or_default();
-        // Where all digits are the same, there are no more than the runs have.
-        let most = self.runs.iter().map(|run| run.precision().digits as f64).fold(f64::INFINITY, f64::min);
+        let most = self.most();
         let with_agreement = |(i, row): (usize, Row)| {
-            let least = found.iter().map(|other| agreement(&other[i], &row).min(most)).reduce(f64::min);
+            let least = |other: &Vec<Row>| other.get(i).map_or(0.0, |other| agreement(other, &row).min(most));
+            let least = found.iter().map(least).reduce(f64::min);
             (row, least)
         };
         Ok(Progress::Rows(best.into_iter().enumerate().map(with_agreement).collect()))
@@ -122,8 +156,12 @@ impl Pair {
 /// Decimal digits to which two rows agree, in angles, rates, positions and velocities: counted from the point
 /// where these are below one.
 fn agreement(a: &Row, b: &Row) -> f64 {
-    let numbers = a.bodies.iter().flatten().zip(b.bodies.iter().flatten());
-    let apart = numbers.map(|(&a, &b)| (a - b).log2() - b.abs().log2().max(0.0));
+    agreed(a.bodies.as_flattened(), b.bodies.as_flattened())
+}
+
+/// Decimal digits to which numbers agree.
+fn agreed(a: &[Wide], b: &[Wide]) -> f64 {
+    let apart = a.iter().zip(b).map(|(&a, &b)| (a - b).log2() - b.abs().log2().max(0.0));
     let most = apart
         .fold(f64::NEG_INFINITY, |most, apart| if apart.is_nan() || apart > most { apart } else { most });
     -most / std::f64::consts::LOG2_10

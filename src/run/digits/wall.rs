@@ -71,7 +71,11 @@ fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) 
 }
 
 /// The zero of a polynomial near a time.
-fn refined<const W: usize>(motion: &Motion<W>, powers: &[Digits<W>], mut t: Digits<W>) -> Digits<W> {
+pub(super) fn refined<const W: usize>(
+    motion: &Motion<W>,
+    powers: &[Digits<W>],
+    mut t: Digits<W>,
+) -> Digits<W> {
     let limbs = motion.precision.limbs;
     t = t.shortened(limbs);
     let mut moved = f64::INFINITY;

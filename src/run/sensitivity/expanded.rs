@@ -203,7 +203,7 @@ impl Block {
         let seed = |(lane, &(path, value)): (usize, &(_, f64))| (path, Number::unknown(value, lane));
         let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
         let (mut scene, _) =
-            template.exact_with(&[], &known, Watched::Changes).map_err(|error| error.to_string())?;
+            template.exact_with(&[], &known, Watched::Beside).map_err(|error| error.to_string())?;
         // Angles that are kept from the start are those of the start that was found.
         let found = structure.start(plain);
         for (k, start) in scene.start.iter_mut().enumerate() {

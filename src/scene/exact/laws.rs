@@ -1,10 +1,10 @@
 //! Formulas of time and state, which are kept as texts, and what they speak of.
 
-use super::{Cursor, Decimal, Reader};
+use super::{Cursor, Decimal, Reader, Watched};
 use crate::scene::error::SceneError;
 use crate::scene::formula::{Formula, Interpolant};
 use crate::scene::locate::Value;
-use crate::scene::{Load, LoadLaw, NamedPoint, Profile, Scene};
+use crate::scene::{Load, LoadLaw, NamedPoint, Profile, Scene, SceneEvent};
 
 /// The list a law stands in.
 fn list<C>(load: &Load<C>) -> &'static str {
@@ -94,6 +94,17 @@ impl<'a, C: Decimal> Reader<'a, C> {
         }
         self.smooth(at, plain)?;
         Ok(plain.to_owned())
+    }
+
+    /// Events, where they are those of this run; their formulas are smooth.
+    pub(super) fn events(&self, plain: &Scene) -> Result<Vec<SceneEvent>, SceneError> {
+        if self.watched == Watched::Beside {
+            return Ok(Vec::new());
+        }
+        for (at, event) in self.root.items("events").iter().zip(&plain.events) {
+            self.smooth(&at.child("when").unwrap_or_else(|| at.clone()), &event.when)?;
+        }
+        Ok(plain.events.clone())
     }
 
     /// A formula without corners and tables.

@@ -199,6 +199,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             signals: plain.signals.clone(),
             integrals: plain.integrals.clone(),
             laws: self.laws(plain)?,
+            events: self.events(plain)?,
             until: plain.until,
             every: plain.every,
             ..Scene::default()

@@ -26,7 +26,7 @@ fn mechanism(name: &str, numbers: &[&'static str]) -> (ExactMechanism<Number>, V
     let seed =
         |(lane, &path): (usize, &&'static str)| (path, Number::unknown(value(path).expect("a value"), lane));
     let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
-    let (scene, _) = template.exact_with(&[], &known, Watched::Changes).expect("known numbers");
+    let (scene, _) = template.exact_with(&[], &known, Watched::Beside).expect("known numbers");
     let start = structure.start(&plain);
     let varied = |k: usize, value: f64| {
         Number::new(value, std::array::from_fn(|lane| libm::sin(1.0 + k as f64 + 1.7 * lane as f64)))
