@@ -62,6 +62,21 @@ fn a_turning_bar_passes_its_angles_at_multiples_of_pi() {
     assert!((run.last_time() - 3.2 * std::f64::consts::PI).abs() < 1e-14);
 }
 
+/// Of a zero of third order a third of the digits are known.
+#[test]
+fn a_formula_may_be_flat_where_it_passes_zero() {
+    let text = r#"{"name": "bar", "gravity": [0, 0],
+        "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "events": [{"name": "level", "when": "bar.sin^3"}],
+        "start": {"bar": {"phi": 0, "omega": 1}}, "until": 7, "every": 7}"#;
+    let events = ended(&source(text, &[], "7", "7")).events();
+    assert_eq!(events.len(), 2);
+    for (event, count) in events.iter().zip(1..) {
+        near(&number(event.t), &(pi() * count), PLACES / 3);
+    }
+}
+
 /// A ball that is dropped from 1 m at 10 m/s², with 0.6 of its speed left after each impact: it flies 2 e v/g,
 /// is highest half-way, and turns around at its impacts.
 #[test]

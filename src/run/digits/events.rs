@@ -23,6 +23,8 @@ const LEAVES: f64 = 1e-3;
 const LOOKS: usize = 8;
 /// Powers the length of a step is taken from: by symmetry some of them may vanish.
 const JUDGES: usize = 5;
+/// Rounds in which a step is shortened, at most.
+const ROUNDS: usize = 20;
 /// Events kept.
 const KEPT: usize = 100_000;
 
@@ -84,16 +86,28 @@ impl<const W: usize> Watch<W> {
         if wanted.is_nan() {
             return wanted;
         }
-        let shortest = |least: f64, powers: &Vec<Digits<W>>| {
-            let weight = |k: usize, step: f64| powers[k].log2() + k as f64 * libm::log2(step);
-            let Some(first) = powers.len().checked_sub(JUDGES) else { return least };
-            let size = (0..3).map(|k| weight(k, wanted)).fold(f64::NEG_INFINITY, f64::max);
-            (first..powers.len()).fold(least, |least, k| {
-                let step = libm::exp2((tolerance + size - powers[k].log2()) / k as f64);
-                if step.is_nan() { least } else { least.min(step) }
-            })
+        let shortened = |mut step: f64, powers: &Vec<Digits<W>>| {
+            let Some((terms, last)) = powers.len().checked_sub(JUDGES).map(|first| powers.split_at(first))
+            else {
+                return step;
+            };
+            // A shorter step has smaller terms.
+            for _ in 0..ROUNDS {
+                let weight = |(k, power): (usize, &Digits<W>)| power.log2() + k as f64 * libm::log2(step);
+                let size = terms.iter().enumerate().map(weight).fold(f64::NEG_INFINITY, f64::max);
+                let allowed = |(j, power): (usize, &Digits<W>)| {
+                    libm::exp2((tolerance + size - power.log2()) / (terms.len() + j) as f64)
+                };
+                let least = last.iter().enumerate().map(allowed).filter(|step| !step.is_nan());
+                let least = least.fold(step, f64::min);
+                if size == f64::NEG_INFINITY || least > 0.99 * step {
+                    break;
+                }
+                step = least;
+            }
+            step
         };
-        self.powers.iter().fold(wanted, shortest)
+        self.powers.iter().fold(wanted, shortened)
     }
 
     /// Looks for what happens in a step of so many seconds.

@@ -17,8 +17,8 @@ use crate::dynamics::kernel::dot;
 use crate::stepping::search::{Crossing, Powers, crossing};
 use crate::stepping::{Cause, StepError};
 
-/// Newton iterations at most; each doubles the digits.
-const MOST: usize = 16;
+/// Newton iterations at most; each doubles the digits, at a zero of higher order it adds a part of one.
+const MOST: usize = 1000;
 
 /// The first wall within a step of so many seconds, and the exact time up to it.
 pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(usize, Digits<W>)>, StepError> {
@@ -70,7 +70,7 @@ fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) 
     powers
 }
 
-/// The zero of a polynomial near a time.
+/// The zero of a polynomial near a time, as far as its digits tell.
 pub(super) fn refined<const W: usize>(
     motion: &Motion<W>,
     powers: &[Digits<W>],
