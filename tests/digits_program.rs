@@ -77,3 +77,14 @@ fn events_are_written_with_their_agreement() {
     }
     program.run("run events.json --digits 30 --until 1 --every 0.5").exits(0).shows(&["level: at t = "]);
 }
+
+/// What is found out on the way stops the run there: the scene itself is not refused.
+#[test]
+fn a_point_that_stays_on_its_wall_stops_the_run() {
+    let program = Program::with_scenes(&[]);
+    let text = r#"{"name": "ball", "gravity": [0, -10], "bars": [{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 1}],
+        "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#;
+    program.write("ball.json", text);
+    program.run("run ball.json --digits 30").exits(4).says(&["t = 0.4472135954999", "stays on wall `floor`"]);
+}

@@ -141,7 +141,8 @@ impl From<StepError> for Failure {
     fn from(error: StepError) -> Self {
         let exit = match error.cause {
             Cause::DriftLimit => Exit::Drift,
-            Cause::Unsuited => Exit::Scene,
+            // What shows itself on the way has not kept the run from beginning.
+            Cause::Unsuited if error.t <= 0.0 => Exit::Scene,
             _ => Exit::Stopped,
         };
         let StepError { method, t, step, what, hint, .. } = &error;
