@@ -179,6 +179,30 @@ fn two_starts_are_no_start() {
     );
 }
 
+/// A bar that slides along another one, and a lock between both: nothing can move, whatever rates are given.
+#[test]
+fn what_is_locked_rests() {
+    let scene = parse_scene(
+        r#"{"name": "locked", "gravity": [0, 0], "bars": [{"name": "a", "mass": 1, "centre": [0.1, 0], "inertia": 0.01},
+            {"name": "b", "mass": 2, "centre": [0.5, 0], "inertia": 0.2}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "ground", "point": [0.921, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "sliders": [{"name": "S", "point": {"body": "a", "point": [0.23, 0]},
+            "rail": {"body": "b", "point": [0, 0], "direction": [1, 0]}}],
+        "locks": [{"name": "lock", "body": "b", "relative_to": "a"}],
+        "start": {"a": {"phi": -1.757, "omega": -0.758}, "b": {"phi": -2.911}}, "until": 1, "every": 0.5}"#,
+        "locked",
+        &[],
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
+    let mechanism = compiled(&scene);
+    assert!(found(&mechanism, &scene).iter().all(|(_, omega)| *omega == 0.0));
+    assert_eq!(mechanism.energy_scale, 1.0);
+    let outcome = driftless::Simulation::new(&scene).expect("equations").run().expect("a run");
+    assert!(outcome.stop.is_none(), "{:?}", outcome.stop);
+    assert!(outcome.drift.energy.max < 1e-15);
+}
+
 #[test]
 fn impossible_starts_name_the_row() {
     let short = with(

@@ -18,6 +18,8 @@ use crate::dynamics::{Mechanism, Time};
 
 /// Singular values below this share of the largest move nothing.
 const NOISE: f64 = 1e-9;
+/// Share of the rates that are given below which what is left of them is rounding.
+const GONE: f64 = 1e-25;
 /// The longest step \[rad, or sizes of the mechanism\].
 const LONGEST: f64 = 0.5;
 /// So many iterations are given to make the violations smaller.
@@ -346,6 +348,15 @@ impl Problem<'_> {
             }
             omega.copy_from_slice(&trial);
             now = there;
+        }
+        // Of rates that constraints leave no room for, nothing but rounding is left.
+        if rates(omega) <= GONE * guessed {
+            let resting = vec![DoubleDouble::ZERO; omega.len()];
+            let there = left(&resting);
+            if squares(&there) <= squares(&now) {
+                omega.copy_from_slice(&resting);
+                now = there;
+            }
         }
         let (left, fastest) = (largest(&now), guessed.max(rates(omega)));
         if left > 0.0 { left / fastest } else { left }
