@@ -3,9 +3,7 @@
 //! `cargo run --example own_parts` prints where it rests from seven starts, when, and how often it has passed the middle.
 
 use driftless::run::Sample;
-use driftless::{
-    Configuration, Direction, Event, Force, Loads, Scalar, SceneBuilder, Simulation, Site, ground, on,
-};
+use driftless::{Configuration, Event, Force, Loads, Scalar, SceneBuilder, Simulation, Site, ground, on};
 use std::ops::ControlFlow;
 
 /// Half the distance between the magnets, how far below the hinge they are, and how far they are from the tip's
@@ -54,10 +52,6 @@ impl Event for Passes {
 
     fn value(&self, at: &Configuration<f64>) -> f64 {
         at.position(&self.tip)[0]
-    }
-
-    fn direction(&self) -> Direction {
-        Direction::Either
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::many_digits::{fixed, near, number, one, pi, shipped, source, times};
 use driftless::run::Request;
-use driftless::run::digits::{LongEvent, LongRun, Precision, Source, long_run};
+use driftless::run::digits::{LongEvent, LongRun, Pair, Precision, Progress, Source, long_run};
 use driftless::{MethodId, Simulation, scene::parse_scene};
 use num_bigint::BigInt;
 
@@ -88,7 +88,7 @@ fn a_ball_turns_around_at_its_impacts_and_between_them() {
                    "line": {"through": [0, 0], "normal": [0, 1]}}],
         "events": [{"name": "up", "when": "p.vy", "direction": "rising"},
             {"name": "down", "when": "p.vy", "direction": "falling"},
-            {"name": "half", "when": "p.y - 1/2"}, {"name": "fast", "when": "p.vy - 2", "direction": "rising"}],
+            {"name": "floor", "when": "p.y"}, {"name": "half", "when": "p.y - 1/2"}, {"name": "fast", "when": "p.vy - 2", "direction": "rising"}],
         "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 1.4, "every": 0.7}"#;
     let long = source(text, &[], "1.4", "0.7");
     let run = ended(&long);
@@ -98,15 +98,18 @@ fn a_ball_turns_around_at_its_impacts_and_between_them() {
     let ups = [fall.clone(), &fall + &flights[0], &fall + &flights[0] + &flights[1]];
     let expected = [
         ("half", (fixed("0.1") * one()).sqrt()),
+        ("floor", ups[0].clone()),
         ("up", ups[0].clone()),
         ("fast", ups[0].clone()),
         ("down", &fall + &flights[0] / 2),
+        ("floor", ups[1].clone()),
         ("up", ups[1].clone()),
         ("down", &ups[1] + &flights[1] / 2),
+        ("floor", ups[2].clone()),
         ("up", ups[2].clone()),
     ];
     agree(&run.events(), &expected);
-    let up = &run.events()[1];
+    let up = &run.events()[2];
     near(&number(up.omega[2]), &(times(&fall, &fixed("10")) * 6 / 10), PLACES);
 
     // Interrupted after its second row it comes to the same events, to the last bit.
@@ -151,6 +154,39 @@ fn events_are_those_of_runs_in_doubles() {
         for (long, plain) in events.iter().zip(&outcome.events) {
             let t: f64 = format!("{:?}", long.t).parse().expect("a number");
             assert!(long.name == plain.name && (t - plain.t).abs() < 1e-8, "{name}: {t} and {plain:?}");
+        }
+    }
+}
+
+/// A checkpoint after the last row holds what happened in the step that row is in, and what has ended the run.
+#[test]
+fn a_pair_resumed_at_its_end_has_all_events() {
+    let long = |action: &str| {
+        let text = format!(
+            r#"{{"name": "bar", "gravity": [0, 0],
+            "bars": [{{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+            "events": [{{"name": "level", "when": "bar.sin"{action}}}],
+            "start": {{"bar": {{"phi": 0, "omega": 1}}}}, "until": 3.2, "every": 0.5}}"#
+        );
+        source(&text, &[], "3.2", "0.5")
+    };
+    for (action, ended_by) in [("", None), (r#", "action": "stop""#, Some("level"))] {
+        let long = long(action);
+        let precisions = [Precision::new(DIGITS, false), Precision::new(DIGITS + 10, false)];
+        let begun = || Pair::new(&long, &precisions).expect("two runs");
+        let mut pair = begun();
+        while !matches!(pair.go(&|| false).expect("no stop"), Progress::Over) {}
+        let (saved, next) = pair.save();
+        let mut other = begun();
+        assert!(other.resume(saved, next));
+        assert!(matches!(other.go(&|| false).expect("no stop"), Progress::Over));
+        for pair in [&pair, &other] {
+            let events = pair.events();
+            assert_eq!(events.len(), 1, "{action}");
+            near(&number(events[0].0.t), &pi(), PLACES);
+            assert!(events[0].1.expect("an agreement") > 50.0);
+            assert!(pair.runs().iter().all(|run| run.ended_by() == ended_by));
         }
     }
 }

@@ -4,8 +4,8 @@
 //! for walls: two zeros within 1e-9 of a step are one, or none.  Steps are so short that the series of the
 //! formulas converge in them, too.
 
-use super::motion::Motion;
-use super::wall::refined;
+use super::motion::{JUDGES, Motion};
+use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
@@ -21,8 +21,6 @@ const NO_VALUE: f64 = 1e-12;
 const LEAVES: f64 = 1e-3;
 /// Times within a step at which its largest value is looked for.
 const LOOKS: usize = 8;
-/// Powers the length of a step is taken from: by symmetry some of them may vanish.
-const JUDGES: usize = 5;
 /// Rounds in which a step is shortened, at most.
 const ROUNDS: usize = 20;
 /// Events kept.
@@ -115,13 +113,7 @@ impl<const W: usize> Watch<W> {
         self.ahead.clear();
         self.ends.clear();
         for (event, powers) in self.powers.iter().enumerate() {
-            let mut scale = Digits::ONE;
-            let mut share = |power: &Digits<W>| {
-                let share = (*power * scale).value();
-                scale = scale * Digits::of(step);
-                share
-            };
-            let shares: Vec<f64> = powers.iter().map(&mut share).collect();
+            let shares = in_shares(powers, 1.0, step);
             let direction = motion.mechanism.events[event].direction;
             let counts =
                 |rises: bool| direction == Direction::Either || rises == (direction == Direction::Rising);
@@ -146,22 +138,26 @@ impl<const W: usize> Watch<W> {
         self.ahead.last().copied().filter(|(event, _)| mechanism.events[*event].stop)
     }
 
-    /// What has happened up to a time in the step that is next.
-    pub fn until(&self, motion: &Motion<W>, t: Digits<W>) -> Vec<Happened<W>> {
+    /// What happens in the step that is next, as far as there is room for it.
+    fn happening(&self, motion: &Motion<W>) -> impl Iterator<Item = Happened<W>> {
         let happens = |&(event, after): &(usize, Digits<W>)| {
             let t = motion.state().t + after;
             let posture = motion.at(t);
             Happened { event, t, phi: posture.phi, omega: posture.omega }
         };
-        let ahead = self.ahead.iter().map(happens).filter(|event| event.t <= t);
-        self.happened.iter().cloned().chain(ahead).take(KEPT).collect()
+        self.ahead.iter().take(KEPT.saturating_sub(self.happened.len())).map(happens)
+    }
+
+    /// What has happened up to a time in the step that is next.
+    pub fn until(&self, motion: &Motion<W>, t: Digits<W>) -> Vec<Happened<W>> {
+        let ahead = self.happening(motion).filter(|event| event.t <= t);
+        self.happened.iter().cloned().chain(ahead).collect()
     }
 
     /// Takes what is in the step that is next, which is made.
-    pub fn pass(&mut self, motion: &Motion<W>, step: Digits<W>) {
-        if !self.ahead.is_empty() {
-            self.happened = self.until(motion, motion.state().t + step);
-        }
+    pub fn pass(&mut self, motion: &Motion<W>) {
+        let passed: Vec<_> = self.happening(motion).collect();
+        self.happened.extend(passed);
         self.sides.clone_from(&self.ends);
         self.ahead.clear();
     }
@@ -195,8 +191,14 @@ fn passages(shares: &[f64], before: i8, began: bool) -> (Vec<(f64, bool)>, i8) {
         }
         side = next;
         if share >= 1.0 {
-            break;
+            return (all, side);
         }
+    }
+    // A step may end at a zero, as one that ends on a wall does.
+    let [value, slope] = curve.at(1.0);
+    if value.abs() <= NO_VALUE * most && sign(slope) == -side {
+        all.push((1.0, slope > 0.0));
+        side = -side;
     }
     (all, side)
 }

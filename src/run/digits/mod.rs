@@ -114,8 +114,6 @@ pub struct Saved {
     /// Events with the numbers of each, and the sides of zero their formulas are on.
     happened: Vec<(usize, Vec<Vec<u64>>)>,
     sides: Vec<i8>,
-    /// The last row, where an event has ended the run.
-    ended: Option<u64>,
 }
 
 impl Saved {
@@ -303,7 +301,6 @@ impl<const W: usize> LongRun for Runner<W> {
             radius: *radius,
             happened: happened.collect(),
             sides: self.motion.watch.sides.clone(),
-            ended: self.has_ended.then_some(self.rows.last),
         }
     }
 
@@ -345,9 +342,6 @@ impl<const W: usize> LongRun for Runner<W> {
             radius: saved.radius,
         });
         (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
-        if let Some(last) = saved.ended {
-            self.rows.last = last;
-        }
         true
     }
 

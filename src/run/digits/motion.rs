@@ -27,7 +27,7 @@ const SLACK: f64 = 0.25;
 /// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
 const WORK: f64 = 10.0;
 /// Powers the step is taken from: by symmetry some of them may vanish.
-const JUDGES: usize = 5;
+pub(super) const JUDGES: usize = 5;
 
 /// Where a run is, with all that its next step depends on.
 #[derive(Clone, Debug)]
@@ -230,15 +230,20 @@ impl<const W: usize> Motion<W> {
             if until <= self.state.t + step || self.end().is_some() {
                 return Ok(true);
             }
-            let mut watch = std::mem::take(&mut self.watch);
-            watch.pass(self, step);
-            self.watch = watch;
+            self.watched(Watch::pass);
             self.advance(step)?;
             wall.map_or(Ok(()), |wall| wall::impact(self, wall))?;
             if pause() {
                 return Ok(false);
             }
         }
+    }
+
+    /// Shows the motion to what watches for its events.
+    fn watched(&mut self, show: impl FnOnce(&mut Watch<W>, &Self)) {
+        let mut watch = std::mem::take(&mut self.watch);
+        show(&mut watch, self);
+        self.watch = watch;
     }
 
     /// The event that ends the run within the step that is next, and its time \[s\].
@@ -279,10 +284,8 @@ impl<const W: usize> Motion<W> {
             return Ok(step);
         }
         let wanted = self.expand();
-        let mut watch = std::mem::take(&mut self.watch);
-        watch.expand(self);
-        let allowed = watch.allows(wanted, self.precision.tolerance());
-        self.watch = watch;
+        self.watched(Watch::expand);
+        let allowed = self.watch.allows(wanted, self.precision.tolerance());
         let wanted = if allowed < wanted { short(allowed) } else { wanted };
         let step = confirmed(self, wanted);
         let seconds = self.state.t.value();
@@ -303,9 +306,7 @@ impl<const W: usize> Motion<W> {
             Some((wall, length)) => (length, Some(wall)),
             None => (Digits::of(step), None),
         };
-        let mut watch = std::mem::take(&mut self.watch);
-        watch.look(self, step.0.value());
-        self.watch = watch;
+        self.watched(|watch, motion| watch.look(motion, step.0.value()));
         self.step = Some(step);
         Ok(step)
     }

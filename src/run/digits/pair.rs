@@ -47,7 +47,13 @@ impl Pair {
     /// scene.
     pub fn resume(&mut self, saved: &[Saved], next: u64) -> bool {
         let is_sound = saved.len() == self.runs.len() && next <= self.last_row() + 1;
-        if !is_sound || !self.runs.iter_mut().zip(saved).all(|(run, saved)| run.resume(saved)) {
+        // The row before tells again what had happened up to it, and whether that has ended the run.
+        let goes_on = |(run, saved): (&mut Box<dyn LongRun>, &Saved)| {
+            let is_back =
+                |run: &mut Box<dyn LongRun>| matches!(run.row(next - 1, &mut || false), Ok(Some(_)));
+            run.resume(saved) && (next == 0 || is_back(run))
+        };
+        if !is_sound || !self.runs.iter_mut().zip(saved).all(goes_on) {
             return false;
         }
         (self.saved, self.next) = (saved.to_vec(), next);

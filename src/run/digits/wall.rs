@@ -26,12 +26,7 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(us
     for (wall, (row, _)) in motion.mechanism.walls.iter().enumerate() {
         let powers = gap(motion, row);
         let length = motion.mechanism.structure.contacts[wall].length;
-        let mut scale = Digits::of(1.0 / length);
-        let mut shares = Vec::with_capacity(powers.len());
-        for power in &powers {
-            shares.push((*power * scale).value());
-            scale = scale * Digits::of(step);
-        }
+        let shares = in_shares(&powers, 1.0 / length, step);
         let from = match crossing(&Powers { powers: &shares, end: 1.0 }, 1.0) {
             Crossing::Nothing => continue,
             Crossing::At(share) => share * step,
@@ -55,6 +50,17 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(us
         }
     }
     Ok(found)
+}
+
+/// A power series in seconds, times a factor, as one in shares of a step in doubles.
+pub(super) fn in_shares<const W: usize>(powers: &[Digits<W>], factor: f64, step: f64) -> Vec<f64> {
+    let (mut scale, step) = (Digits::of(factor), Digits::of(step));
+    let share = |power: &Digits<W>| {
+        let share = (*power * scale).value();
+        scale = scale * step;
+        share
+    };
+    powers.iter().map(share).collect()
 }
 
 /// Powers of the gap of a wall \[m/s^m\].
