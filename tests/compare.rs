@@ -44,6 +44,34 @@ fn compared_by(
     compare(&scene, &compile(&scene), &asked, clock, &mut |_| {}, &|| false).expect("a horizon")
 }
 
+/// A fall at constant speed that an event ends after half a second: what comes later is nobody's motion.
+#[test]
+fn a_motion_that_an_event_ends_is_compared_up_to_there() {
+    let text = r#"{"name": "ends", "gravity": [0, 0],
+        "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
+        "hinges": [{"name": "A", "between": [
+            {"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "s", "body": "bar", "stiffness": 1, "free_angle": 0, "damping": 0}],
+        "events": [{"name": "half", "when": "bar.phi - 1", "action": "stop"}],
+        "start": {"bar": {"phi": 0, "omega": 2}}, "until": 10, "every": 0.1}"#;
+    let scene = driftless::scene::parse_scene(text, "ends", &[]).expect("a scene");
+    let asked = Asked {
+        methods: vec!["dp8".parse().expect("a method"), "taylor".parse().expect("a method")],
+        stabilize: Vec::new(),
+        until: None,
+        budget: Duration::from_secs(20),
+        blocks: 2,
+    };
+    let begin = Instant::now();
+    let found = compare(&scene, &compile(&scene), &asked, &|| begin.elapsed(), &mut |_| {}, &|| false);
+    let found = found.expect("a horizon");
+    // phi = 2 sin t passes 1 at pi/6.
+    assert!(found.until > 0.51 && found.until < std::f64::consts::FRAC_PI_6, "{}", found.until);
+    assert!(found.notes.iter().any(|note| note.contains("half")), "{:?}", found.notes);
+    let measured: Vec<_> = found.entries.iter().filter_map(|entry| entry.found.as_ref()).collect();
+    assert!(measured.len() > 10 && measured.iter().all(|found| found.error.is_finite()));
+}
+
 #[test]
 fn the_error_is_the_distance_from_the_true_motion() {
     let found = compared("free", &[], &["dp8"], &[], 2.0);

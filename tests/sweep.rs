@@ -11,7 +11,7 @@ use driftless::run::{
     SweepError, SweepTable, Vary, reference, simulate, sweep,
 };
 use driftless::scene::{Override, Template};
-use driftless::stepping::Cause;
+use driftless::stepping::{Cause, taylor::batch::Batch};
 use std::f64::consts::PI;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -121,6 +121,128 @@ fn points_of_one_tree_agree_with_single_runs() {
             agreed(scene, &plan, &point, &request);
             assert_eq!(plan.point(point.index).as_ref(), Some(&point));
         }
+    }
+}
+
+/// Forces and laws by formulas, among them one that is flat to the last digit where the first step begins.
+#[test]
+fn points_with_formulas_agree_with_single_runs() {
+    let request = Request { rtol: Some(1e-12), every: Some(0.5), ..request("taylor", 1.0) };
+    for (scene, vary) in [
+        ("duffing", ["parameters.k3=0.5..1:2", "bar.phi=-1..1:9"]),
+        ("drag", ["bar2.phi=-0.5..0.5:3", "bar1.phi=-1..1:3"]),
+    ] {
+        let plan = prepared(scene, &vary, &request);
+        for point in points(&plan, 1) {
+            agreed(scene, &plan, &point, &request);
+            assert_eq!(plan.point(point.index).as_ref(), Some(&point));
+        }
+    }
+}
+
+/// A rotor, and what its formulas make of it in closed form.
+fn rotor(more: &str) -> Template {
+    let text = format!(
+        r#"{{"name": "rotor", "gravity": [0, 0], {more},
+            "bars": [{{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [
+                {{"body": "ground", "point": [0, 0]}}, {{"body": "rotor", "point": [0, 0]}}]}}],
+            "start": {{"rotor": {{"phi": 0, "omega": 0}}}}, "until": 4, "every": 4}}"#
+    );
+    Template::new(text, "rotor".into(), &[])
+}
+
+#[test]
+fn points_with_formulas_are_those_of_closed_forms() {
+    let swept = |more: &str| {
+        let mechanism = Mechanism::new(&rotor(more).scene().expect("a scene")).expect("a mechanism");
+        assert!(Batch::takes_alike(&mechanism));
+        let vary = ["rotor.phi=-2..2:5", "rotor.omega=-1..1:3"].map(|vary| vary.parse().expect("a range"));
+        let plan = Sweep::new(&rotor(more), vary.into(), &request("taylor", 4.0)).expect("a sweep");
+        points(&plan, 1)
+    };
+    // A spring by its potential: w = 2, to all points their cosines.
+    let spring = r#""torsion_springs": [{"name": "s", "body": "rotor", "potential": "1*(angle^2)"}]"#;
+    for point in swept(spring) {
+        let ([phi, omega], (sin, cos)) = ([point.values[0], point.values[1]], 8f64.sin_cos());
+        assert!((point.phi[0] - (phi * cos + 0.5 * omega * sin)).abs() < 1e-8, "{point:?}");
+        assert!((point.omega[0] - (omega * cos - 2.0 * phi * sin)).abs() < 1e-8, "{point:?}");
+        assert!(point.energy < 1e-8, "{point:?}");
+    }
+    // A torque that sets in after 3 s within some hundredths, and is flat to the last digit before:
+    // ∫ (1 + tanh(200 (t - 3))) dt = (t - 3) + ln(2 cosh(200 (t - 3)))/200.
+    let late = r#""torques": [{"name": "p", "body": "rotor", "torque": "0.5*(1 + tanh(200*(1*t - 3)))"}]"#;
+    for point in swept(late) {
+        let omega = point.values[1] + 2.0;
+        assert!((point.omega[0] - omega).abs() < 1e-8, "{point:?}");
+    }
+}
+
+/// A parallelogram with three cranks, one constraint too many, that a torque turns: J phi'' = M exactly.
+#[test]
+fn loops_with_redundant_constraints_are_in_lanes() {
+    let crank = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": 0.2}}"#)
+    };
+    let hinge = |name: &str, x: f64| {
+        format!(
+            r#"{{"name": "A{name}", "between": [
+                {{"body": "ground", "point": [{x}, 0]}}, {{"body": "{name}", "point": [0, 0]}}]}},
+            {{"name": "B{name}", "between": [
+                {{"body": "{name}", "point": [0.2, 0]}}, {{"body": "bar", "point": [{x}, 0]}}]}}"#
+        )
+    };
+    for torque in ["0.03", r#""0.03 + 0*cos(a.phi)""#] {
+        let text = format!(
+            r#"{{"name": "cranks", "gravity": [0, 0],
+                "bars": [{}, {}, {}, {{"name": "bar", "mass": 2, "centre": [0.5, 0], "inertia": 0.3, "length": 1}}],
+                "hinges": [{}, {}, {}], "torques": [{{"name": "M", "body": "a", "torque": {torque}}}],
+                "start": {{"a": {{"phi": 0.5, "omega": 0}}, "b": {{"phi": 0.5}},
+                    "c": {{"phi": 0.5}}, "bar": {{"phi": 0}}}}, "until": 1, "every": 1}}"#,
+            crank("a"),
+            crank("b"),
+            crank("c"),
+            hinge("a", 0.0),
+            hinge("b", 0.5),
+            hinge("c", 1.0)
+        );
+        let vary: Vec<Vary> = vec!["a.omega=0..1:11".parse().expect("a range")];
+        let template = Template::new(text, "cranks".into(), &[]);
+        let plan = Sweep::new(&template, vary, &request("taylor", 1.0)).expect("a sweep");
+        assert_eq!(plan.mechanism().redundant().len(), 1);
+        assert!(Batch::takes_alike(plan.mechanism()));
+        let inertia = 3.0 * (0.02 + 0.01) + 2.0 * 0.04;
+        for point in points(&plan, 1) {
+            let omega = point.values[0];
+            let (phi, rate) = (0.5 + omega + 0.015 / inertia, omega + 0.03 / inertia);
+            for k in 0..3 {
+                assert!(
+                    (point.phi[k] - phi).abs() < 1e-10 && (point.omega[k] - rate).abs() < 1e-10,
+                    "{point:?}"
+                );
+            }
+            let [position, rate] = point.constraint.expect("constraints");
+            assert!(point.energy < 1e-12 && position < 1e-15 && rate < 1e-14, "{point:?}");
+        }
+    }
+}
+
+/// An event that ends a run ends the points of a sweep too, and one that changes what acts changes it there.
+#[test]
+fn events_act_on_the_points_of_a_sweep() {
+    let stop = r#""events": [{"name": "e", "when": "rotor.phi - 1", "action": "stop"}]"#;
+    let vary: Vec<Vary> = vec!["rotor.omega=0.5..2:7".parse().expect("a range")];
+    let plan = Sweep::new(&rotor(stop), vary, &request("taylor", 4.0)).expect("a sweep");
+    for point in points(&plan, 1) {
+        assert!((point.t - 1.0 / point.values[0]).abs() < 1e-12 && (point.phi[0] - 1.0).abs() < 1e-12);
+    }
+    // The spring is off from a quarter of its period on.
+    let off = r#""torsion_springs": [{"name": "t", "body": "rotor", "stiffness": 2, "free_angle": 0, "damping": 0}],
+        "events": [{"name": "e", "when": "rotor.phi", "off": ["t"]}]"#;
+    let vary: Vec<Vary> = vec!["rotor.phi=0.5..2:7".parse().expect("a range")];
+    let plan = Sweep::new(&rotor(off), vary, &request("taylor", 4.0)).expect("a sweep");
+    for point in points(&plan, 1) {
+        assert!((point.omega[0] + 2.0 * point.values[0]).abs() < 1e-9, "{point:?}");
     }
 }
 

@@ -7,6 +7,7 @@ use crate::dynamics::force::UserForce;
 use crate::dynamics::forest::{BodyOrigin, Hang};
 use crate::dynamics::point::Point;
 use crate::dynamics::{State, Time};
+use std::borrow::Cow;
 
 impl Mechanism {
     /// Number of coordinates: the bodies' angles, and two for every origin that moves freely.
@@ -115,6 +116,11 @@ impl Mechanism {
         !self.frictions.is_empty() || self.laws.as_ref().is_some_and(|laws| laws.formulas.switches())
     }
 
+    /// True where events of the scene end a motion.
+    pub fn has_stops(&self) -> bool {
+        self.laws.as_ref().is_some_and(|laws| laws.formulas.events.iter().any(|event| event.stop))
+    }
+
     /// True where power series are chosen and serve as references: not with the mean force of a vibration,
     /// which has none, nor with dry friction and aims that depend on the mechanism, which `taylor` takes
     /// where it is asked for; and it takes the matrices of the tree.
@@ -205,6 +211,17 @@ impl Mechanism {
     /// True where a row is left when the given angles are eliminated: loops, sliders, contacts that are held.
     pub fn has_closed_loops(&self) -> bool {
         self.constraints.iter().any(|row| !row.is_angle())
+    }
+
+    /// The mechanism without the rows that follow from the others.
+    pub(crate) fn without_redundant_rows(&self) -> Cow<'_, Self> {
+        if self.assembly.redundant.is_empty() {
+            return Cow::Borrowed(self);
+        }
+        let mut mechanism = self.clone();
+        mechanism.constraints.retain(|row| !self.assembly.redundant.contains(&row.name));
+        mechanism.assembly.redundant.clear();
+        Cow::Owned(mechanism)
     }
 
     /// True where rows cannot all be eliminated: those of loops and sliders, and given angles whose whole

@@ -4,8 +4,10 @@ use super::measure::{Ended, Found};
 use super::truth::{Room, Truth, together};
 use super::{Asked, Comparison, Entry, Fate, Stage, ladder, measure, name};
 use crate::dynamics::{Mechanism, Motion};
+use crate::run::drift::Limits;
 use crate::run::methods::{METHODS, MethodId, Stabilization};
 use crate::run::plan::{Plan, Refusal, Request};
+use crate::run::running::{Run, Running};
 use crate::scene::Scene;
 use std::sync::Arc;
 use std::time::Duration;
@@ -74,6 +76,16 @@ struct Task<'a> {
 impl Task<'_> {
     fn run(&self, mut until: f64, see: &mut dyn FnMut(&Stage)) -> Comparison {
         let mut notes = Vec::new();
+        if let Some((event, t)) = self.ended_by(until) {
+            // Coarse settings may find it earlier.
+            let before = 0.99 * t;
+            let digits = libm::exp10(libm::floor(libm::log10(before)) - 2.0);
+            let rounded = format!("{:.2e}", (before / digits).floor() * digits);
+            until = rounded.parse().unwrap_or(before);
+            notes.push(format!(
+                "the event {event} ends the motion at t = {t:.6} s: methods are compared up to {until} s"
+            ));
+        }
         see(&self.stage("how long paths mean anything"));
         let near = together(
             self.mechanism,
@@ -120,6 +132,20 @@ impl Task<'_> {
         comparison.is_whole = self.repeat(&mut comparison, see);
         comparison.wall = self.spent();
         comparison
+    }
+
+    /// The event that ends the motion before `until` \[s\], and when \[s\].
+    fn ended_by(&self, until: f64) -> Option<(String, f64)> {
+        if !self.mechanism.has_stops() {
+            return None;
+        }
+        let request = Request { until: Some(until), every: Some(until), ..Request::default() };
+        let plan = Plan::new(self.scene, self.mechanism, &request).ok()?;
+        let run = Run::new(Arc::clone(self.mechanism), plan, Limits::default(), self.start).ok()?;
+        let mut running = Running::new(run);
+        running.go(&mut |_| Ok(()), &mut || (self.is_over)()).ok()?;
+        let outcome = running.finish();
+        outcome.ended_by.map(|event| (event, outcome.last.t)).filter(|(_, t)| *t > 0.0)
     }
 
     /// The methods and stabilizations asked for, with their settings; what is refused is an entry.

@@ -6,6 +6,7 @@
 //! trajectory as soon as its last one has ended.
 
 mod driven;
+mod formulas;
 mod free;
 mod laws;
 mod looped;
@@ -115,18 +116,19 @@ impl Batch {
     /// two bodies without springs, one of them driven from the ground by a law that is no formula.
     pub fn takes(mechanism: &Mechanism) -> bool {
         let springs = mechanism.springs.len();
-        (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS && free::fits(mechanism)
-            || DrivenTeam::fits(mechanism, mechanism)
-            || SwingingTeam::fits(mechanism, mechanism)
+        let is_of_few = (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS;
+        goes_on(mechanism)
+            && (is_of_few && free::fits(mechanism)
+                || DrivenTeam::fits(mechanism, mechanism)
+                || SwingingTeam::fits(mechanism, mechanism))
     }
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
     /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
-    /// motors on angles, springs beside them, that are no formulas, without walls and friction; and the same
-    /// with closed loops and sliders, their states in the form of
-    /// [`Multiplier`](crate::dynamics::multiplier::Multiplier).
+    /// motors on angles, springs beside them, all by smooth formulas or without, and no walls and friction; and the same with closed loops and sliders, their states in the
+    /// form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
-        trees::fits(mechanism)
+        goes_on(mechanism) && trees::fits(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
@@ -153,8 +155,10 @@ impl Batch {
             let like = members[next].mechanism;
             macro_rules! try_teams {
                 ($($team:ty),*) => {$(
-                    if <$team>::fits(like, like) {
-                        let fits = |one: &Mechanism| std::ptr::eq(one, like) || <$team>::fits(one, like);
+                    if goes_on(like) && <$team>::fits(like, like) {
+                        let fits = |one: &Mechanism| {
+                            std::ptr::eq(one, like) || goes_on(one) && <$team>::fits(one, like)
+                        };
                         let fits: Vec<bool> = members.iter().map(|member| fits(member.mechanism)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
                         self.integrate_those::<$team>(like, &fits, members, until, (&mut *watch, &mut *alone));
@@ -166,7 +170,7 @@ impl Batch {
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
             try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
             let (member, hint) = (&mut members[next], "integrate it by `taylor`");
-            let what = "lanes take hinge trees and loops, whose motors and springs are no formulas".into();
+            let what = "lanes take hinge trees and loops without walls, friction and events that act".into();
             member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));
             is_done[next] = true;
         }
@@ -185,6 +189,12 @@ impl Batch {
         let lanes = LaneSlots::new(T::new(like, self.order, vectors), self.order, until);
         vectors.run(Integration::<T> { lanes, fits, batch: self, members, until, watch, alone });
     }
+}
+
+/// True where no event ends a motion or changes what acts, and nothing has branches: what is in lanes looks
+/// for none.
+fn goes_on(mechanism: &Mechanism) -> bool {
+    !mechanism.is_switched() && !mechanism.has_stops()
 }
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
@@ -218,6 +228,11 @@ trait Team {
     /// after its expansion, and again after its end.
     fn is_leaving(&self, _lane: usize) -> bool {
         false
+    }
+
+    /// Of the step a lane wants as much as its series carries \[s\].
+    fn allowed(&mut self, _lane: usize, slot: &LaneSlot, _order: usize, _tolerance: f64) -> f64 {
+        slot.wanted
     }
 
     /// Every lane's state at the end of its step \[s\].
@@ -262,7 +277,7 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
             }
             self.lanes.team.begin::<W>(&self.lanes.slots);
             self.lanes.team.expand::<W>(order);
-            let taken = self.lanes.choose_steps::<W>(order);
+            let taken = self.lanes.choose_steps::<W>(order, self.batch.tolerance);
             self.lanes.team.finish::<W>(order, &taken);
             self.lanes.arrive(order, self.members, self.until, self.watch);
             self.lanes.bring_back(self.batch, self.members, self.until, (self.watch, self.alone));

@@ -20,37 +20,56 @@ const ALLOWED: f64 = 1e3;
 /// Shortenings at most; each by a third.
 const MOST: usize = 40;
 
+/// Accelerations by the series, and by the equations at the place the series comes to \[rad/s², m/s²\].
+pub(super) type Accelerations = [Vec<f64>; 2];
+
+/// Of the step `h` \[s\] as much as the equations confirm; `look` writes the accelerations at a time inside.
+pub(super) fn confirmed(
+    tolerance: f64,
+    mut h: f64,
+    both: &mut Accelerations,
+    mut look: impl FnMut(f64, &mut Accelerations),
+) -> f64 {
+    for _ in 0..MOST {
+        let agrees = SHARES.iter().all(|share| {
+            look(share * h, both);
+            let [series, equations] = &*both;
+            let largest = equations.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
+            let allowed = ALLOWED * tolerance / h + ROUNDING * largest;
+            let differs = |(s, a): (&f64, &f64)| (s - a).abs() > allowed;
+            // Where the equations have no finite answer the step is not judged.
+            !largest.is_finite() || !series.iter().zip(equations).any(differs)
+        });
+        if agrees {
+            break;
+        }
+        h *= 2.0 / 3.0;
+    }
+    h
+}
+
 impl<T: Coefficient> Taylor<T> {
     /// Of the step `h` \[s\] as much as the equations confirm.
     pub(super) fn confirmed<P: OdeSystem + Form + ?Sized>(
         &mut self,
         problem: &mut P,
         state: &State,
-        mut h: f64,
+        h: f64,
     ) -> f64 {
         let Self { expansion: Some(expansion), inside, tolerance, .. } = self else { return h };
         let f = expansion.series().coordinates();
         let mut rates = vec![0.0; state.y.len()];
-        for _ in 0..MOST {
-            let agrees = SHARES.iter().all(|share| {
-                let t = share * h;
-                inside.clone_from(state);
-                expansion.go(inside, t.into());
-                inside.time = state.time + t;
-                inside.wrap();
-                problem.rhs(inside.time, &inside.y, &mut rates);
-                let accelerations = &rates[f..2 * f];
-                let largest = accelerations.iter().fold(0.0, |most: f64, a| most.max(a.abs()));
-                let allowed = ALLOWED * *tolerance / h + ROUNDING * largest;
-                // Where the equations have no finite answer the step is not judged.
-                let differs = |(i, a): (usize, &f64)| (expansion.acceleration(i, t) - a).abs() > allowed;
-                !largest.is_finite() || !accelerations.iter().enumerate().any(differs)
-            });
-            if agrees {
-                break;
-            }
-            h *= 2.0 / 3.0;
-        }
-        h
+        let mut both = [Vec::new(), Vec::new()];
+        confirmed(*tolerance, h, &mut both, |t, [series, equations]| {
+            inside.clone_from(state);
+            expansion.go(inside, t.into());
+            inside.time = state.time + t;
+            inside.wrap();
+            problem.rhs(inside.time, &inside.y, &mut rates);
+            equations.clear();
+            equations.extend_from_slice(&rates[f..2 * f]);
+            series.clear();
+            series.extend((0..f).map(|i| expansion.acceleration(i, t)));
+        })
     }
 }

@@ -2,15 +2,12 @@
 
 use super::super::event::Found;
 use super::super::search::Powers;
-use super::{JUDGES, LEADING};
+use super::{JUDGES, LEADING, step_size};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::series::polynomial::{integral, tail};
 use crate::dynamics::series::{Coefficient, Series};
 use crate::dynamics::{Coordinates, Mechanism, State, Time};
 
-/// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out
-/// are the larger ones.
-const SHARE: f64 = 1e-3;
 /// The step where every power but the first vanishes, in units of time.
 const LONGEST: f64 = 1e9;
 
@@ -144,12 +141,7 @@ impl<T: Coefficient> Expansion<T> {
             }
         }
         let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST * units.time);
-        let beginning = largest(0).max(largest(1) * step);
-        if tolerance < 0.1 * SHARE * beginning || last == [0.0; JUDGES] {
-            step
-        } else {
-            self.shortened(&last, largest, step)
-        }
+        step_size::falling(tolerance, order, (&last, largest), step)
     }
 
     /// The same of the work over the energy scale: the power of motors, dampers and applied forces may fall
@@ -160,29 +152,6 @@ impl<T: Coefficient> Expansion<T> {
             let size = (self.series.power[k - 1].value() / (k as f64 * scale)).abs();
             if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
         })
-    }
-
-    /// The step of a motion that is smaller than the tolerance, whose terms must fall nevertheless.
-    #[cold]
-    fn shortened(&self, last: &[f64; JUDGES], largest: impl Fn(usize) -> f64, mut step: f64) -> f64 {
-        let order = self.series.order();
-        // Every round takes the surplus down by a fifth or more.
-        for _ in 0..100 {
-            let (mut size, mut power) = (0.0_f64, 1.0);
-            for k in 0..=order - JUDGES {
-                size = size.max(largest(k) * power);
-                power *= step;
-            }
-            let most = |(i, &last): (usize, &f64)| {
-                libm::exp2((minus_log2(last) - minus_log2(SHARE * size)) / (order - i) as f64)
-            };
-            let least = last.iter().enumerate().map(most).fold(f64::INFINITY, f64::min);
-            if size == 0.0 || least >= 0.95 * step {
-                break;
-            }
-            step = least;
-        }
-        step
     }
 
     /// Sums no further than to the power that is the smallest at `h` \[s\].

@@ -8,6 +8,11 @@
 //! of a double is piecewise linear, its error at most 0.09, and that is divided by k.
 
 use super::JUDGES;
+use super::expansion::minus_log2;
+
+/// Largest share of a motion that its last powers may have, however small it is: beyond, the powers left out
+/// are the larger ones.
+const SHARE: f64 = 1e-3;
 
 /// How long steps may be.
 #[derive(Clone, Debug)]
@@ -57,6 +62,42 @@ impl StepSize {
         let h = power * f64::from_bits(((1023 + whole.max(-1000.0) as i64) as u64) << 52);
         if h < self.longest { h } else { self.longest }
     }
+}
+
+/// Of a step as much as leaves the last of `largest`, powers order, order - 1, … of the rates over their
+/// unit, smaller than the first: a motion that is smaller than the tolerance would have any step.
+pub fn falling(
+    tolerance: f64,
+    order: usize,
+    (last, largest): (&[f64; JUDGES], impl Fn(usize) -> f64),
+    step: f64,
+) -> f64 {
+    let beginning = largest(0).max(largest(1) * step);
+    if tolerance < 0.1 * SHARE * beginning || *last == [0.0; JUDGES] {
+        return step;
+    }
+    shortened(order, last, largest, step)
+}
+
+#[cold]
+fn shortened(order: usize, last: &[f64; JUDGES], largest: impl Fn(usize) -> f64, mut step: f64) -> f64 {
+    // Every round takes the surplus down by a fifth or more.
+    for _ in 0..100 {
+        let (mut size, mut power) = (0.0_f64, 1.0);
+        for k in 0..=order - JUDGES {
+            size = size.max(largest(k) * power);
+            power *= step;
+        }
+        let most = |(i, &last): (usize, &f64)| {
+            libm::exp2((minus_log2(last) - minus_log2(SHARE * size)) / (order - i) as f64)
+        };
+        let least = last.iter().enumerate().map(most).fold(f64::INFINITY, f64::min);
+        if size == 0.0 || least >= 0.95 * step {
+            break;
+        }
+        step = least;
+    }
+    step
 }
 
 /// The step taken of the one wanted where `left` \[s\] are left: no sliver is left over.

@@ -69,6 +69,7 @@ fn fits(mechanism: &Mechanism) -> bool {
     };
     super::trees::fits(mechanism)
         && mechanism.has_closed_loops()
+        && mechanism.forces.is_empty()
         && mechanism.torsions.is_empty()
         && !mechanism.is_damped()
         && mechanism.actions.iter().all(is_constant)
@@ -76,6 +77,7 @@ fn fits(mechanism: &Mechanism) -> bool {
 
 impl Team for LoopTeam {
     fn new(like: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
+        let like = &*like.without_redundant_rows();
         let n = like.bodies.len();
         let reduced = dynamics::looped::reduced(like);
         let (mut applied, mut torque) = (vec![Complex::ZERO; n], vec![0.0; n]);

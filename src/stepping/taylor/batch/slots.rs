@@ -99,7 +99,7 @@ impl<T: Team> LaneSlots<T> {
 
     /// The steps \[s\] that the series just expanded allow.
     #[inline(always)]
-    pub(super) fn choose_steps<W: EightLanes>(&mut self, order: usize) -> Octet {
+    pub(super) fn choose_steps<W: EightLanes>(&mut self, order: usize, tolerance: f64) -> Octet {
         let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
         for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
             (slot.wanted, slot.taken) = (f64::NAN, 0.0);
@@ -109,6 +109,7 @@ impl<T: Team> LaneSlots<T> {
                     own[back] = sizes[back].0[lane];
                 }
                 slot.wanted = slot.step_size.step_of(order, &own);
+                slot.wanted = self.team.allowed(lane, slot, order, tolerance);
                 slot.taken = step_size::taken(slot.wanted, slot.left);
             }
             *taken = slot.taken;

@@ -1,5 +1,5 @@
-//! Hinge trees with springs, torsion springs, applied forces and motors, and mechanisms with closed loops
-//! and sliders, all lanes of equal mechanisms: the series of [`dynamics`](crate::dynamics::series) on numbers
+//! Hinge trees with springs, torsion springs, forces, formulas and motors, and mechanisms with closed loops and
+//! sliders, all lanes of equal mechanisms: the series of [`dynamics`](crate::dynamics::series) on numbers
 //! with a lane for each trajectory.
 //!
 //! Loops and sliders are kept by multipliers, and by a projection after every step.  A trajectory leaves the
@@ -7,6 +7,7 @@
 //! step began it has to go on alone.
 
 use super::super::terms::over;
+use super::formulas::{Begun, StepJudge};
 use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
@@ -43,10 +44,12 @@ pub(super) struct TreeTeam {
     /// Where the rows are kept by multipliers: unknowns where the step began, those of all lanes that do not
     /// land.
     kept: Option<[Vec<Octet>; 2]>,
+    /// What steps are judged by where there are formulas.
+    judge: Option<StepJudge>,
 }
 
 /// True for hinge trees whose motors are all eliminated, with a motion left, and for mechanisms with loops or
-/// sliders whose rows are independent of one another; laws must be no formulas.
+/// sliders.
 ///
 /// Not for bodies on their axes under gravity and springs alone: more of them than have lanes of their own
 /// are faster one by one.
@@ -54,11 +57,10 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
     (1..=BODIES).contains(&mechanism.bodies.len())
         && mechanism.coordinates() == mechanism.bodies.len()
         && mechanism.tree.is_dense()
-        && mechanism.forces.is_empty()
+        && mechanism.integrals().next().is_none()
         && mechanism.contacts.is_empty()
         && mechanism.frictions.is_empty()
         && mechanism.vibration.is_none()
-        && laws(mechanism).all(|law| law.profile.is_none())
         && (is_tree(mechanism) || is_looped(mechanism))
 }
 
@@ -68,7 +70,6 @@ fn is_tree(mechanism: &Mechanism) -> bool {
 
 fn is_looped(mechanism: &Mechanism) -> bool {
     mechanism.has_closed_loops()
-        && mechanism.assembly.redundant.is_empty()
         && !mechanism.has_released()
         && !mechanism.has_aims()
         && !mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name))
@@ -155,6 +156,7 @@ impl TreeTeam {
 
 impl Team for TreeTeam {
     fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self {
+        let like = &*like.without_redundant_rows();
         let is_kept = like.has_multipliers();
         let f = if is_kept { like.coordinates() } else { like.partition.count() };
         Self {
@@ -171,6 +173,7 @@ impl Team for TreeTeam {
             is_going: [false; LANES],
             is_leaving: [false; LANES],
             kept: is_kept.then(|| [vec![ZERO; 2 * f + 1], vec![ZERO; 2 * f + 1]]),
+            judge: StepJudge::new(like, laws(like).any(|law| law.profile.is_some())),
         }
     }
 
@@ -179,7 +182,7 @@ impl Team for TreeTeam {
         let is_equal = || {
             (&mechanism.tree, &mechanism.partition, &mechanism.springs)
                 == (&like.tree, &like.partition, &like.springs)
-                && mechanism.constraints == like.constraints
+                && (&mechanism.constraints, &mechanism.forces) == (&like.constraints, &like.forces)
                 && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
         };
         fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && is_equal())
@@ -193,6 +196,9 @@ impl Team for TreeTeam {
             }
         }
         self.energy.0[lane] = member.mechanism.energy_scale * member.mechanism.units.time;
+        if let Some(judge) = &self.judge {
+            return judge.longest();
+        }
         let tied = if self.mechanism.partition.driven() { 8.0 } else { 3.0 };
         order as f64 / tied / fastest_rate(&self.mechanism, member.state.time.hi)
     }
@@ -250,6 +256,13 @@ impl Team for TreeTeam {
     fn is_finite(&self, lane: usize, order: usize) -> bool {
         let f = self.coordinates;
         self.series.rates()[order * f..(order + 1) * f].iter().all(|rate| rate.0[lane].is_finite())
+    }
+
+    fn allowed(&mut self, lane: usize, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
+        let Some(judge) = &mut self.judge else { return slot.wanted };
+        let begun =
+            Begun { lane, high: &self.high, rates: self.series.rates(), coordinates: self.coordinates };
+        judge.allowed(begun, slot, order, tolerance)
     }
 
     #[inline(always)]

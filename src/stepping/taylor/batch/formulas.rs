@@ -1,0 +1,118 @@
+//! How far the series of a mechanism with formulas carries, lane by lane: as in
+//! [`Taylor`](super::super::Taylor), since nothing bounds how fast a formula may change.
+
+use super::super::JUDGES;
+use super::super::confirm::{self, Accelerations};
+use super::super::step_size;
+use super::LaneSlot;
+use crate::arithmetic::eight::Octet;
+use crate::dynamics::elimination::Elimination;
+use crate::dynamics::multiplier::Multiplier;
+use crate::dynamics::{Mechanism, OdeSystem, State};
+use std::sync::Arc;
+
+/// The longest step in units of time, where every power but the first vanishes.
+const LONGEST: f64 = 1e9;
+
+/// The equations in the coordinates of the lanes.
+#[derive(Debug)]
+enum Equations {
+    Independent(Box<Elimination<0>>),
+    All(Box<Multiplier<0, true>>),
+}
+
+/// What steps are judged by.
+#[derive(Debug)]
+pub(super) struct StepJudge {
+    /// The unit of time \[s\].
+    unit: f64,
+    /// Where formulas may be flat: see [`confirm`].
+    equations: Option<Equations>,
+    inside: State,
+    rates: Vec<f64>,
+    both: Accelerations,
+}
+
+/// Where the step of a lane begins, and the powers of its rates, coordinate by coordinate.
+#[derive(Clone, Copy)]
+pub(super) struct Begun<'a> {
+    pub lane: usize,
+    /// Coordinates and rates (2f).
+    pub high: &'a [Octet],
+    /// Powers ((P+1) × f).
+    pub rates: &'a [Octet],
+    pub coordinates: usize,
+}
+
+impl StepJudge {
+    /// For a mechanism whose forces are formulas, or motors' laws; nothing for others.
+    pub(super) fn new(mechanism: &Mechanism, has_profiles: bool) -> Option<Self> {
+        if mechanism.forces.is_empty() && !has_profiles {
+            return None;
+        }
+        let equations = || match (mechanism.has_multipliers(), Arc::new(mechanism.clone())) {
+            (true, mechanism) => Equations::All(Box::new(Multiplier::new(mechanism))),
+            (false, mechanism) => Equations::Independent(Box::new(Elimination::new(mechanism))),
+        };
+        Some(Self {
+            unit: mechanism.units.time,
+            equations: mechanism.may_be_flat().then(equations),
+            inside: State::default(),
+            rates: Vec::new(),
+            both: Accelerations::default(),
+        })
+    }
+
+    /// The longest step \[s\].
+    pub(super) fn longest(&self) -> f64 {
+        LONGEST * self.unit
+    }
+
+    /// Of the step a lane wants as much as its series carries \[s\].
+    pub(super) fn allowed(&mut self, begun: Begun, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
+        let Begun { lane, rates, coordinates: f, .. } = begun;
+        let power = |k: usize, c: usize| rates[k * f + c].0[lane];
+        let largest = |k: usize| (0..f).fold(0.0, |most: f64, c| most.max(power(k, c).abs())) * self.unit;
+        let last: [f64; JUDGES] = std::array::from_fn(|back| largest(order - back));
+        let wanted = step_size::falling(tolerance, order, (&last, largest), slot.wanted);
+        let h = wanted.min(slot.left);
+        let confirmed = self.confirmed(begun, slot, (order, tolerance), h);
+        if confirmed < h { confirmed } else { wanted }
+    }
+
+    /// Of the step `h` \[s\] as much as the equations confirm.
+    fn confirmed(
+        &mut self,
+        Begun { lane, high, rates, coordinates: f }: Begun,
+        slot: &LaneSlot,
+        (order, tolerance): (usize, f64),
+        h: f64,
+    ) -> f64 {
+        let Self { equations: Some(equations), inside, rates: found, both, .. } = self else { return h };
+        inside.y.resize(2 * f + 1, 0.0);
+        found.resize(2 * f + 1, 0.0);
+        confirm::confirmed(tolerance, h, both, |t, [series, by_equations]| {
+            series.clear();
+            for c in 0..f {
+                let (mut angle, mut rate, mut acceleration) = (0.0, 0.0, 0.0);
+                for k in (1..=order).rev() {
+                    let power = rates[k * f + c].0[lane];
+                    angle = angle * t + power / (k + 1) as f64;
+                    rate = rate * t + power;
+                    acceleration = acceleration * t + k as f64 * power;
+                }
+                let start = rates[c].0[lane];
+                inside.y[c] = high[c].0[lane] + t * (start + t * angle);
+                inside.y[f + c] = start + t * rate;
+                series.push(acceleration);
+            }
+            let time = slot.time + t;
+            match equations {
+                Equations::Independent(equations) => equations.rhs(time, &inside.y, found),
+                Equations::All(equations) => equations.rhs(time, &inside.y, found),
+            }
+            by_equations.clear();
+            by_equations.extend_from_slice(&found[f..2 * f]);
+        })
+    }
+}
