@@ -269,6 +269,10 @@ fn a_moment_is_that_of_the_run() {
     program.run("inspect crank_rocker.json --at 0.3").exits(0).shows(&["0.3 s", "torque"]);
     program.run("inspect crank_rocker.json --at -1").exits(2).says(&["--at"]);
     program.run("inspect crank_rocker.json --at lunch").exits(2).says(&["--at lunch", "event"]);
+    // The release ends the motion: there is no later moment.
+    let ended = program.read("latch.json").replace(r#""off": ["latch"]}"#, r#""action": "stop"}"#);
+    with_input(&program, "inspect - --at release", &ended).exits(0).shows(&["2.5 s"]);
+    with_input(&program, "inspect - --at 3", &ended).exits(2).says(&["--at 3", "release", "2.5 s"]);
 }
 
 #[test]

@@ -79,5 +79,16 @@ fn moment(
     };
     let running = run(until)?;
     let inspection = inspect::inspect_at(running.mechanism(), running.motion());
-    running.finish().stop.map_or(Ok(inspection), |stop| Err(stop.into()))
+    let outcome = running.finish();
+    match (outcome.stop, outcome.ended_by) {
+        (Some(stop), _) => Err(stop.into()),
+        (None, Some(event)) if outcome.last.t < until * (1.0 - 1e-9) => {
+            let reached = outcome.last.t;
+            let text = format!(
+                "--at {at}: the event {event} ends the motion at t = {reached} s\nhint: --at {event}, or an earlier time"
+            );
+            Err(Failure::new(Exit::Usage, text))
+        }
+        (None, _) => Ok(inspection),
+    }
 }

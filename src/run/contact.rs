@@ -117,6 +117,8 @@ pub(super) struct ContactDriver {
     pub(super) stabilizer: f64,
     /// Impacts, holds, releases and changes by events, where somebody asks.
     pub(super) jumps: Option<JumpLog>,
+    /// What steps go no further than where it [pauses at impacts](Self::pause_at_impacts).
+    horizon: Option<Time>,
 }
 
 impl ContactDriver {
@@ -144,6 +146,7 @@ impl ContactDriver {
             flips: None,
             stabilizer: 0.0,
             jumps: None,
+            horizon: None,
         }
     }
 
@@ -185,6 +188,14 @@ impl ContactDriver {
     /// The motion last sampled.
     pub(super) fn shown(&self) -> &Motion {
         &self.shown
+    }
+
+    /// From now on what a trajectory is left alone for: steps up to a time, with a pause after every impact.
+    pub(super) fn pause_at_impacts(&mut self, until: Time) {
+        if self.horizon != Some(until) {
+            self.is_between = false;
+        }
+        self.horizon = Some(until);
     }
 
     /// Counts of all drivers so far.
@@ -232,7 +243,7 @@ impl ContactDriver {
             if let Some(monitor) = &mut monitor {
                 monitor.count_events(outcome.impact_count + outcome.persistent_contact_count);
             }
-            let horizon = outcome.plan.time(outcome.plan.rows);
+            let horizon = self.horizon.unwrap_or_else(|| outcome.plan.time(outcome.plan.rows));
             if let Some(extremes) = &mut self.extremes {
                 extremes.hold(&self.mechanism);
             }
@@ -280,6 +291,10 @@ impl ContactDriver {
                 Err(stop) => return Err(stop),
             }
             self.events_in_row += 1.max((outcome.impact_count - impacts_before) as usize);
+            if self.horizon.is_some() && self.events_in_row < EVENTS_MOST {
+                self.is_between = true;
+                return Ok(false);
+            }
         }
         let what = format!("more than {EVENTS_MOST} impacts and releases before the next output time");
         let hint = "shorten the output interval, lower the restitution, or look for a point that motors squeeze \

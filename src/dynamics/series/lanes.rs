@@ -54,8 +54,14 @@ pub trait SeriesInLanes: Debug {
     /// Power `m` of a body's rate in a lane \[rad/s^(m+1)\].
     fn rate_of(&self, m: usize, body: usize, lane: usize) -> f64;
 
+    /// The unit vector of a body at the start in a lane.
+    fn unit_of(&self, body: usize, lane: usize) -> Complex<f64>;
+
     /// The angle of a body at the start in a lane, in [-π, π] \[rad\].
-    fn angle_of(&self, body: usize, lane: usize) -> f64;
+    fn angle_of(&self, body: usize, lane: usize) -> f64 {
+        let Complex { re, im } = self.unit_of(body, lane);
+        Scalar::atan2(im, re)
+    }
 }
 
 /// Room for the series of eight motions of a mechanism of bodies alone, in all angles where there are rows
@@ -81,11 +87,15 @@ impl WideCode for Room<'_> {
         };
         let series = Series::<InLanes<W>>::of_terms(&terms, coordinates, self.order);
         let f = series.coordinates();
+        let is_asked = series.is_tied || !self.mechanism.contacts.is_empty();
         let room = || vec![InLanes::ZERO; f];
         Box::new(Whole {
             begin: [room(), room(), room()],
             rates: vec![Octet::default(); (self.order + 1) * f],
             power: vec![Octet::default(); self.order],
+            // Where they are not the coordinates' rates, or asked for at every step.
+            omega: vec![Octet::default(); if is_asked { series.omega.len() } else { 0 }],
+            units: vec![[Octet::default(); 2]; if is_asked { series.elements } else { 0 }],
             regularity: Regularity::new(series.rows.levers()),
             series,
         })
@@ -99,6 +109,9 @@ struct Whole<W: EightLanes> {
     begin: [Vec<InLanes<W>>; 3],
     rates: Vec<Octet>,
     power: Vec<Octet>,
+    /// Rates of the bodies and their unit vectors at the start, where these are asked for.
+    omega: Vec<Octet>,
+    units: Vec<[Octet; 2]>,
     regularity: Regularity,
 }
 
@@ -114,7 +127,7 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
 
     #[inline(always)]
     fn perform(self) {
-        let Whole { series, begin: [u, rest, rate], rates, power, regularity } = self.whole;
+        let Whole { series, begin: [u, rest, rate], rates, power, omega, units, regularity } = self.whole;
         let [from_u, from_rest, from_rate] = self.begin;
         for c in 0..u.len() {
             u[c] = InLanes(W::of(&from_u[c].0));
@@ -130,6 +143,13 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
         }
         for m in 0..power.len() {
             power[m] = Octet(series.power[m].0.array());
+        }
+        for i in 0..omega.len() {
+            omega[i] = Octet(series.omega[i].0.array());
+        }
+        for i in 0..units.len() {
+            let z = series.z[i];
+            units[i] = [Octet(z.re.0.array()), Octet(z.im.0.array())];
         }
     }
 }
@@ -157,11 +177,17 @@ impl<W: EightLanes> SeriesInLanes for Whole<W> {
     }
 
     fn rate_of(&self, m: usize, body: usize, lane: usize) -> f64 {
-        self.series.omega[m * self.series.elements + body].0.array()[lane]
+        let of = if self.omega.is_empty() { &self.rates } else { &self.omega };
+        of[m * self.series.elements + body].0[lane]
     }
 
-    fn angle_of(&self, body: usize, lane: usize) -> f64 {
-        let Complex { re, im } = self.series.z[body];
-        Scalar::atan2(im.0.array()[lane], re.0.array()[lane])
+    fn unit_of(&self, body: usize, lane: usize) -> Complex<f64> {
+        match self.units.get(body) {
+            Some([re, im]) => Complex::new(re.0[lane], im.0[lane]),
+            None => {
+                let Complex { re, im } = self.series.z[body];
+                Complex::new(re.0.array()[lane], im.0.array()[lane])
+            }
+        }
     }
 }

@@ -1,91 +1,109 @@
 //! Trajectories in lanes, and alone where these do not take them.
 //!
-//! With closed loops a trajectory [leaves](BatchMember::has_left) the lanes near a singular position. It goes
-//! on by `taylor` with projection, as a single run would from there, until it is past, and comes back.
+//! A trajectory [leaves](BatchMember::has_left) the lanes near a singular position, and where it may come to a
+//! wall.  It goes on by `taylor` as a single run would from there, with projection or through the impact,
+//! until it is past, and comes back.
 
-use crate::dynamics::kernel::Kernel;
-use crate::dynamics::schur::NEAR;
-use crate::dynamics::{State, Time};
-use crate::run::build::{Problem, tangent_form};
-use crate::stabilization::Projected;
+mod impacts;
+mod singular;
+
+use self::impacts::ThroughImpacts;
+use self::singular::PastSingular;
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::elimination::Elimination;
+use crate::dynamics::multiplier::Multiplier;
+use crate::dynamics::{Mechanism, Time};
+use crate::run::build::Problem;
+use crate::run::plan::Plan;
+use crate::stepping::StepError;
 use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage, Watch};
-use crate::stepping::{Integrator, StepError, Taylor};
-use std::cell::RefCell;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-/// Integrates all trajectories to `until`, as [`Batch::integrate`] does.
-pub(super) fn integrate(batch: &Batch, members: &mut [BatchMember], until: Time, watch: &mut Watch) {
-    let mut all: Vec<Option<Box<Alone>>> = Vec::new();
-    all.resize_with(members.len(), || None);
-    batch.integrate_with(members, until, watch, &mut |number, member, watch| {
-        let alone = all[number].get_or_insert_with(|| Box::new(Alone::new(batch, member)));
-        alone.go_past(member, until, &mut |passage| watch(number, passage)).unwrap_or_else(|stop| {
-            member.stopped = Some(stop);
-            Going::Enough
-        })
-    });
-}
-
 /// What takes one trajectory on.
-struct Alone {
-    problem: RefCell<Box<dyn Problem>>,
-    method: RefCell<Projected<Taylor<f64>>>,
-    kernel: Kernel<f64>,
+enum Alone {
+    PastSingular(Box<PastSingular>),
+    ThroughImpacts(Box<ThroughImpacts>),
 }
 
-impl Alone {
-    fn new(batch: &Batch, member: &BatchMember) -> Self {
-        let mechanism = Arc::new(member.mechanism.clone());
-        Self {
-            kernel: Kernel::new(&mechanism),
-            problem: RefCell::new(tangent_form(&mechanism)),
-            method: RefCell::new(Projected::new(batch.alone())),
-        }
+/// The method of some trajectories, and what takes those on that have left the lanes.
+pub(super) struct Ensemble {
+    batch: Batch,
+    plan: Plan,
+    alone: Vec<Option<Alone>>,
+}
+
+impl Ensemble {
+    /// For so many trajectories, by a method in lanes that has the tolerance of a plan.
+    pub(super) fn new(batch: Batch, plan: &Plan, count: usize) -> Self {
+        let mut alone = Vec::new();
+        alone.resize_with(count, || None);
+        Self { batch, plan: plan.clone(), alone }
     }
 
-    /// Takes steps until the constraints are independent of one another again, at least one; tells whether
-    /// there is more to be seen.
-    fn go_past(
+    /// Integrates trajectories, those from number `first` on, to `until`, as [`Batch::integrate`] does.
+    pub(super) fn integrate(
         &mut self,
-        member: &mut BatchMember,
+        first: usize,
+        members: &mut [BatchMember],
         until: Time,
-        watch: &mut dyn FnMut(&Passage) -> Going,
-    ) -> Result<Going, StepError> {
-        let Self { problem, method, kernel } = self;
-        let n = member.mechanism.coordinates();
-        member.has_left = false;
-        method.get_mut().begin(&mut **problem.get_mut(), &mut member.state, until)?;
-        loop {
-            let from = member.state.clone();
-            let BatchMember { mechanism, state, statistics, .. } = &mut *member;
-            method.get_mut().step(&mut **problem.get_mut(), state, until, statistics)?;
-            let inside = |after: f64| {
-                let mut inside = State::default();
-                let (mut problem, mut method) = (problem.borrow_mut(), method.borrow_mut());
-                method.interpolate_roughly(&mut **problem, &from, from.time + after, &mut inside);
-                inside
-            };
-            let series = |body: usize, after: f64| angle_and_rate(&inside(after), &from, n, body);
-            let start = |body: usize| angle_and_rate(&from, &from, n, body);
-            let ends =
-                |body: usize| [start(body), angle_and_rate(state, &from, n, body)].map(<[f64; 2]>::from);
-            let passage = Passage::new(from.time, (state.time - from.time).hi, &ends, &series);
-            if watch(&passage) == Going::Enough {
-                return Ok(Going::Enough);
-            }
-            let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
-            let share = kernel.independence_at(mechanism, state.time, phi, omega);
-            if state.time >= until || share >= NEAR {
-                return Ok(Going::On);
-            }
+        watch: &mut Watch,
+    ) {
+        let Self { batch, plan, alone } = self;
+        batch.integrate_with(members, until, watch, &mut |number, member, watch| {
+            let watch = &mut |passage: &Passage| watch(number, passage);
+            take_on(&mut alone[first + number], batch, plan, member, until, watch).unwrap_or_else(|stop| {
+                member.stopped = Some(stop);
+                Going::Enough
+            })
+        });
+    }
+
+    /// What impacts have changed so far of a trajectory's energy less the work its state tells of \[J\].
+    pub(super) fn energy_of_impacts(&self, number: usize) -> DoubleDouble {
+        match &self.alone[number] {
+            Some(Alone::ThroughImpacts(alone)) => alone.energy(),
+            _ => DoubleDouble::default(),
         }
+    }
+
+    /// Forgets a trajectory, whose number the last one gets.
+    pub(super) fn swap_remove(&mut self, number: usize) {
+        self.alone.swap_remove(number);
     }
 }
 
-/// Angle of a body \[rad\], continued from that of a former state in [-π, π], and its rate \[rad/s\].
-fn angle_and_rate(state: &State, from: &State, n: usize, body: usize) -> (f64, f64) {
-    let reduced = |angle: f64| if angle.abs() <= PI { 0.0 } else { (angle / TAU).round() };
-    let turns = (state.turns[body] - from.turns[body]) as f64 - reduced(from.y[body]);
-    (state.y[body] + TAU * turns, state.y[n + body])
+fn take_on(
+    alone: &mut Option<Alone>,
+    batch: &Batch,
+    plan: &Plan,
+    member: &mut BatchMember,
+    until: Time,
+    watch: &mut dyn FnMut(&Passage) -> Going,
+) -> Result<Going, StepError> {
+    let alone = match alone {
+        Some(alone) => alone,
+        None => alone.insert(match member.mechanism.contacts.is_empty() {
+            true => Alone::PastSingular(Box::new(PastSingular::new(batch, member))),
+            false => Alone::ThroughImpacts(Box::new(ThroughImpacts::new(plan, member)?)),
+        }),
+    };
+    member.has_left = false;
+    match alone {
+        Alone::PastSingular(alone) => alone.go(member, until, watch),
+        Alone::ThroughImpacts(alone) => alone.go(member, until, watch),
+    }
+}
+
+/// The form whose states those in lanes are.
+pub(super) fn form_in_lanes(mechanism: Arc<Mechanism>) -> Box<dyn Problem> {
+    match mechanism.has_multipliers() {
+        true => Box::new(Multiplier::<0, true>::new(mechanism)),
+        false => Box::new(Elimination::<0>::new(mechanism)),
+    }
+}
+
+/// Whole turns that are to be taken off an angle \[rad\] for it to be in [-π, π].
+fn whole_turns(angle: f64) -> f64 {
+    if angle.abs() <= PI { 0.0 } else { (angle / TAU).round() }
 }

@@ -6,7 +6,7 @@
 //! between these.  Beside an integration at 1e-9 both together cost 2.2 times as much (32 points of `free`,
 //! counted instructions).
 
-use super::ensemble;
+use super::ensemble::Ensemble;
 use super::point::Ready;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{State, Time};
@@ -55,7 +55,7 @@ struct Known {
 
 /// The second integration.
 pub(super) struct Judge<'a> {
-    batch: Batch,
+    ensemble: Ensemble,
     members: Vec<BatchMember<'a>>,
     known: Vec<Known>,
 }
@@ -65,9 +65,10 @@ impl<'a> Judge<'a> {
     pub(super) fn new(ready: &'a [Ready], plan: &Plan) -> Self {
         let tolerance = plan.tolerance.unwrap_or_default();
         let finer = (tolerance.relative.min(tolerance.absolute) / FINER).max(FINEST);
-        let batch = Batch::new(Tolerance { relative: finer, absolute: finer }).with_order(ORDER);
+        let tolerance = Tolerance { relative: finer, absolute: finer };
+        let plan = Plan { tolerance: Some(tolerance), ..plan.clone() };
         Self {
-            batch,
+            ensemble: Ensemble::new(Batch::new(tolerance).with_order(ORDER), &plan, ready.len()),
             members: ready.iter().map(|ready| ready.member(2)).collect(),
             known: vec![Known::default(); ready.len()],
         }
@@ -75,15 +76,15 @@ impl<'a> Judge<'a> {
 
     /// Goes on to an output time, and compares all points: at their ends, where these come before it.
     pub(super) fn integrate(&mut self, points: &[BatchMember], until: Time) {
-        let Self { batch, members, known } = self;
+        let Self { ensemble, members, known } = self;
         for (number, point) in points.iter().enumerate() {
             if point.state.time < until {
                 let member = &mut members[number..=number];
-                ensemble::integrate(batch, member, point.state.time, &mut |_, _| Going::On);
+                ensemble.integrate(number, member, point.state.time, &mut |_, _| Going::On);
                 known[number].take(&point.state, &members[number]);
             }
         }
-        ensemble::integrate(batch, members, until, &mut |_, _| Going::On);
+        ensemble.integrate(0, members, until, &mut |_, _| Going::On);
         for ((point, member), known) in points.iter().zip(members).zip(known) {
             if point.state.time >= until {
                 known.take(&point.state, member);
@@ -94,6 +95,7 @@ impl<'a> Judge<'a> {
     /// What is known of a point, which goes no further.
     pub(super) fn remove(&mut self, number: usize) -> PointTrust {
         self.members.swap_remove(number);
+        self.ensemble.swap_remove(number);
         let Known { last: [_, error], horizon, is_lost } = self.known.swap_remove(number);
         let printed = |error: f64| (CAUTION * error).max(LEAST);
         match horizon {

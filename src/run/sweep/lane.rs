@@ -70,10 +70,12 @@ impl Lane {
         }
     }
 
-    /// Takes what a member has come to; false where the point goes no further.
+    /// Takes what a member has come to, whose energy impacts have moved so far \[J\]; false where the point
+    /// goes no further.
     pub(super) fn measure(
         &mut self,
         member: &BatchMember,
+        moved: DoubleDouble,
         motion: &mut Motion,
         kernel: &mut Kernel<DoubleDouble>,
         stated: Option<f64>,
@@ -85,7 +87,7 @@ impl Lane {
         let work = if is_counted { state.unknown(2 * coordinates) } else { DoubleDouble::ZERO };
         let point = &mut self.point;
         let energy = member.mechanism.energy(kernel, &motion.phi, &motion.omega).total() - work;
-        let imbalance = ((energy - self.reference).hi / self.scale).abs();
+        let imbalance = ((energy - self.reference - moved).hi / self.scale).abs();
         point.energy = larger(imbalance, point.energy);
         point.t = state.time.hi;
         point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();

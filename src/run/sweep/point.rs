@@ -1,13 +1,12 @@
 //! One point of a sweep, or several integrated in lanes.
 
+use super::ensemble::{Ensemble, form_in_lanes};
 use super::judge::{Judge, PointTrust};
 use super::lane::Lane;
-use super::{Sweep, ensemble, timed};
+use super::{Sweep, timed};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::elimination::Elimination;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::multiplier::Multiplier;
-use crate::dynamics::{Form, Mechanism, Motion};
+use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::larger;
 use crate::run::flip::Flip;
 use crate::run::methods::{MethodId, Stabilization};
@@ -76,11 +75,7 @@ pub(super) struct Ready {
 impl Ready {
     /// Its trajectory, which may take so many times the evaluations planned.
     pub fn member(&self, times: u64) -> BatchMember<'_> {
-        let mechanism = Arc::clone(&self.mechanism);
-        let state = match mechanism.has_multipliers() {
-            true => Multiplier::<0, true>::new(mechanism).state(&self.start),
-            false => Elimination::<0>::new(mechanism).state(&self.start),
-        };
+        let state = form_in_lanes(Arc::clone(&self.mechanism)).state(&self.start);
         let mut member = BatchMember::new(&self.mechanism, state);
         member.statistics.max_evaluations = self.plan.max_evaluations.saturating_mul(times);
         member
@@ -282,11 +277,12 @@ impl Sweep {
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
             lanes.push(Lane::new(ready, reference));
         }
+        let mut ensemble = Ensemble::new(batch, &plan, members.len());
         let mut judge = (self.trust != Level::Off).then(|| Judge::new(&ready, &plan));
         let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
         for row in 1..=plan.rows {
-            ensemble::integrate(&batch, &mut members, plan.time(row), &mut |lane, passage| {
+            ensemble.integrate(0, &mut members, plan.time(row), &mut |lane, passage| {
                 let lane = &mut lanes[lane];
                 if lane.point.flip.is_none() {
                     lane.look(bodies, passage);
@@ -307,7 +303,9 @@ impl Sweep {
             while number < lanes.len() {
                 let (lane, member) = (&mut lanes[number], &members[number]);
                 let over = row == plan.rows || (self.ends_at_flips && lane.point.flip.is_some());
-                if lane.measure(member, &mut motion, &mut kernel, self.limits.energy, &plan) && !over {
+                let moved = ensemble.energy_of_impacts(number);
+                let limit = self.limits.energy;
+                if lane.measure(member, moved, &mut motion, &mut kernel, limit, &plan) && !over {
                     number += 1;
                     continue;
                 }
@@ -315,6 +313,7 @@ impl Sweep {
                 point.trust = judge.as_mut().map(|judge| judge.remove(number));
                 found.push(point);
                 members.swap_remove(number);
+                ensemble.swap_remove(number);
                 finished();
             }
             if lanes.is_empty() {

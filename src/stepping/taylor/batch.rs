@@ -5,6 +5,7 @@
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
 //! trajectory as soon as its last one has ended.
 
+mod clearance;
 mod driven;
 mod formulas;
 mod free;
@@ -52,8 +53,9 @@ pub struct BatchMember<'a> {
     pub statistics: Statistics,
     /// Why it stopped, if it did.
     pub stopped: Option<StepError>,
-    /// True where it came to a step that lanes do not take, near a singular position: it stands where that
-    /// step begins, to be taken on by [`Taylor`](super::Taylor) with projection.
+    /// True where it came to a step that lanes do not take, near a singular position or to a wall: it stands
+    /// where that step begins, to be taken on by [`Taylor`](super::Taylor) with projection, or through the
+    /// impact.
     pub has_left: bool,
 }
 

@@ -89,8 +89,12 @@ impl StepJudge {
         h: f64,
     ) -> f64 {
         let Self { equations: Some(equations), inside, rates: found, both, .. } = self else { return h };
-        inside.y.resize(2 * f + 1, 0.0);
-        found.resize(2 * f + 1, 0.0);
+        let dimension = match equations {
+            Equations::Independent(equations) => equations.dimension(),
+            Equations::All(equations) => equations.dimension(),
+        };
+        inside.y.resize(dimension, 0.0);
+        found.resize(dimension, 0.0);
         confirm::confirmed(tolerance, h, both, |t, [series, by_equations]| {
             series.clear();
             for c in 0..f {

@@ -70,6 +70,7 @@ fn fits(mechanism: &Mechanism) -> bool {
     super::trees::fits(mechanism)
         && mechanism.has_closed_loops()
         && mechanism.forces.is_empty()
+        && mechanism.contacts.is_empty()
         && mechanism.torsions.is_empty()
         && !mechanism.is_damped()
         && mechanism.actions.iter().all(is_constant)

@@ -3,10 +3,11 @@
 //! with a lane for each trajectory.
 //!
 //! Loops and sliders are kept by multipliers, and by a projection after every step.  A trajectory leaves the
-//! lanes where a step begins or ends near a singular position, or does not end on its rows: from where that
-//! step began it has to go on alone.
+//! lanes where a step begins or ends near a singular position, does not end on its rows, or may come to a
+//! wall: from where that step began it has to go on alone.
 
 use super::super::terms::over;
+use super::clearance::{self, Clearance, StepFrom};
 use super::formulas::{Begun, StepJudge};
 use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
 use crate::arithmetic::angle;
@@ -46,6 +47,7 @@ pub(super) struct TreeTeam {
     kept: Option<[Vec<Octet>; 2]>,
     /// What steps are judged by where there are formulas.
     judge: Option<StepJudge>,
+    clearance: Clearance,
 }
 
 /// True for hinge trees whose motors are all eliminated, with a motion left, and for mechanisms with loops or
@@ -58,7 +60,7 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.coordinates() == mechanism.bodies.len()
         && mechanism.tree.is_dense()
         && mechanism.integrals().next().is_none()
-        && mechanism.contacts.is_empty()
+        && mechanism.contacts.iter().all(clearance::takes)
         && mechanism.frictions.is_empty()
         && mechanism.vibration.is_none()
         && (is_tree(mechanism) || is_looped(mechanism))
@@ -174,6 +176,7 @@ impl Team for TreeTeam {
             is_leaving: [false; LANES],
             kept: is_kept.then(|| [vec![ZERO; 2 * f + 1], vec![ZERO; 2 * f + 1]]),
             judge: StepJudge::new(like, laws(like).any(|law| law.profile.is_some())),
+            clearance: Clearance::default(),
         }
     }
 
@@ -183,6 +186,7 @@ impl Team for TreeTeam {
             (&mechanism.tree, &mechanism.partition, &mechanism.springs)
                 == (&like.tree, &like.partition, &like.springs)
                 && (&mechanism.constraints, &mechanism.forces) == (&like.constraints, &like.forces)
+                && mechanism.contacts == like.contacts
                 && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
         };
         fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && is_equal())
@@ -259,10 +263,25 @@ impl Team for TreeTeam {
     }
 
     fn allowed(&mut self, lane: usize, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
-        let Some(judge) = &mut self.judge else { return slot.wanted };
-        let begun =
-            Begun { lane, high: &self.high, rates: self.series.rates(), coordinates: self.coordinates };
-        judge.allowed(begun, slot, order, tolerance)
+        let mut wanted = slot.wanted;
+        if let Some(judge) = &mut self.judge {
+            let begun =
+                Begun { lane, high: &self.high, rates: self.series.rates(), coordinates: self.coordinates };
+            wanted = judge.allowed(begun, slot, order, tolerance);
+        }
+        if self.mechanism.contacts.is_empty() {
+            return wanted;
+        }
+        let length = wanted.min(slot.left);
+        let step = StepFrom { lane, time: slot.time, order, length };
+        match self.clearance.of(&self.mechanism, &*self.series, step) {
+            Some(clear) if clear < length => clear,
+            Some(_) => wanted,
+            None => {
+                (self.is_leaving[lane], self.is_going[lane]) = (true, false);
+                0.0
+            }
+        }
     }
 
     #[inline(always)]
