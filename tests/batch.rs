@@ -293,6 +293,43 @@ fn trees_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
     }
 }
 
+/// The same trees with other masses, lengths, stiffnesses, laws and gravity for every trajectory.
+#[test]
+fn trees_with_numbers_of_their_own_agree_with_double_double_whoever_is_beside_them() {
+    for scene in trees().iter().filter(|scene| Batch::takes_own_numbers(&compile(scene))) {
+        let all: Vec<_> = (0..11)
+            .map(|i| {
+                let mut scene = scene.clone();
+                let more = 1.0 + 0.03 * i as f64;
+                scene.gravity[0] *= more;
+                for (k, bar) in scene.bars.iter_mut().enumerate() {
+                    bar.mass *= if k % 2 == 0 { more } else { more.recip() };
+                    bar.centre[0] *= more;
+                }
+                for hinge in &mut scene.hinges {
+                    hinge.between.iter_mut().for_each(|end| end.point[0] *= more);
+                }
+                for spring in &mut scene.springs {
+                    (spring.stiffness, spring.damping) = (spring.stiffness * more, spring.damping / more);
+                }
+                for spring in &mut scene.torsion_springs {
+                    spring.stiffness *= more;
+                    spring.free_angle += 0.01 * i as f64;
+                }
+                scene.parameters.iter_mut().for_each(|parameter| parameter.value *= more);
+                for motor in &mut scene.motors {
+                    motor.law.rate /= more;
+                    motor.law.sines.iter_mut().for_each(|sine| sine.frequency *= more);
+                }
+                let mechanism = compile(&scene);
+                let state = start(&mechanism, &scene);
+                (mechanism, state)
+            })
+            .collect();
+        agree_with_double_double_whoever_is_beside(&all, 1.0, 2e-12);
+    }
+}
+
 /// Bodies with coordinates of their own, driven ones and such as ride on a driven one.
 #[test]
 fn trees_are_seen_inside_their_steps() {

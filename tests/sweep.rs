@@ -46,7 +46,7 @@ fn every_point_is_the_run_it_stands_for() {
         ("free", "gauss8", ["bar1.phi=0.5..2:2", "bars.bar2.density=500..900:2"], None),
         ("free", "rattle4", ["bar1.phi=0.5..2:2", "gravity[0]=1..9.81:2"], None),
         ("spring", "dp8", ["bar1.phi=0.5..2:2", "spring.stiffness=5..10:2"], None),
-        ("duffing", "taylor", ["bar.phi=0.5..2:2", "bars.bar.inertia=0.8..1:2"], None),
+        ("one_sided_spring", "taylor", ["bar.omega=0..1:2", "bars.bar.inertia=0.015..0.02:2"], None),
         ("motor", "dp8", ["bar2.phi=0.5..2:2", "bar2.omega=0..3:2"], Some(Stabilization::Projection)),
         ("motor", "dop853", ["bar2.phi=0.5..2:2", "bar2.omega=0..3:2"], Some(Stabilization::Baumgarte)),
         ("wall", "dp8", ["wall.restitution=0.2..0.8:2", "gravity[0]=5..9:2"], None),
@@ -131,6 +131,8 @@ fn points_with_formulas_agree_with_single_runs() {
     for (scene, vary) in [
         ("duffing", ["parameters.k3=0.5..1:2", "bar.phi=-1..1:9"]),
         ("drag", ["bar2.phi=-0.5..0.5:3", "bar1.phi=-1..1:3"]),
+        ("duffing", ["bar.phi=-1..1:2", "parameters.amplitude=0.1..0.4:9"]),
+        ("branch", ["bar1.phi=1..2:2", "bars.plate.mass=0.05..0.1:9"]),
     ] {
         let plan = prepared(scene, &vary, &request);
         for point in points(&plan, 1) {

@@ -80,6 +80,22 @@ pub struct CoordinatePartition<C = f64> {
     given: usize,
 }
 
+impl<C> CoordinatePartition<C> {
+    /// The same ties with other laws.
+    pub(super) fn map<D>(&self, mut law: impl FnMut(&Law<C>) -> Law<D>) -> CoordinatePartition<D> {
+        let body = |of: &DependentAngle<C>| DependentAngle {
+            base: of.base,
+            laws: of.laws.iter().map(|(sign, of)| (*sign, law(of))).collect(),
+        };
+        CoordinatePartition {
+            angles: self.angles,
+            bodies: self.bodies.iter().map(body).collect(),
+            independent: self.independent.clone(),
+            given: self.given,
+        }
+    }
+}
+
 impl<C: Real> CoordinatePartition<C> {
     /// Walks the given angles outwards from the ground and from the first body of every group left;
     /// translational coordinates are coordinates of their own.

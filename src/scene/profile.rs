@@ -70,6 +70,17 @@ impl Profile {
 }
 
 impl<C> Profile<C> {
+    /// The same formula with other numbers.
+    pub(crate) fn map_numbers<D>(&self, of: impl FnMut(&C) -> D) -> Profile<D> {
+        Profile {
+            text: self.text.clone(),
+            tape: Arc::clone(&self.tape),
+            results: self.results,
+            numbers: self.numbers.iter().map(of).collect(),
+            peaks: self.peaks,
+        }
+    }
+
     /// Its formula.
     pub fn text(&self) -> &str {
         &self.text

@@ -116,6 +116,25 @@ pub struct Tape {
 }
 
 impl Tape {
+    /// The same formula with its constants as inputs, of which `input` gives the number; and where its results
+    /// are then.
+    pub fn lifted(&self, mut input: impl FnMut(f64) -> u32) -> (Self, Vec<Slot>) {
+        let (mut operations, mut new) = (Vec::with_capacity(self.operations.len()), Vec::<Slot>::new());
+        for &operation in &self.operations {
+            let operation = match operation {
+                Operation::Constant(value) => Operation::Input(input(value)),
+                Operation::Scale(a, factor) => {
+                    operations.push(Operation::Input(input(factor)));
+                    Operation::Multiply(new[a as usize], operations.len() as Slot - 1)
+                }
+                other => other.renumbered(&new),
+            };
+            new.push(operations.len() as Slot);
+            operations.push(operation);
+        }
+        (Self { operations }, new)
+    }
+
     /// The formula of `operations`, of which the `results` are asked for; these are renumbered.
     fn new(operations: &[Operation], results: &mut [Slot]) -> Self {
         let mut is_needed = vec![false; operations.len()];

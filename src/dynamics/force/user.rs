@@ -14,6 +14,7 @@ use crate::arithmetic::tape::{Slot, Tape};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::constraint::{Posture, Site};
+use crate::dynamics::point::Point;
 
 /// A force or torque that acts on a mechanism, beside those a scene knows.
 ///
@@ -132,6 +133,45 @@ pub struct UserForce<C = f64> {
     pub(crate) may_be_flat: bool,
     /// Potential energy \[J\].
     pub(super) potential: Option<(Tape, Slot)>,
+}
+
+impl UserForce {
+    /// What it does at other places, and with other numbers in its formulas, one by one.
+    pub(in crate::dynamics) fn map<D>(
+        &self,
+        mut of: impl FnMut(f64) -> D,
+        point: impl Fn(&Point, &mut dyn FnMut(f64) -> D) -> Point<D>,
+    ) -> UserForce<D> {
+        let site = |site: &Site| Site { body: site.body, point: point(&site.point, &mut of) };
+        let sites = self.sites.iter().map(site).collect();
+        let (mut inputs, mut numbers) = (self.inputs.clone(), Vec::new());
+        let mut input = |value: f64| {
+            inputs.push(Input::Number(numbers.len()));
+            numbers.push(of(value));
+            inputs.len() as u32 - 1
+        };
+        let parts = self.parts.each_ref().map(|part| {
+            let (tape, new) = part.tape.lifted(&mut input);
+            let at = |slot: Slot| new[slot as usize];
+            Part {
+                tape,
+                forces: part.forces.iter().map(|&(site, xy)| (site, xy.map(at))).collect(),
+                torques: part.torques.iter().map(|&(body, torque)| (body, at(torque))).collect(),
+                power: part.power.map(at),
+            }
+        });
+        UserForce {
+            name: self.name.clone(),
+            inputs,
+            sites,
+            numbers,
+            parts,
+            // Neither is asked for by series.
+            span: None,
+            potential: None,
+            may_be_flat: self.may_be_flat,
+        }
+    }
 }
 
 impl<C: Real> UserForce<C> {

@@ -107,6 +107,12 @@ pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constan
         self + factor * constant
     }
 
+    /// The number less the product of another one and a constant.
+    #[inline(always)]
+    fn less_constant(self, factor: Self, constant: Self::Constant) -> Self {
+        self.with_constant(factor, -constant)
+    }
+
     /// The sum with the product of a number and a constant.
     #[inline(always)]
     fn with_constant(self, factor: Self, constant: Self::Constant) -> Self {

@@ -1,6 +1,6 @@
 //! The series of a law of time.
 
-use crate::arithmetic::{Real, Scalar};
+use crate::arithmetic::{Over, Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Sine};
 use crate::scene::Profile;
@@ -24,11 +24,11 @@ pub fn add<T: Real>(law: &Law, sign: f64, t: Time, series: &mut [T], first: usiz
 /// The same from the rate at that time and from functions that know it: sine and cosine of a sine's argument,
 /// and the series of a profile up to an order.
 #[inline(always)]
-pub fn add_from<T: Real>(
-    law: &Law,
+pub fn add_from<C: Copy, T: Real + Over<C>>(
+    law: &Law<C>,
     sign: f64,
     rate: T,
-    (unit, profile_powers): (impl Fn(&Sine) -> (T, T), impl Fn(&Profile, usize) -> Vec<T>),
+    (unit, profile_powers): (impl Fn(&Sine<C>) -> (T, T), impl Fn(&Profile<C>, usize) -> Vec<T>),
     (series, first, stride): (&mut [T], usize, usize),
 ) {
     series[first] += rate.scale(sign);
@@ -40,15 +40,15 @@ pub fn add_from<T: Real>(
             *power += powers[m + 1].scale(sign * (m + 1) as f64);
         }
     }
-    series[first + stride] += T::of(law.acceleration).scale(sign);
+    series[first + stride] += T::constant(law.acceleration).scale(sign);
     for sine in &law.sines {
         let (sin, cos) = unit(sine);
         // The m-th derivative of A f cos is A f^(m+1) cos, -sin, -cos, sin; power 0 is in the law's rate
         // already.
         let turns = [cos, -sin, -cos, sin];
-        let mut factor = T::of(sine.amplitude).scale(sign * sine.frequency);
+        let mut factor = T::constant(sine.amplitude).by(sine.frequency).scale(sign);
         for (m, power) in series[first..].iter_mut().step_by(stride).enumerate().skip(1) {
-            factor = factor.scale(sine.frequency) / T::of(m as f64);
+            factor = factor.by(sine.frequency) / T::of(m as f64);
             *power += turns[m % 4] * factor;
         }
     }

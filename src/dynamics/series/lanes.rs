@@ -3,13 +3,17 @@
 //! No operation mixes lanes, so that a motion has the bits it would have beside any others; the vectors of
 //! the processor and plain code give the same ones.
 
+mod constants;
 mod factor;
 mod landing;
 mod number;
 
+pub use self::constants::are_alike;
+use self::constants::{LaneConstants, TermSet};
+
 use self::landing::{Land, Regularity};
 use self::number::InLanes;
-use super::{Series, Terms};
+use super::Series;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Task, Vectors, WideCode};
 use crate::arithmetic::{Complex, Scalar};
@@ -34,6 +38,9 @@ pub struct Landing<'a> {
 
 /// Powers of eight motions.
 pub trait SeriesInLanes: Debug {
+    /// Puts the constants of a mechanism that is [alike](are_alike) into a lane.
+    fn take_in(&mut self, lane: usize, mechanism: &Mechanism);
+
     /// Expands the motions of a mechanism from their times, angles (leading parts and rests) and rates.
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]);
 
@@ -80,12 +87,9 @@ impl WideCode for Room<'_> {
 
     #[inline(always)]
     fn run<W: EightLanes>(self) -> Box<dyn SeriesInLanes> {
-        let terms = self.mechanism.terms();
-        let coordinates = match self.mechanism.has_multipliers() {
-            true => Coordinates::All,
-            false => Coordinates::Independent,
-        };
-        let series = Series::<InLanes<W>>::of_terms(&terms, coordinates, self.order);
+        let constants = LaneConstants::of(self.mechanism);
+        let terms = constants.terms::<W>(self.mechanism);
+        let series = series(&terms, self.mechanism, self.order);
         let f = series.coordinates();
         let is_asked = series.is_tied || !self.mechanism.contacts.is_empty();
         let room = || vec![InLanes::ZERO; f];
@@ -97,14 +101,31 @@ impl WideCode for Room<'_> {
             omega: vec![Octet::default(); if is_asked { series.omega.len() } else { 0 }],
             units: vec![[Octet::default(); 2]; if is_asked { series.elements } else { 0 }],
             regularity: Regularity::new(series.rows.levers()),
+            constants,
+            terms,
             series,
         })
     }
 }
 
+/// Room for series of these terms.
+fn series<W: EightLanes>(
+    terms: &TermSet<InLanes<W>>,
+    mechanism: &Mechanism,
+    order: usize,
+) -> Series<InLanes<W>> {
+    let coordinates = match mechanism.has_multipliers() {
+        true => Coordinates::All,
+        false => Coordinates::Independent,
+    };
+    Series::of_terms(&terms.terms(mechanism), coordinates, order)
+}
+
 /// Series, where they begin, and what is asked of them.
 #[derive(Debug)]
 struct Whole<W: EightLanes> {
+    constants: LaneConstants,
+    terms: TermSet<InLanes<W>>,
     series: Series<InLanes<W>>,
     begin: [Vec<InLanes<W>>; 3],
     rates: Vec<Octet>,
@@ -117,7 +138,7 @@ struct Whole<W: EightLanes> {
 
 struct Expand<'a, 'b, W: EightLanes> {
     whole: &'a mut Whole<W>,
-    terms: &'a Terms<'b, f64>,
+    mechanism: &'b Mechanism,
     times: Times,
     begin: [&'a [Octet]; 3],
 }
@@ -127,16 +148,18 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
 
     #[inline(always)]
     fn perform(self) {
-        let Whole { series, begin: [u, rest, rate], rates, power, omega, units, regularity } = self.whole;
+        let Whole { series, begin: [u, rest, rate], rates, power, omega, units, regularity, terms, .. } =
+            self.whole;
+        let terms = &terms.terms(self.mechanism);
         let [from_u, from_rest, from_rate] = self.begin;
         for c in 0..u.len() {
             u[c] = InLanes(W::of(&from_u[c].0));
             rest[c] = InLanes(W::of(&from_rest[c].0));
             rate[c] = InLanes(W::of(&from_rate[c].0));
         }
-        series.expand_terms(self.terms, self.times, u, rest, rate);
+        series.expand_terms(terms, self.times, u, rest, rate);
         if !series.rows.is_empty() {
-            regularity.look(series, &self.terms.tree.diagonal);
+            regularity.look(series, &terms.tree.diagonal);
         }
         for i in 0..rates.len() {
             rates[i] = Octet(series.rate[i].0.array());
@@ -156,7 +179,14 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
 
 impl<W: EightLanes> SeriesInLanes for Whole<W> {
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]) {
-        W::perform(Expand { whole: self, terms: &mechanism.terms(), times, begin });
+        W::perform(Expand { whole: self, mechanism, times, begin });
+    }
+
+    fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
+        if self.constants.put(lane, mechanism) {
+            self.terms = self.constants.terms(mechanism);
+            self.series = series(&self.terms, mechanism, self.series.order());
+        }
     }
 
     fn is_regular(&self, lane: usize) -> bool {
@@ -164,8 +194,8 @@ impl<W: EightLanes> SeriesInLanes for Whole<W> {
     }
 
     fn land(&mut self, mechanism: &Mechanism, times: Times, landing: Landing) -> [bool; LANES] {
-        let Self { series, begin, regularity, .. } = self;
-        W::perform(Land { series, regularity, begin, terms: &mechanism.terms(), times, landing })
+        let Self { series, begin, regularity, terms, .. } = self;
+        W::perform(Land { series, regularity, begin, terms: &terms.terms(mechanism), times, landing })
     }
 
     fn rates(&self) -> &[Octet] {

@@ -412,7 +412,7 @@ fn mass_rows<T: SeriesNumber>(
             sum.re = sum.re.with_constant(x.re, h.re);
             sum.im = sum.im.with_constant(x.im, h.re);
             if off_axis {
-                sum.re = sum.re.with_constant(x.im, -h.im);
+                sum.re = sum.re.less_constant(x.im, h.im);
                 sum.im = sum.im.with_constant(x.re, h.im);
             }
         }

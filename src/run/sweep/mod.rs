@@ -324,7 +324,11 @@ impl Sweep {
 
     /// True where a mechanism of the points can be in lanes.
     fn has_lanes_for(&self, mechanism: &Mechanism) -> bool {
-        Batch::takes(mechanism) || self.is_alike && Batch::takes_alike(mechanism)
+        let takes_many = || match self.is_alike {
+            true => Batch::takes_alike(mechanism),
+            false => Batch::takes_own_numbers(mechanism),
+        };
+        Batch::takes(mechanism) || takes_many()
     }
 
     /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.

@@ -127,10 +127,18 @@ impl Batch {
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
     /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
-    /// motors on angles, springs beside them, all by smooth formulas or without, and no walls and friction; and the same with closed loops and sliders, their states in the
-    /// form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
+    /// motors on angles, springs beside them, all by smooth formulas or without, and no friction; and the same
+    /// with closed loops and sliders, their states in the form of
+    /// [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         goes_on(mechanism) && trees::fits(mechanism)
+    }
+
+    /// True for those of the latter whose trajectories may have numbers of their own: hinge trees without walls
+    /// and formulas that may be flat.  Beside each other are mechanisms that differ in nothing but their
+    /// numbers, and have the same ones zero; numbers in laws of motors by formulas are equal.
+    pub fn takes_own_numbers(mechanism: &Mechanism) -> bool {
+        Self::takes_alike(mechanism) && trees::takes_own_numbers(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and

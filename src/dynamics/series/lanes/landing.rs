@@ -52,7 +52,7 @@ impl Regularity {
 
     /// Looks at the factors at hand.
     #[inline(always)]
-    pub fn look<W: EightLanes>(&mut self, series: &Series<InLanes<W>>, diagonal: &[f64]) {
+    pub fn look<W: EightLanes>(&mut self, series: &Series<InLanes<W>>, diagonal: &[InLanes<W>]) {
         let [mass, columns, rows] = series.rows.scales();
         let [jacobian, pivot] = series.rows.factors();
         let (r, f) = (mass.len(), columns.len());
@@ -61,7 +61,7 @@ impl Regularity {
             weakest = pivot[i].0.mul(W::splat(mass[i])).larger(weakest);
         }
         for c in 0..f {
-            deepest = series.pivot[c].0.mul(W::splat(diagonal[c])).larger(deepest);
+            deepest = series.pivot[c].0.mul(diagonal[c].0).larger(deepest);
         }
         for i in 0..r {
             for j in i..r {
@@ -127,7 +127,7 @@ pub(super) struct Land<'a, 'b, W: EightLanes> {
     pub series: &'a mut Series<InLanes<W>>,
     pub regularity: &'a mut Regularity,
     pub begin: &'a mut [Vec<InLanes<W>>; 3],
-    pub terms: &'a Terms<'b, f64>,
+    pub terms: &'a Terms<'b, InLanes<W>>,
     pub times: Times,
     pub landing: Landing<'a>,
 }
@@ -231,7 +231,7 @@ fn move_by<W: EightLanes>(high: &mut Octet, low: &mut Octet, change: W) {
 impl<W: EightLanes> Series<InLanes<W>> {
     /// The factors of M_0 and of the rows at unit vectors that are there already, and nothing more.
     #[inline(always)]
-    fn factor_for_rows(&mut self, terms: &Terms<f64>) {
+    fn factor_for_rows(&mut self, terms: &Terms<InLanes<W>>) {
         self.factor_mass::<0>(terms);
         let n = self.elements;
         self.rows.factor(&self.z[..n], &self.reduced, &self.pivot);

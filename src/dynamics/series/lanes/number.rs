@@ -2,12 +2,12 @@
 
 use super::super::factors::Factored;
 use super::super::{Constants, Series, SeriesNumber, Terms, bodywise, drive};
-use super::Times;
 use super::factor::FactorInLanes;
+use super::{Times, constants};
 use crate::arithmetic::eight::LANES;
 use crate::arithmetic::lanes::wide::{EightLanes, Task};
 use crate::arithmetic::lanes::{Arithmetic, Lanes};
-use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, sincos};
+use crate::arithmetic::{Complex, DoubleDouble, Over, Real, Scalar, sincos};
 use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Phase, Sine};
 use crate::scene::Profile;
@@ -211,18 +211,19 @@ impl<W: EightLanes> SubAssign for InLanes<W> {
 }
 
 impl<W: EightLanes> Constants for InLanes<W> {
-    type Constant = f64;
+    type Constant = Self;
     type Time = Times;
 
     fn moment(times: Times) -> Self {
         Self::of_times(&times, |t| t.hi)
     }
 
-    fn phase(law: &Law, times: Times) -> Phase<Self> {
-        if law.start == 0.0 && law.is_constant() {
+    fn phase(law: &Law<Self>, times: Times) -> Phase<Self> {
+        let laws = constants::laws(law);
+        if laws.iter().all(|law| law.start == 0.0 && law.is_constant()) {
             return Phase { unit: Complex::new(Self::ONE, Self::ZERO), ..Phase::default() };
         }
-        let phases = times.map(|t| law.at::<f64>(t));
+        let phases: [Phase<f64>; LANES] = std::array::from_fn(|lane| laws[lane].at::<f64>(times[lane]));
         let join =
             |part: fn(&Phase<f64>) -> f64| Self(W::of(&std::array::from_fn(|lane| part(&phases[lane]))));
         Phase {
@@ -233,26 +234,46 @@ impl<W: EightLanes> Constants for InLanes<W> {
         }
     }
 
-    fn law_value(law: &Law, times: Times) -> Self {
-        Self::of_times(&times, |t| law.value(t))
+    fn law_value(law: &Law<Self>, times: Times) -> Self {
+        let laws = constants::laws(law);
+        Self(W::of(&std::array::from_fn(|lane| laws[lane].value(times[lane]))))
     }
 
-    fn add_law(law: &Law, sign: f64, times: Times, series: &mut [Self], first: usize, stride: usize) {
-        if law.is_constant() {
+    fn add_law(law: &Law<Self>, sign: f64, times: Times, series: &mut [Self], first: usize, stride: usize) {
+        let laws = constants::laws(law);
+        if laws.iter().all(Law::is_constant) {
             return;
         }
-        let rate = Self::of_times(&times, |t| law.at::<f64>(t).rate);
-        let unit = |sine: &Sine| {
-            let units = times.map(|t| Scalar::sin_cos(sine.argument(t).reduced().0.hi));
-            let join = |part: fn((f64, f64)) -> f64| Self(W::of(&units.map(part)));
-            (join(|(sin, _)| sin), join(|(_, cos)| cos))
+        let of_lanes = |of: &dyn Fn(usize) -> f64| Self(W::of(&std::array::from_fn(of)));
+        let rate = of_lanes(&|lane| laws[lane].at::<f64>(times[lane]).rate);
+        let unit = |sine: &Sine<Self>| {
+            let units: [(f64, f64); LANES] = std::array::from_fn(|lane| {
+                let argument = constants::sine_of(sine, lane).argument(times[lane]);
+                Scalar::sin_cos(argument.reduced().0.hi)
+            });
+            (of_lanes(&|lane| units[lane].0), of_lanes(&|lane| units[lane].1))
         };
-        let profile = |profile: &Profile, order: usize| {
-            let powers = times.map(|t| profile.series::<f64>(t, order));
-            let power = |m: usize| Self(W::of(&std::array::from_fn(|lane| powers[lane][m])));
-            (0..powers[0].len()).map(power).collect()
+        let profile = |_: &Profile<Self>, order: usize| {
+            let of = |lane: usize| {
+                laws[lane].profile.as_ref().map(|profile| profile.series::<f64>(times[lane], order))
+            };
+            let powers: [Vec<f64>; LANES] = std::array::from_fn(|lane| of(lane).unwrap_or_default());
+            (0..powers[0].len()).map(|m| of_lanes(&|lane| powers[lane][m])).collect()
         };
         drive::add_from(law, sign, rate, (unit, profile), (series, first, stride));
+    }
+}
+
+/// A constant for each motion, as any number of theirs.
+impl<W: EightLanes> Over<Self> for InLanes<W> {
+    #[inline(always)]
+    fn constant(value: Self) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn by(self, factor: Self) -> Self {
+        self * factor
     }
 }
 
@@ -276,8 +297,13 @@ impl<W: EightLanes> SeriesNumber for InLanes<W> {
     }
 
     #[inline(always)]
-    fn with_constant(self, factor: Self, constant: f64) -> Self {
-        Self(factor.0.mul_add(W::splat(constant), self.0))
+    fn less_constant(self, factor: Self, constant: Self) -> Self {
+        Self(factor.0.neg_mul_add(constant.0, self.0))
+    }
+
+    #[inline(always)]
+    fn with_constant(self, factor: Self, constant: Self) -> Self {
+        Self(factor.0.mul_add(constant.0, self.0))
     }
 
     #[inline(always)]
@@ -286,7 +312,7 @@ impl<W: EightLanes> SeriesNumber for InLanes<W> {
     }
 
     #[inline(always)]
-    fn orders(series: &mut Series<Self>, terms: &Terms<f64>, first: usize) {
+    fn orders(series: &mut Series<Self>, terms: &Terms<Self>, first: usize) {
         series.orders_here::<0>(terms, first);
     }
 

@@ -12,7 +12,7 @@ use crate::dynamics::{Mechanism, OdeSystem, State};
 use std::sync::Arc;
 
 /// The longest step in units of time, where every power but the first vanishes.
-const LONGEST: f64 = 1e9;
+pub(super) const LONGEST: f64 = 1e9;
 
 /// The equations in the coordinates of the lanes.
 #[derive(Debug)]
@@ -24,8 +24,6 @@ enum Equations {
 /// What steps are judged by.
 #[derive(Debug)]
 pub(super) struct StepJudge {
-    /// The unit of time \[s\].
-    unit: f64,
     /// Where formulas may be flat: see [`confirm`].
     equations: Option<Equations>,
     inside: State,
@@ -55,7 +53,6 @@ impl StepJudge {
             (false, mechanism) => Equations::Independent(Box::new(Elimination::new(mechanism))),
         };
         Some(Self {
-            unit: mechanism.units.time,
             equations: mechanism.may_be_flat().then(equations),
             inside: State::default(),
             rates: Vec::new(),
@@ -63,16 +60,11 @@ impl StepJudge {
         })
     }
 
-    /// The longest step \[s\].
-    pub(super) fn longest(&self) -> f64 {
-        LONGEST * self.unit
-    }
-
     /// Of the step a lane wants as much as its series carries \[s\].
     pub(super) fn allowed(&mut self, begun: Begun, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
         let Begun { lane, rates, coordinates: f, .. } = begun;
         let power = |k: usize, c: usize| rates[k * f + c].0[lane];
-        let largest = |k: usize| (0..f).fold(0.0, |most: f64, c| most.max(power(k, c).abs())) * self.unit;
+        let largest = |k: usize| (0..f).fold(0.0, |most: f64, c| most.max(power(k, c).abs())) * slot.unit;
         let last: [f64; JUDGES] = std::array::from_fn(|back| largest(order - back));
         let wanted = step_size::falling(tolerance, order, (&last, largest), slot.wanted);
         let h = wanted.min(slot.left);

@@ -8,13 +8,13 @@
 
 use super::super::terms::over;
 use super::clearance::{self, Clearance, StepFrom};
-use super::formulas::{Begun, StepJudge};
+use super::formulas::{Begun, LONGEST, StepJudge};
 use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::law::Law;
-use crate::dynamics::series::lanes::{Landing, SeriesInLanes, in_lanes};
+use crate::dynamics::series::lanes::{Landing, SeriesInLanes, are_alike, in_lanes};
 use crate::dynamics::{Mechanism, State, Time};
 use std::f64::consts::{PI, TAU};
 
@@ -48,6 +48,8 @@ pub(super) struct TreeTeam {
     /// What steps are judged by where there are formulas.
     judge: Option<StepJudge>,
     clearance: Clearance,
+    /// Where the mechanisms of the trajectories in the lanes are, to tell one from another.
+    present: [Option<usize>; LANES],
 }
 
 /// True for hinge trees whose motors are all eliminated, with a motion left, and for mechanisms with loops or
@@ -68,6 +70,11 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 
 fn is_tree(mechanism: &Mechanism) -> bool {
     !super::free::fits(mechanism) && mechanism.partition.count() > 0 && !mechanism.has_multipliers()
+}
+
+/// True where lanes may have numbers of their own: where nothing but the series asks for them.
+pub(super) fn takes_own_numbers(mechanism: &Mechanism) -> bool {
+    is_tree(mechanism) && mechanism.contacts.is_empty() && !mechanism.may_be_flat()
 }
 
 fn is_looped(mechanism: &Mechanism) -> bool {
@@ -177,6 +184,7 @@ impl Team for TreeTeam {
             kept: is_kept.then(|| [vec![ZERO; 2 * f + 1], vec![ZERO; 2 * f + 1]]),
             judge: StepJudge::new(like, laws(like).any(|law| law.profile.is_some())),
             clearance: Clearance::default(),
+            present: [None; LANES],
         }
     }
 
@@ -189,22 +197,31 @@ impl Team for TreeTeam {
                 && mechanism.contacts == like.contacts
                 && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
         };
-        fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && is_equal())
+        let is_alike =
+            || takes_own_numbers(like) && takes_own_numbers(mechanism) && are_alike(mechanism, like);
+        fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && (is_equal() || is_alike()))
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         self.park(lane);
+        // All that is not in the terms is equal, or not looked at.
+        if std::mem::replace(&mut self.present[lane], Some(std::ptr::from_ref(member.mechanism).addr()))
+            != Some(std::ptr::from_ref(member.mechanism).addr())
+            && self.kept.is_none()
+        {
+            self.series.take_in(lane, member.mechanism);
+        }
         for (numbers, unknowns) in [(&mut self.high, &member.state.y), (&mut self.low, &member.state.low)] {
             for (number, unknown) in numbers.iter_mut().zip(unknowns) {
                 number.0[lane] = *unknown;
             }
         }
         self.energy.0[lane] = member.mechanism.energy_scale * member.mechanism.units.time;
-        if let Some(judge) = &self.judge {
-            return judge.longest();
+        if self.judge.is_some() {
+            return LONGEST * member.mechanism.units.time;
         }
         let tied = if self.mechanism.partition.driven() { 8.0 } else { 3.0 };
-        order as f64 / tied / fastest_rate(&self.mechanism, member.state.time.hi)
+        order as f64 / tied / fastest_rate(member.mechanism, member.state.time.hi)
     }
 
     /// At rest.
