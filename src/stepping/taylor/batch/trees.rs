@@ -204,11 +204,8 @@ impl Team for TreeTeam {
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         self.park(lane);
-        // All that is not in the terms is equal, or not looked at.
-        if std::mem::replace(&mut self.present[lane], Some(std::ptr::from_ref(member.mechanism).addr()))
-            != Some(std::ptr::from_ref(member.mechanism).addr())
-            && self.kept.is_none()
-        {
+        let place = std::ptr::from_ref(member.mechanism).addr();
+        if self.kept.is_none() && self.present[lane].replace(place) != Some(place) {
             self.series.take_in(lane, member.mechanism);
         }
         for (numbers, unknowns) in [(&mut self.high, &member.state.y), (&mut self.low, &member.state.low)] {
