@@ -411,6 +411,33 @@ fn spectra_add_up_to_what_the_dissipation_says() {
     assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
 }
 
+/// An integral is one unknown, whose exponent is zero where nothing depends on it: angle and rate of the pendulum
+/// keep theirs.
+#[test]
+fn an_integral_has_one_exponent() {
+    let with = |more: &str| {
+        let text = format!(
+            r#"{{"name": "pendulum", "gravity": [0, -9.81], {more}
+                "bars": [{{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+                "hinges": [{{"name": "A", "between": [
+                    {{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+                "torsion_springs": [{{"name": "t", "body": "bar", "stiffness": 0, "free_angle": 0, "damping": 0.2}}],
+                "start": {{"bar": {{"phi": 0.3, "omega": 0}}}}, "until": 40, "every": 1}}"#
+        );
+        lyapunov(&Template::new(text, "pendulum".into(), &[]), None, None, &mut || false).expect("a spectrum")
+    };
+    let [plain, counted] = ["", r#""integrals": {"swing": "bar.phi"},"#].map(with);
+    assert_eq!((plain.exponents.len(), counted.exponents.len()), (2, 3));
+    // Damping c takes c/J off their sum.
+    for found in [&plain, &counted] {
+        assert!((found.sum + 0.2 / 0.35).abs() < 1e-9, "{:?}", found.exponents);
+    }
+    assert!(counted.exponents[0].abs() < 0.05, "{:?}", counted.exponents);
+    for (found, alone) in counted.exponents[1..].iter().zip(&plain.exponents) {
+        assert!((found - alone).abs() < 0.05, "{:?} {:?}", counted.exponents, plain.exponents);
+    }
+}
+
 /// Over a thousand seconds; the divergence of the driven Duffing oscillator is -c/I = -0.2 /s everywhere.
 #[test]
 fn spectra_add_up_over_a_thousand_seconds() {

@@ -5,12 +5,13 @@
 use crate::program;
 
 use driftless::dynamics::{Mechanism, Time};
+use driftless::run::sweep::table::{Layout, columns, numbers};
 use driftless::run::trust::Level;
 use driftless::run::{
     Flip, Limits, MethodId, Outcome, Point, PointObserver, Request, Shard, Stabilization, Status, Sweep,
     SweepError, SweepTable, Vary, reference, simulate, sweep,
 };
-use driftless::scene::{Override, Template};
+use driftless::scene::{Output, Override, Template};
 use driftless::stepping::{Cause, taylor::batch::Batch};
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -177,6 +178,34 @@ fn points_with_formulas_are_those_of_closed_forms() {
     for point in swept(late) {
         let omega = point.values[1] + 2.0;
         assert!((point.omega[0] - omega).abs() < 1e-8, "{point:?}");
+    }
+}
+
+/// Integrals are columns of their own: numbers, and no bodies that turn over.
+#[test]
+fn integrals_are_columns_of_a_sweep() {
+    let more = r#""integrals": {"sum": "rotor.phi + rotor.phi"}"#;
+    for (method, trust) in [("taylor", Level::Auto), ("dp8", Level::Off)] {
+        let vary = vec!["rotor.omega=-1..1:11".parse().expect("a range")];
+        let plan = Sweep::new(&rotor(more), vary, &request(method, 4.0)).expect("a sweep").trusted(trust);
+        let (columns, layout) = (columns(&plan), Layout::of(&plan));
+        assert!(columns.contains(&"sum".to_owned()) && !columns.iter().any(|name| name.starts_with("sum.")));
+        let at = columns.iter().position(|name| name == "sum").expect("a column");
+        for point in points(&plan, 1) {
+            let row = numbers(&point, layout);
+            assert_eq!(row.len() + 3, columns.len());
+            assert!((row[at] - 16.0 * point.values[0]).abs() < 1e-7, "{method}: {row:?}");
+            assert!(point.flip.is_none_or(|flip| flip.bar == 0), "{point:?}");
+            assert_eq!(point.flip.is_some(), point.values[0].abs() * 4.0 > PI, "{point:?}");
+        }
+    }
+    // Of an angle over time: radians count as 1.
+    let template =
+        rotor(more).with_outputs(vec!["S=sum", "W=rotor.omega"].into_iter().map(Output::parse).collect());
+    let vary = vec!["rotor.omega=-1..1:2".parse().expect("a range")];
+    let plan = Sweep::new(&template, vary, &request("taylor", 4.0)).expect("a sweep");
+    for head in ["max:S [s]", "max:W [rad/s]"] {
+        assert!(columns(&plan).iter().any(|name| name == head), "{:?}", columns(&plan));
     }
 }
 

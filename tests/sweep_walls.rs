@@ -137,6 +137,8 @@ fn points_with_walls_agree_with_single_runs() {
     let driven = Template::new(driven.to_string(), "driven".into(), &[]);
     for (template, vary, until) in [
         (shipped("wall"), "bar1.phi=0.5..1.4:8", 1.2),
+        (shipped("wall"), "bars.bar2.density=400..900:8", 1.2),
+        (shipped("wall"), "walls.wall.restitution=0.4..0.9:8", 1.2),
         (driven, "bar2.omega=-2..2:8", 1.5),
         (buffer, "crank.omega=-4..4:8", 1.5),
     ] {

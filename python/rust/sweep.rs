@@ -4,7 +4,7 @@ use crate::errors::{of_sweep, refused};
 use crate::request::asked;
 use crate::scene::Scene;
 use driftless::Level;
-use driftless::run::sweep::table::{columns, numbers, outputs};
+use driftless::run::sweep::table::{Layout, columns, numbers};
 use driftless::run::{Point, PointObserver, Shard, Status, Sweep, Totals, Vary, sweep_on};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -24,9 +24,7 @@ type Swept<'py> = (
 
 /// Gathers points, tells how far it is, and looks for Ctrl-C.
 struct Gather {
-    bars: usize,
-    is_judged: bool,
-    outputs: usize,
+    layout: Layout,
     numbers: Vec<f64>,
     flips: Vec<i32>,
     status: Vec<u8>,
@@ -37,7 +35,7 @@ struct Gather {
 
 impl PointObserver for Gather {
     fn see(&mut self, point: &Point) -> io::Result<()> {
-        self.numbers.extend(numbers(point, self.bars, self.is_judged, self.outputs));
+        self.numbers.extend(numbers(point, self.layout));
         self.flips.push(point.flip.map_or(-1, |flip| flip.bar as i32));
         let (status, cause) = match &point.status {
             Status::Done => (0, None),
@@ -104,9 +102,7 @@ pub fn sweep<'py>(
         .sharded(shard);
     let plan = if to_flip { plan.ending_at_flips() } else { plan };
     let mut gather = Gather {
-        bars: plan.mechanism().bodies.len(),
-        is_judged: plan.trust() != Level::Off,
-        outputs: outputs(&plan).count(),
+        layout: Layout::of(&plan),
         numbers: Vec::new(),
         flips: Vec::new(),
         status: Vec::new(),

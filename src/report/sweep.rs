@@ -6,7 +6,7 @@ use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Pictur
 use crate::run::files::sha256;
 use crate::run::sweep::table::columns;
 #[cfg(feature = "charts")]
-use crate::run::sweep::table::{numbers, outputs};
+use crate::run::sweep::table::{Layout, numbers};
 use crate::run::trust::{HORIZON, Level};
 #[cfg(feature = "charts")]
 use crate::run::{Point, Status};
@@ -160,9 +160,7 @@ const MOST: u64 = 1 << 22;
 pub struct Curve {
     /// Which of the numbers of a row.
     column: Option<usize>,
-    bars: usize,
-    is_judged: bool,
-    outputs: usize,
+    layout: Layout,
     /// The numbers of all points so far; not a number where there is none.
     seen: Vec<f64>,
     failed: Vec<bool>,
@@ -232,23 +230,14 @@ impl Curve {
                     .ok_or_else(|| NoChart::Column(wanted.to_owned(), listed(sweep)))?,
             ),
         };
-        Ok(Self {
-            column,
-            bars: sweep.mechanism().bodies.len(),
-            is_judged: sweep.trust() != Level::Off,
-            outputs: outputs(sweep).count(),
-            seen: Vec::new(),
-            failed: Vec::new(),
-        })
+        Ok(Self { column, layout: Layout::of(sweep), seen: Vec::new(), failed: Vec::new() })
     }
 
     /// Whether it can be the chart of so many points of a sweep.
     pub fn fits(&self, sweep: &Sweep, points: u64) -> bool {
         let sizes = [self.seen.len(), self.failed.len()];
         let is_known = self.column.is_none_or(|column| column < results(sweep).len());
-        is_known
-            && self.bars == sweep.mechanism().bodies.len()
-            && sizes.iter().all(|&size| size as u64 == points)
+        is_known && self.layout == Layout::of(sweep) && sizes.iter().all(|&size| size as u64 == points)
     }
 
     /// With the points of the part that follows.
@@ -259,7 +248,7 @@ impl Curve {
 
     /// Takes a point.
     pub fn see(&mut self, point: &Point) {
-        let numbers = numbers(point, self.bars, self.is_judged, self.outputs);
+        let numbers = numbers(point, self.layout);
         let column = self.column.map_or(numbers.len() - 1, |column| column + point.values.len());
         self.seen.push(numbers[column]);
         self.failed.push(matches!(point.status, Status::Stopped(_) | Status::Refused(_)));

@@ -279,6 +279,8 @@ pub struct Names<C = f64> {
     changing: Vec<[Option<String>; 2]>,
     /// In the order in which messages list them.
     order: Vec<String>,
+    /// Dimensions of integrals, as far as they are known.
+    integrals: HashMap<String, Option<Dimension>>,
 }
 
 impl<C: Real> Names<C> {
@@ -325,12 +327,22 @@ impl<C: Real> Names<C> {
                 names.signal(&signal.name, &bound, dimension);
             }
         }
+        for integral in &scene.integrals {
+            let rate = names.alone().bind(&integral.formula).ok().and_then(|bound| bound.1);
+            let dimension = rate.map(|rate| rate.times(Dimension::of("s"), 1.0));
+            names.integrals.insert(integral.name.clone(), dimension);
+        }
         names
     }
 
     /// What a name stands for, and its dimension where that is known.
     pub(super) fn find(&self, name: &str) -> Option<(Meaning<Place<C>>, Option<Dimension>)> {
         self.known.get(name).copied()
+    }
+
+    /// The dimension of an integral, where that is known: what it integrates over time.
+    pub(super) fn integral(&self, name: &str) -> Option<Option<Dimension>> {
+        self.integrals.get(name).copied()
     }
 
     /// All names, in the order in which messages list them.

@@ -309,7 +309,9 @@ impl OutputNames {
                     return Err(formula.unknown(name, &known.collect::<Vec<_>>()));
                 }
             };
-            if formula.text().trim() == name
+            if let (true, Some(dimension)) = (formula.text().trim() == name, self.names.integral(name)) {
+                unit = Some(dimension.map_or_else(|| UNKNOWN.to_owned(), |dimension| dimension.unit()));
+            } else if formula.text().trim() == name
                 && !matches!(source, Source::State(Meaning::Signal(_) | Meaning::Parameter(_)))
             {
                 unit = Some(if own.is_empty() { "1" } else { own }.to_owned());

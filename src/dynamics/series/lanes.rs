@@ -1,4 +1,4 @@
-//! Eight motions of one mechanism as one series: numbers with a lane for each.
+//! Eight motions of mechanisms with one structure as one series: numbers with a lane for each.
 //!
 //! No operation mixes lanes, so that a motion has the bits it would have beside any others; the vectors of
 //! the processor and plain code give the same ones.

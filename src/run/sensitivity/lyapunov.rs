@@ -101,7 +101,10 @@ pub fn lyapunov(
         return Err(SensitivityError::Unsuited(why.into()));
     }
     variation.dissipation = mechanism.is_damped().then(|| Dissipation::new(&mechanism));
-    let mut orthonormal = Orthonormal::new(&mechanism, study.plan.until, 2 * freedom);
+    // An integral is one unknown: nothing depends on the angle of the rotor that carries it.
+    let count = 2 * freedom - mechanism.integrals().count();
+    variation.keep_columns(count);
+    let mut orthonormal = Orthonormal::new(&mechanism, study.plan.until, count);
     orthonormal.renew(&mut variation, &motion);
     orthonormal.logs.fill(0.0);
     let until = study.plan.until;
@@ -195,6 +198,9 @@ impl Orthonormal {
         let (_, phi, _) = plain(motion);
         let n = phi.len();
         let mechanism = variation.mechanism.clone();
+        for (_, k) in mechanism.integrals() {
+            variation.columns.iter_mut().for_each(|column| column[k] = 0.0);
+        }
         self.kernel.unit_vectors::<0>(&mechanism, &phi);
         self.kernel.mass_matrix::<0>(&mechanism);
         let mass = &self.kernel.mass;

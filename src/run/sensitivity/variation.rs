@@ -181,6 +181,13 @@ impl Variation {
         freedom
     }
 
+    /// Keeps the first so many columns.
+    pub fn keep_columns(&mut self, count: usize) {
+        self.columns.truncate(count);
+        self.neighbours.truncate(count);
+        self.forcing.truncate(count);
+    }
+
     /// Adds columns that nothing moves but the motion.
     #[cfg(feature = "fit")]
     pub fn add(&mut self, columns: &[Vec<f64>]) {

@@ -267,7 +267,7 @@ impl Sweep {
     /// Runs points beside each other, a lane each.
     fn batch(&self, ready: Vec<Ready>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
         let Some(first) = ready.first() else { return Vec::new() };
-        let (plan, bodies) = (first.plan.clone(), first.mechanism.bodies.len());
+        let (plan, bodies) = (first.plan.clone(), first.mechanism.own_bodies().len());
         let batch = Batch::new(plan.tolerance.unwrap_or_default());
         let mut kernel = Kernel::<DoubleDouble>::without_rows(&first.mechanism);
         let mut lanes: Vec<Lane> = Vec::with_capacity(ready.len());

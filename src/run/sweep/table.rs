@@ -9,9 +9,30 @@ use std::io::Write;
 pub struct SweepTable<W: Write> {
     writer: csv::Writer<W>,
     bars: Vec<String>,
-    is_judged: bool,
-    outputs: usize,
+    layout: Layout,
     fields: Vec<String>,
+}
+
+/// How many numbers of what a row has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Layout {
+    bars: usize,
+    integrals: usize,
+    outputs: usize,
+    is_judged: bool,
+}
+
+impl Layout {
+    /// Of the rows of a sweep.
+    pub fn of(sweep: &Sweep) -> Self {
+        let mechanism = sweep.mechanism();
+        Self {
+            bars: mechanism.own_bodies().len(),
+            integrals: mechanism.integrals().count(),
+            outputs: outputs(sweep).count(),
+            is_judged: sweep.trust() != Level::Off,
+        }
+    }
 }
 
 /// The columns of a sweep's table: what is varied, then what came of it.
@@ -21,9 +42,10 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
     let mut columns: Vec<String> =
         sweep.variables().iter().map(|variable| with_unit(&variable.path, variable.unit)).collect();
     columns.push("t [s]".to_owned());
-    for body in &sweep.mechanism().bodies {
+    for body in sweep.mechanism().own_bodies() {
         columns.extend([format!("{}.phi [rad]", body.name), format!("{}.omega [rad/s]", body.name)]);
     }
+    columns.extend(sweep.mechanism().integrals().map(|(name, _)| name.to_owned()));
     let unit = sweep.mechanism().unit_of_rows().unwrap_or("rad");
     columns.push("energy_drift [1]".to_owned());
     columns.extend([
@@ -50,19 +72,21 @@ pub fn outputs(sweep: &Sweep) -> impl Iterator<Item = (&str, &str)> {
 
 /// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is
 /// none.
-pub fn numbers(point: &Point, bars: usize, is_judged: bool, outputs: usize) -> Vec<f64> {
+pub fn numbers(point: &Point, layout: Layout) -> Vec<f64> {
+    let Layout { bars, integrals, outputs, is_judged } = layout;
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
         // Time, three drifts, steps and flip time; of a judged point two more.
         let others = if is_judged { 8 } else { 6 };
-        numbers.resize(numbers.len() + 2 * bars + 4 * outputs + others, f64::NAN);
+        numbers.resize(numbers.len() + 2 * bars + integrals + 4 * outputs + others, f64::NAN);
         return numbers;
     }
     numbers.push(point.t);
-    // Behind the angles of the bodies are the coordinates of those that float.
+    // Behind the angles of the bodies are the integrals, and the coordinates of bodies that float.
     for (&phi, &omega) in point.phi.iter().zip(&point.omega).take(bars) {
         numbers.extend([phi, omega]);
     }
+    numbers.extend(&point.omega[bars..bars + integrals]);
     numbers.push(point.energy);
     numbers.extend(point.constraint.unwrap_or([f64::NAN; 2]));
     if is_judged {
@@ -89,13 +113,11 @@ impl<W: Write> SweepTable<W> {
 
     /// Goes on with a table whose header and first rows were written before.
     pub fn going_on(sweep: &Sweep, writer: W) -> Self {
-        let bars = sweep.mechanism().bodies.iter().map(|body| body.name.clone()).collect();
-        let is_judged = sweep.trust() != Level::Off;
+        let bars = sweep.mechanism().own_bodies().iter().map(|body| body.name.clone()).collect();
         Self {
             writer: csv::Writer::from_writer(writer),
             bars,
-            is_judged,
-            outputs: outputs(sweep).count(),
+            layout: Layout::of(sweep),
             fields: vec![String::new(); columns(sweep).len()],
         }
     }
@@ -114,7 +136,7 @@ impl<W: Write> SweepTable<W> {
     /// # Errors
     /// What the writer says.
     pub fn write(&mut self, point: &Point) -> csv::Result<()> {
-        let numbers = numbers(point, self.bars.len(), self.is_judged, self.outputs);
+        let numbers = numbers(point, self.layout);
         let steps = numbers.len() - 2;
         self.fields.iter_mut().for_each(String::clear);
         for (column, (field, number)) in self.fields.iter_mut().zip(&numbers).enumerate() {

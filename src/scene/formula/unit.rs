@@ -19,7 +19,7 @@ impl Dimension {
     }
 
     /// That of a product with a power of another.
-    pub(super) fn times(self, other: Self, power: f64) -> Self {
+    pub(in crate::scene) fn times(self, other: Self, power: f64) -> Self {
         Self([0, 1, 2].map(|k| self.0[k] + power * other.0[k]))
     }
 

@@ -134,9 +134,9 @@ impl Batch {
         goes_on(mechanism) && trees::fits(mechanism)
     }
 
-    /// True for those of the latter whose trajectories may have numbers of their own: hinge trees without walls
-    /// and formulas that may be flat.  Beside each other are mechanisms that differ in nothing but their
-    /// numbers, and have the same ones zero; numbers in laws of motors by formulas are equal.
+    /// True for those of the latter whose trajectories may have numbers of their own: hinge trees.  Beside each
+    /// other are mechanisms that differ in nothing but their numbers, and have the same ones zero; numbers in
+    /// laws of motors by formulas are equal.
     pub fn takes_own_numbers(mechanism: &Mechanism) -> bool {
         Self::takes_alike(mechanism) && trees::takes_own_numbers(mechanism)
     }
@@ -180,7 +180,7 @@ impl Batch {
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
             try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
             let (member, hint) = (&mut members[next], "integrate it by `taylor`");
-            let what = "lanes take hinge trees and loops without walls, friction and events that act".into();
+            let what = "lanes take hinge trees and loops without friction and events that act".into();
             member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));
             is_done[next] = true;
         }

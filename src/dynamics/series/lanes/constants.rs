@@ -12,6 +12,7 @@ use crate::dynamics::Mechanism;
 use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
+use crate::dynamics::impact::Contact;
 use crate::dynamics::law::{Law, Sine};
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::point::Point;
@@ -58,8 +59,10 @@ impl<C: Real> TermSet<C> {
 
 /// True for mechanisms that differ in their constants alone, of which the same are zero.
 pub fn are_alike(one: &Mechanism, other: &Mechanism) -> bool {
-    let skeleton =
-        |mechanism: &Mechanism| TermSet::map(mechanism, |constant| if constant == 0.0 { 0.0 } else { 1.0 });
+    let of = |constant: f64| if constant == 0.0 { 0.0 } else { 1.0 };
+    let wall = |wall: &Contact| (equation(&wall.row, &mut { of }), wall.on, wall.is_off);
+    let walls = |mechanism: &Mechanism| mechanism.contacts.iter().map(wall).collect::<Vec<_>>();
+    let skeleton = |mechanism: &Mechanism| (TermSet::map(mechanism, of), walls(mechanism));
     skeleton(one) == skeleton(other)
 }
 

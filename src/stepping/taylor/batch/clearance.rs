@@ -10,6 +10,7 @@
 //! next to nothing the trajectory is left to code that finds the moment of an impact and what it does.
 
 use crate::arithmetic::Complex;
+use crate::arithmetic::eight::LANES;
 use crate::dynamics::constraint::Measure;
 use crate::dynamics::gap::turning;
 use crate::dynamics::impact::Contact;
@@ -23,9 +24,10 @@ const PARTS: usize = 16;
 /// Share of a step that is worth a step in a lane.
 const LEAST: f64 = 0.2;
 
-/// The walls of a mechanism, about a step of one of its trajectories.
+/// The walls of the mechanisms in the lanes, about a step of one of them.
 #[derive(Debug, Default)]
 pub(super) struct Clearance {
+    contacts: [Vec<Contact>; LANES],
     /// Bounds of the rate and the acceleration of every body in the step \[rad/s, rad/s²\].
     most: Vec<[f64; 2]>,
     /// Bounds of the second derivatives of the gaps over their lengths \[1/s²\].
@@ -47,19 +49,20 @@ pub(super) fn takes(contact: &Contact) -> bool {
 }
 
 impl Clearance {
-    /// Of a step as much as no point can come to a wall in, where that is worth a step \[s\].
-    pub(super) fn of(
-        &mut self,
-        mechanism: &Mechanism,
-        series: &dyn SeriesInLanes,
-        step: StepFrom,
-    ) -> Option<f64> {
-        self.bound(mechanism, series, step);
+    /// Takes the walls of the trajectory in a lane.
+    pub(super) fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
+        self.contacts[lane].clone_from(&mechanism.contacts);
+    }
+
+    /// Of a step of so many bodies as much as no point can come to a wall in, where that is worth a step
+    /// \[s\].
+    pub(super) fn of(&mut self, bodies: usize, series: &dyn SeriesInLanes, step: StepFrom) -> Option<f64> {
+        self.bound(bodies, series, step);
         // Part by part, the larger first.
         let (mut from, mut part) = (0, PARTS);
         while from < PARTS {
             let length = |parts: usize| step.length * (parts as f64 / PARTS as f64);
-            if self.is_clear(mechanism, series, step, [length(from), length(part)]) {
+            if self.is_clear(series, step, [length(from), length(part)]) {
                 from += part;
                 // The largest part that begins here.
                 part = 1 << from.trailing_zeros();
@@ -74,10 +77,10 @@ impl Clearance {
     }
 
     /// Bounds of rates and accelerations in a step, and of what gaps make of them.
-    fn bound(&mut self, mechanism: &Mechanism, series: &dyn SeriesInLanes, step: StepFrom) {
+    fn bound(&mut self, bodies: usize, series: &dyn SeriesInLanes, step: StepFrom) {
         let StepFrom { lane, order, length, time } = step;
         self.most.clear();
-        self.most.extend((0..mechanism.bodies.len()).map(|body| {
+        self.most.extend((0..bodies).map(|body| {
             (0..=order).rev().fold([0.0, 0.0], |[rate, slope], m| {
                 [rate * length + series.rate_of(m, body, lane).abs(), slope * length + rate]
             })
@@ -98,17 +101,11 @@ impl Clearance {
             all / contact.length
         };
         self.bends.clear();
-        self.bends.extend(mechanism.contacts.iter().map(bend));
+        self.bends.extend(self.contacts[lane].iter().map(bend));
     }
 
     /// True where no point can come to a wall in a part of the step, so long from its beginning on \[s\].
-    fn is_clear(
-        &self,
-        mechanism: &Mechanism,
-        series: &dyn SeriesInLanes,
-        step: StepFrom,
-        [after, length]: [f64; 2],
-    ) -> bool {
+    fn is_clear(&self, series: &dyn SeriesInLanes, step: StepFrom, [after, length]: [f64; 2]) -> bool {
         let StepFrom { lane, order, .. } = step;
         let element = |body: usize| {
             if after == 0.0 {
@@ -122,7 +119,7 @@ impl Clearance {
             turning(series.unit_of(body, lane) * Complex::unit(angle * after), rate)
         };
         let at = Along { time: step.time + after, step_size: 1.0, y: &[], slope: &[] };
-        mechanism.contacts.iter().zip(&self.bends).all(|(contact, bend)| {
+        self.contacts[lane].iter().zip(&self.bends).all(|(contact, bend)| {
             if contact.is_off {
                 return true;
             }

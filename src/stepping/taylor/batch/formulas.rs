@@ -5,7 +5,7 @@ use super::super::JUDGES;
 use super::super::confirm::{self, Accelerations};
 use super::super::step_size;
 use super::LaneSlot;
-use crate::arithmetic::eight::Octet;
+use crate::arithmetic::eight::{LANES, Octet};
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Mechanism, OdeSystem, State};
@@ -24,8 +24,8 @@ enum Equations {
 /// What steps are judged by.
 #[derive(Debug)]
 pub(super) struct StepJudge {
-    /// Where formulas may be flat: see [`confirm`].
-    equations: Option<Equations>,
+    /// Those of every lane, where formulas may be flat: see [`confirm`].
+    equations: [Option<Equations>; LANES],
     inside: State,
     rates: Vec<f64>,
     both: Accelerations,
@@ -48,16 +48,21 @@ impl StepJudge {
         if mechanism.forces.is_empty() && !has_profiles {
             return None;
         }
-        let equations = || match (mechanism.has_multipliers(), Arc::new(mechanism.clone())) {
-            (true, mechanism) => Equations::All(Box::new(Multiplier::new(mechanism))),
-            (false, mechanism) => Equations::Independent(Box::new(Elimination::new(mechanism))),
-        };
         Some(Self {
-            equations: mechanism.may_be_flat().then(equations),
+            equations: [const { None }; LANES],
             inside: State::default(),
             rates: Vec::new(),
             both: Accelerations::default(),
         })
+    }
+
+    /// Takes the mechanism of the trajectory in a lane.
+    pub(super) fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
+        let equations = || match (mechanism.has_multipliers(), Arc::new(mechanism.clone())) {
+            (true, mechanism) => Equations::All(Box::new(Multiplier::new(mechanism))),
+            (false, mechanism) => Equations::Independent(Box::new(Elimination::new(mechanism))),
+        };
+        self.equations[lane] = mechanism.may_be_flat().then(equations);
     }
 
     /// Of the step a lane wants as much as its series carries \[s\].
@@ -80,7 +85,8 @@ impl StepJudge {
         (order, tolerance): (usize, f64),
         h: f64,
     ) -> f64 {
-        let Self { equations: Some(equations), inside, rates: found, both, .. } = self else { return h };
+        let Self { equations, inside, rates: found, both } = self;
+        let Some(equations) = &mut equations[lane] else { return h };
         let dimension = match equations {
             Equations::Independent(equations) => equations.dimension(),
             Equations::All(equations) => equations.dimension(),

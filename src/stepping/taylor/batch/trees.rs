@@ -1,5 +1,5 @@
 //! Hinge trees with springs, torsion springs, forces, formulas and motors, and mechanisms with closed loops and
-//! sliders, all lanes of equal mechanisms: the series of [`dynamics`](crate::dynamics::series) on numbers
+//! sliders, all lanes of mechanisms with one structure: the series of [`dynamics`](crate::dynamics::series) on numbers
 //! with a lane for each trajectory.
 //!
 //! Loops and sliders are kept by multipliers, and by a projection after every step.  A trajectory leaves the
@@ -61,7 +61,6 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
     (1..=BODIES).contains(&mechanism.bodies.len())
         && mechanism.coordinates() == mechanism.bodies.len()
         && mechanism.tree.is_dense()
-        && mechanism.integrals().next().is_none()
         && mechanism.contacts.iter().all(clearance::takes)
         && mechanism.frictions.is_empty()
         && mechanism.vibration.is_none()
@@ -72,9 +71,9 @@ fn is_tree(mechanism: &Mechanism) -> bool {
     !super::free::fits(mechanism) && mechanism.partition.count() > 0 && !mechanism.has_multipliers()
 }
 
-/// True where lanes may have numbers of their own: where nothing but the series asks for them.
+/// True where lanes may have numbers of their own, where there are no rows to be kept.
 pub(super) fn takes_own_numbers(mechanism: &Mechanism) -> bool {
-    is_tree(mechanism) && mechanism.contacts.is_empty() && !mechanism.may_be_flat()
+    is_tree(mechanism)
 }
 
 fn is_looped(mechanism: &Mechanism) -> bool {
@@ -205,8 +204,14 @@ impl Team for TreeTeam {
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         self.park(lane);
         let place = std::ptr::from_ref(member.mechanism).addr();
-        if self.kept.is_none() && self.present[lane].replace(place) != Some(place) {
-            self.series.take_in(lane, member.mechanism);
+        if self.present[lane].replace(place) != Some(place) {
+            if self.kept.is_none() {
+                self.series.take_in(lane, member.mechanism);
+            }
+            if let Some(judge) = &mut self.judge {
+                judge.take_in(lane, member.mechanism);
+            }
+            self.clearance.take_in(lane, member.mechanism);
         }
         for (numbers, unknowns) in [(&mut self.high, &member.state.y), (&mut self.low, &member.state.low)] {
             for (number, unknown) in numbers.iter_mut().zip(unknowns) {
@@ -288,7 +293,7 @@ impl Team for TreeTeam {
         }
         let length = wanted.min(slot.left);
         let step = StepFrom { lane, time: slot.time, order, length };
-        match self.clearance.of(&self.mechanism, &*self.series, step) {
+        match self.clearance.of(self.mechanism.bodies.len(), &*self.series, step) {
             Some(clear) if clear < length => clear,
             Some(_) => wanted,
             None => {
