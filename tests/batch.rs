@@ -234,7 +234,8 @@ fn bodies_with_springs_agree_with_double_double_whoever_is_beside_them() {
 
 /// Trees of one mechanism each: three bars with a motor on the first one, a motor between two bars beside a
 /// spring with a damper, torsion springs beside a torque, a tree off its axes, a motor whose law is a formula,
-/// and bars with formulas of time, places, angles and rates, smooth ones and one that is flat for most times.
+/// bars with formulas of time, places, angles and rates, smooth ones and one that is flat for most times, and two
+/// plates on a spring that are thrown.
 fn trees() -> Vec<Scene> {
     let text =
         |bars: usize| -> serde_json::Value { serde_json::from_str(&chain_text(bars, 0.0)).expect("JSON") };
@@ -269,12 +270,16 @@ fn trees() -> Vec<Scene> {
         "-c*tip.vx*sqrt(1 + tip.vx^2 + tip.vy^2)", "-c*tip.vy*sqrt(1 + tip.vx^2 + tip.vy^2)"]}]);
     hardened["torques"] = serde_json::json!([
         {"name": "push", "body": "b0", "torque": "0.1*(1 + tanh(60*(1*t - 0.6)))/(1 + b1.cos^2)"}]);
+    let thrown = serde_json::json!({"name": "thrown", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.1, 0.02], "inertia": 0.02, "length": 0.4},
+            {"name": "b", "mass": 2, "centre": [-0.1, 0], "inertia": 0.03, "length": 0.4}],
+        "springs": [{"name": "s", "between": [end("a", 0.3, 0.0), end("b", 0.0, 0.1)],
+            "stiffness": 40, "free_length": 0.5, "damping": 0.3}],
+        "start": {"a": {"phi": 0.3, "omega": 2, "origin": [0, 0], "velocity": [1, 5]},
+            "b": {"phi": -1, "omega": -1, "origin": [1, 0.2], "velocity": [0, 4]}}, "until": 4, "every": 1});
     let read = |text: serde_json::Value| parse_scene(&text.to_string(), "tree", &[]).expect("a scene");
-    let scenes = vec![read(driven), read(between), read(coiled), shipped("branch", &[])];
-    scenes
-        .into_iter()
-        .chain([read(written), read(hardened), shipped("drag", &[]), shipped("duffing", &[])])
-        .collect()
+    let scenes = [driven, between, coiled, written, hardened, thrown].map(read);
+    scenes.into_iter().chain(["branch", "drag", "duffing"].map(|name| shipped(name, &[]))).collect()
 }
 
 #[test]

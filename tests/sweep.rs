@@ -143,6 +143,41 @@ fn points_with_formulas_agree_with_single_runs() {
     }
 }
 
+/// Free bodies, by formulas and by a spring: a planet on its ellipses, and a dumbbell that is thrown.
+#[test]
+fn points_of_floating_bodies_are_in_lanes() {
+    let start = |of: &str| format!("start.{of}");
+    let request = Request { rtol: Some(1e-12), every: Some(0.5), ..request("taylor", 4.0) };
+    let thrown = r#"{"name": "thrown", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.1, 0.02], "inertia": 0.02, "length": 0.4},
+            {"name": "b", "mass": 2, "centre": [-0.1, 0], "inertia": 0.03, "length": 0.4}],
+        "springs": [{"name": "s", "between": [{"body": "a", "point": [0.3, 0]}, {"body": "b", "point": [0, 0.1]}],
+            "stiffness": 40, "free_length": 0.5, "damping": 0.3}],
+        "start": {"a": {"phi": 0.3, "omega": 2, "origin": [0, 0], "velocity": [1, 5]},
+            "b": {"phi": -1, "omega": -1, "origin": [1, 0.2], "velocity": [0, 4]}}, "until": 4, "every": 1}"#;
+    let thrown = Template::new(thrown.into(), "thrown".into(), &[]);
+    for (template, vary) in [
+        (template("kepler"), vec!["parameters.m2=0.3..0.6:2".to_owned(), start("planet.omega=0..1:9")]),
+        (template("kepler"), vec!["parameters.G=0.8..1.2:9".to_owned()]),
+        (thrown, vec!["bars.b.mass=1..2:3".to_owned(), start("a.omega=-3..3:5")]),
+    ] {
+        let vary = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
+        let plan = Sweep::new(&template, vary, &request).expect("a sweep");
+        assert!(Batch::takes_own_numbers(plan.mechanism()));
+        for point in points(&plan, 1) {
+            let alone = template.filled(plan.variables(), &point.values).expect("a scene");
+            let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");
+            assert_eq!((&point.status, point.phi.len()), (&Status::Done, 6));
+            let both = point.phi.iter().chain(&point.omega);
+            for (found, exact) in both.zip(outcome.last.phi.iter().chain(&outcome.last.omega)) {
+                assert!((found - exact).abs() < 1e-8, "{point:?} {:?}", outcome.last);
+            }
+            assert!(point.energy < 1e-10, "{point:?}");
+            assert_eq!(plan.point(point.index).as_ref(), Some(&point));
+        }
+    }
+}
+
 /// A rotor, and what its formulas make of it in closed form.
 fn rotor(more: &str) -> Template {
     let text = format!(

@@ -81,7 +81,7 @@ impl Lane {
         stated: Option<f64>,
         plan: &Plan,
     ) -> bool {
-        let (n, state) = (member.mechanism.bodies.len(), &member.state);
+        let (bodies, state) = (member.mechanism.bodies.len(), &member.state);
         let coordinates = read(member.mechanism, state, motion);
         let is_counted = 2 * coordinates < state.y.len();
         let work = if is_counted { state.unknown(2 * coordinates) } else { DoubleDouble::ZERO };
@@ -90,14 +90,14 @@ impl Lane {
         let imbalance = ((energy - self.reference - moved).hi / self.scale).abs();
         point.energy = larger(imbalance, point.energy);
         point.t = state.time.hi;
-        point.phi = (0..n).map(|k| motion.unwrapped(k)).collect();
+        point.phi = (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect();
         point.omega = motion.omega.iter().map(|omega| omega.hi).collect();
         point.steps = member.statistics.steps;
         point.constraint = violation(member.mechanism, motion, &kernel.z, point.constraint);
         if let Some(allowance) = &self.allowance {
             let moment = Moment {
                 omega: &point.omega,
-                translations: &[],
+                translations: &point.phi[bodies..],
                 work: work.hi,
                 largest: self.scale.max(work.hi.abs()),
                 steps: point.steps,

@@ -326,7 +326,8 @@ impl Sweep {
     fn has_lanes_for(&self, mechanism: &Mechanism) -> bool {
         let takes_many = || match self.is_alike {
             true => Batch::takes_alike(mechanism),
-            false => Batch::takes_own_numbers(mechanism),
+            // Fewer are faster one by one.
+            false => self.grid.count() >= LANES as u64 && Batch::takes_own_numbers(mechanism),
         };
         Batch::takes(mechanism) || takes_many()
     }
@@ -339,7 +340,7 @@ impl Sweep {
         } else {
             1
         };
-        (count / (16 * threads)).max(lanes.min(count / (2 * threads))).clamp(1, CHUNK)
+        (count / (16 * threads)).max(lanes.min(count.div_ceil(threads))).clamp(1, CHUNK)
     }
 }
 

@@ -126,9 +126,9 @@ impl Batch {
     }
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
-    /// equal: hinge trees of up to 12 bodies with hinges off their axes, torsion springs, applied forces or
-    /// motors on angles, springs beside them, all by smooth formulas or without, and no friction; and the same
-    /// with closed loops and sliders, their states in the form of
+    /// equal: trees of up to 12 bodies, hinged off their axes or floating, torsion springs, applied forces,
+    /// motors on angles, springs beside them, walls, all by smooth formulas or without, and no friction; and
+    /// the same with closed loops and sliders, their states in the form of
     /// [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         goes_on(mechanism) && trees::fits(mechanism)

@@ -1,4 +1,4 @@
-//! How far the series of a mechanism with formulas carries, lane by lane: as in
+//! How far the series of a mechanism with formulas, or with bodies that float, carries, lane by lane: as in
 //! [`Taylor`](super::super::Taylor), since nothing bounds how fast a formula may change.
 
 use super::super::JUDGES;
@@ -22,7 +22,7 @@ enum Equations {
 }
 
 /// What steps are judged by.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct StepJudge {
     /// Those of every lane, where formulas may be flat: see [`confirm`].
     equations: [Option<Equations>; LANES],
@@ -40,22 +40,12 @@ pub(super) struct Begun<'a> {
     /// Powers ((P+1) × f).
     pub rates: &'a [Octet],
     pub coordinates: usize,
+    /// So many of the coordinates are angles; the others count over the unit of length \[1/m\].
+    pub angles: usize,
+    pub per_length: f64,
 }
 
 impl StepJudge {
-    /// For a mechanism whose forces are formulas, or motors' laws; nothing for others.
-    pub(super) fn new(mechanism: &Mechanism, has_profiles: bool) -> Option<Self> {
-        if mechanism.forces.is_empty() && !has_profiles {
-            return None;
-        }
-        Some(Self {
-            equations: [const { None }; LANES],
-            inside: State::default(),
-            rates: Vec::new(),
-            both: Accelerations::default(),
-        })
-    }
-
     /// Takes the mechanism of the trajectory in a lane.
     pub(super) fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
         let equations = || match (mechanism.has_multipliers(), Arc::new(mechanism.clone())) {
@@ -67,8 +57,8 @@ impl StepJudge {
 
     /// Of the step a lane wants as much as its series carries \[s\].
     pub(super) fn allowed(&mut self, begun: Begun, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
-        let Begun { lane, rates, coordinates: f, .. } = begun;
-        let power = |k: usize, c: usize| rates[k * f + c].0[lane];
+        let Begun { lane, rates, coordinates: f, angles, per_length, .. } = begun;
+        let power = |k: usize, c: usize| rates[k * f + c].0[lane] * if c < angles { 1.0 } else { per_length };
         let largest = |k: usize| (0..f).fold(0.0, |most: f64, c| most.max(power(k, c).abs())) * slot.unit;
         let last: [f64; JUDGES] = std::array::from_fn(|back| largest(order - back));
         let wanted = step_size::falling(tolerance, order, (&last, largest), slot.wanted);
@@ -80,7 +70,7 @@ impl StepJudge {
     /// Of the step `h` \[s\] as much as the equations confirm.
     fn confirmed(
         &mut self,
-        Begun { lane, high, rates, coordinates: f }: Begun,
+        Begun { lane, high, rates, coordinates: f, .. }: Begun,
         slot: &LaneSlot,
         (order, tolerance): (usize, f64),
         h: f64,

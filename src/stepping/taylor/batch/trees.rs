@@ -28,8 +28,11 @@ pub(super) struct TreeTeam {
     mechanism: Mechanism,
     series: Box<dyn SeriesInLanes>,
     order: usize,
-    /// Number of coordinates f.
+    /// Number of coordinates f, of which the first ones are angles.
     coordinates: usize,
+    angles: usize,
+    /// One over the unit of length \[1/m\], for the others.
+    per_length: Octet,
     /// The energy scale times the unit of time \[J s\].
     energy: Octet,
     /// Leading parts of angles, rates and work (2f + 1), and what they leave out.
@@ -45,7 +48,7 @@ pub(super) struct TreeTeam {
     /// Where the rows are kept by multipliers: unknowns where the step began, those of all lanes that do not
     /// land.
     kept: Option<[Vec<Octet>; 2]>,
-    /// What steps are judged by where there are formulas.
+    /// What steps are judged by where nothing bounds them.
     judge: Option<StepJudge>,
     clearance: Clearance,
     /// Where the mechanisms of the trajectories in the lanes are, to tell one from another.
@@ -59,7 +62,6 @@ pub(super) struct TreeTeam {
 /// are faster one by one.
 pub(super) fn fits(mechanism: &Mechanism) -> bool {
     (1..=BODIES).contains(&mechanism.bodies.len())
-        && mechanism.coordinates() == mechanism.bodies.len()
         && mechanism.tree.is_dense()
         && mechanism.contacts.iter().all(clearance::takes)
         && mechanism.frictions.is_empty()
@@ -68,7 +70,11 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 }
 
 fn is_tree(mechanism: &Mechanism) -> bool {
-    !super::free::fits(mechanism) && mechanism.partition.count() > 0 && !mechanism.has_multipliers()
+    let has_only_angles = mechanism.coordinates() == mechanism.bodies.len();
+    !super::free::fits(mechanism)
+        && mechanism.partition.count() > 0
+        && !mechanism.has_multipliers()
+        && (has_only_angles || mechanism.contacts.is_empty())
 }
 
 /// True where lanes may have numbers of their own, where there are no rows to be kept.
@@ -78,9 +84,17 @@ pub(super) fn takes_own_numbers(mechanism: &Mechanism) -> bool {
 
 fn is_looped(mechanism: &Mechanism) -> bool {
     mechanism.has_closed_loops()
+        && mechanism.coordinates() == mechanism.bodies.len()
         && !mechanism.has_released()
         && !mechanism.has_aims()
         && !mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name))
+}
+
+/// True where nothing tells beforehand how fast a motion may change: with formulas, and bodies that float.
+fn is_unbounded(mechanism: &Mechanism) -> bool {
+    !mechanism.forces.is_empty()
+        || mechanism.coordinates() != mechanism.bodies.len()
+        || laws(mechanism).any(|law| law.profile.is_some())
 }
 
 /// The laws of motors and applied forces.
@@ -172,6 +186,8 @@ impl Team for TreeTeam {
             mechanism: like.clone(),
             order,
             coordinates: f,
+            angles: if is_kept { f } else { like.partition.turning() },
+            per_length: Octet::splat(1.0),
             energy: Octet::splat(1.0),
             high: vec![ZERO; 2 * f + 1],
             low: vec![ZERO; 2 * f + 1],
@@ -181,7 +197,7 @@ impl Team for TreeTeam {
             is_going: [false; LANES],
             is_leaving: [false; LANES],
             kept: is_kept.then(|| [vec![ZERO; 2 * f + 1], vec![ZERO; 2 * f + 1]]),
-            judge: StepJudge::new(like, laws(like).any(|law| law.profile.is_some())),
+            judge: is_unbounded(like).then(StepJudge::default),
             clearance: Clearance::default(),
             present: [None; LANES],
         }
@@ -218,6 +234,7 @@ impl Team for TreeTeam {
                 number.0[lane] = *unknown;
             }
         }
+        self.per_length.0[lane] = 1.0 / member.mechanism.units.length;
         self.energy.0[lane] = member.mechanism.energy_scale * member.mechanism.units.time;
         if self.judge.is_some() {
             return LONGEST * member.mechanism.units.time;
@@ -267,8 +284,11 @@ impl Team for TreeTeam {
             let k = order - back;
             // The work over the energy scale counts as the rates do.
             let mut most = load::<W>(&power[k - 1]).div(energy.mul(W::splat(k as f64))).larger(W::ZERO);
-            for c in 0..f {
+            for c in 0..self.angles {
                 most = load::<W>(&rates[k * f + c]).larger(most);
+            }
+            for c in self.angles..f {
+                most = load::<W>(&rates[k * f + c]).mul(load(&self.per_length)).larger(most);
             }
             sizes[back] = store(most);
             back += 1;
@@ -284,8 +304,14 @@ impl Team for TreeTeam {
     fn allowed(&mut self, lane: usize, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
         let mut wanted = slot.wanted;
         if let Some(judge) = &mut self.judge {
-            let begun =
-                Begun { lane, high: &self.high, rates: self.series.rates(), coordinates: self.coordinates };
+            let begun = Begun {
+                lane,
+                high: &self.high,
+                rates: self.series.rates(),
+                coordinates: self.coordinates,
+                angles: self.angles,
+                per_length: self.per_length.0[lane],
+            };
             wanted = judge.allowed(begun, slot, order, tolerance);
         }
         if self.mechanism.contacts.is_empty() {
