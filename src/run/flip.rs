@@ -220,6 +220,17 @@ mod tests {
         assert!((far.t - 2.0 - (PI / 3.0).sqrt()).abs() < 1e-14, "{far:?}");
     }
 
+    /// A step that ends just before the passage leaves it to the first moments of the next one.
+    #[test]
+    fn a_passage_just_behind_the_beginning_is_found_to_rounding() {
+        for before in [1e-3, 4e-6, 1e-8, 1e-11] {
+            let found =
+                search(|t| [before - PI - 0.75 * t + 0.2 * t * t, 0.4 * t - 0.75], 0.1).expect("it passes");
+            let root = 2.0 * before / (0.75 + (0.75_f64 * 0.75 - 0.8 * before).sqrt());
+            assert!((found.t - 2.0 - root).abs() < 1e-14, "{before}: {found:?} {root}");
+        }
+    }
+
     #[test]
     fn there_and_back_within_one_step_is_seen() {
         let top = |height: f64| move |t: f64| [height - (t - 0.4) * (t - 0.4), -2.0 * (t - 0.4)];

@@ -205,14 +205,16 @@ fn bracketed(curve: &impl Curve, level: f64, mut low: f64, mut high: f64, falls:
         let next = t - value / slope;
         let next = if next > low && next < high { next } else { 0.5 * (low + high) };
         if next == t || next <= low || next >= high {
-            break;
+            return high;
         }
         if (next - t).abs() <= f64::EPSILON * t {
             return next;
         }
         t = next;
     }
-    high
+    // Where rounding leaves the same value at many places it goes from one to the next, and the other end of the
+    // bracket stays far off.
+    t
 }
 
 /// A power series about zero, for the search up to `end`.

@@ -169,3 +169,36 @@ fn a_minimum_whose_side_is_unknown_is_told() {
         );
     }
 }
+
+/// Zeros near the beginning, where doubles are closer together than rounding can tell values apart.
+#[test]
+fn zeros_near_the_beginning_are_found_to_rounding() {
+    // A bar that had come within 4e-6 rad of the boundary, at Chebyshev's nodes.
+    let angles = [
+        3.146274495853511,
+        3.1460965549548274,
+        3.1455896449990424,
+        3.1448305078439844,
+        3.1439342782762156,
+        3.143037210683562,
+        3.142276050323488,
+        3.1417671171146524,
+        3.141588338143051,
+    ];
+    let curve = Chebyshev::through(&angles.map(|angle| std::f64::consts::PI - angle));
+    let Crossing::At(found) = super::crossing(&curve, 1.0) else { panic!("no zero") };
+    assert!((found - 9.186_294_836_757e-4).abs() < 1e-14, "{found}");
+    let mut worst = 0.0_f64;
+    for k in 0..20_000 {
+        let share = f64::from(k) / 20_000.0;
+        let root = libm::exp10(-8.0 + 7.0 * share);
+        let (slope, bend) = (0.0047 * (1.0 + share), 1e-5 * (37.0 * share).sin());
+        let values = |t: f64| (t - root) * (bend * t - slope);
+        let values: Vec<f64> = chebyshev::Nodes::new(8).places.into_iter().map(values).collect();
+        let Crossing::At(found) = super::crossing(&Chebyshev::through(&values), 1.0) else {
+            panic!("no zero at {root}")
+        };
+        worst = worst.max((found - root).abs());
+    }
+    assert!(worst < 1e-14, "{worst:e}");
+}
