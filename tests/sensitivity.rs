@@ -426,7 +426,7 @@ fn an_integral_has_one_exponent() {
         );
         lyapunov(&Template::new(text, "pendulum".into(), &[]), None, None, &mut || false).expect("a spectrum")
     };
-    let [plain, counted] = ["", r#""integrals": {"swing": "bar.phi"},"#].map(with);
+    let [plain, counted] = ["", r#""integrals": {"sum": "bar.phi"},"#].map(with);
     assert_eq!((plain.exponents.len(), counted.exponents.len()), (2, 3));
     // Damping c takes c/J off their sum.
     for found in [&plain, &counted] {

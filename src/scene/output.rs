@@ -309,10 +309,10 @@ impl OutputNames {
                     return Err(formula.unknown(name, &known.collect::<Vec<_>>()));
                 }
             };
-            if let (true, Some(dimension)) = (formula.text().trim() == name, self.names.integral(name)) {
+            let is_alone = formula.text().trim() == name;
+            if let Some(dimension) = self.names.integral(name).filter(|_| is_alone) {
                 unit = Some(dimension.map_or_else(|| UNKNOWN.to_owned(), |dimension| dimension.unit()));
-            } else if formula.text().trim() == name
-                && !matches!(source, Source::State(Meaning::Signal(_) | Meaning::Parameter(_)))
+            } else if is_alone && !matches!(source, Source::State(Meaning::Signal(_) | Meaning::Parameter(_)))
             {
                 unit = Some(if own.is_empty() { "1" } else { own }.to_owned());
             }

@@ -10,7 +10,6 @@ mod number;
 
 pub use self::constants::are_alike;
 use self::constants::{LaneConstants, TermSet};
-
 use self::landing::{Land, Regularity};
 use self::number::InLanes;
 use super::Series;
@@ -99,7 +98,7 @@ impl WideCode for Room<'_> {
             power: vec![Octet::default(); self.order],
             // Where they are not the coordinates' rates, or asked for at every step.
             omega: vec![Octet::default(); if is_asked { series.omega.len() } else { 0 }],
-            units: vec![[Octet::default(); 2]; if is_asked { series.elements } else { 0 }],
+            units: vec![[Octet::default(); 2]; series.elements],
             regularity: Regularity::new(series.rows.levers()),
             constants,
             terms,
@@ -130,8 +129,9 @@ struct Whole<W: EightLanes> {
     begin: [Vec<InLanes<W>>; 3],
     rates: Vec<Octet>,
     power: Vec<Octet>,
-    /// Rates of the bodies and their unit vectors at the start, where these are asked for.
+    /// Rates of the bodies, where they are not those of the coordinates or asked for at every step.
     omega: Vec<Octet>,
+    /// Unit vectors of the elements at the start.
     units: Vec<[Octet; 2]>,
     regularity: Regularity,
 }
@@ -212,12 +212,7 @@ impl<W: EightLanes> SeriesInLanes for Whole<W> {
     }
 
     fn unit_of(&self, body: usize, lane: usize) -> Complex<f64> {
-        match self.units.get(body) {
-            Some([re, im]) => Complex::new(re.0[lane], im.0[lane]),
-            None => {
-                let Complex { re, im } = self.series.z[body];
-                Complex::new(re.0.array()[lane], im.0.array()[lane])
-            }
-        }
+        let [re, im] = &self.units[body];
+        Complex::new(re.0[lane], im.0[lane])
     }
 }

@@ -138,7 +138,7 @@ impl Batch {
     /// other are mechanisms that differ in nothing but their numbers, and have the same ones zero; numbers in
     /// laws of motors by formulas are equal.
     pub fn takes_own_numbers(mechanism: &Mechanism) -> bool {
-        Self::takes_alike(mechanism) && trees::takes_own_numbers(mechanism)
+        Self::takes_alike(mechanism) && trees::is_tree(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and

@@ -69,17 +69,13 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && (is_tree(mechanism) || is_looped(mechanism))
 }
 
-fn is_tree(mechanism: &Mechanism) -> bool {
+/// True where there are no rows to be kept: there lanes may have numbers of their own.
+pub(super) fn is_tree(mechanism: &Mechanism) -> bool {
     let has_only_angles = mechanism.coordinates() == mechanism.bodies.len();
     !super::free::fits(mechanism)
         && mechanism.partition.count() > 0
         && !mechanism.has_multipliers()
         && (has_only_angles || mechanism.contacts.is_empty())
-}
-
-/// True where lanes may have numbers of their own, where there are no rows to be kept.
-pub(super) fn takes_own_numbers(mechanism: &Mechanism) -> bool {
-    is_tree(mechanism)
 }
 
 fn is_looped(mechanism: &Mechanism) -> bool {
@@ -212,8 +208,7 @@ impl Team for TreeTeam {
                 && mechanism.contacts == like.contacts
                 && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
         };
-        let is_alike =
-            || takes_own_numbers(like) && takes_own_numbers(mechanism) && are_alike(mechanism, like);
+        let is_alike = || is_tree(like) && is_tree(mechanism) && are_alike(mechanism, like);
         fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && (is_equal() || is_alike()))
     }
 
