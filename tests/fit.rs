@@ -91,6 +91,30 @@ fn a_chaotic_motion_is_fitted_by_multiple_shooting() {
     assert!(found.gap < 1e-5, "{}", found.gap);
 }
 
+/// A cart on a level rail: its height is rounding in exact data, and tells nothing.
+#[test]
+fn columns_that_constraints_keep_do_not_outweigh_the_others() {
+    let known = template("cart_pole", &[]);
+    let mut text = String::from("t [s],cart.x [m],cart.y [m],cart.vy [m/s],pole.phi [rad]\n");
+    let sampled = Simulation::new(&known.scene().expect("a scene")).expect("a simulation");
+    sampled
+        .method(MethodId::Taylor)
+        .tolerance(1e-13, 1e-13)
+        .until(2.0)
+        .every(0.02)
+        .run_with(|sample| {
+            let (at, rate) = (sample.centre[0], sample.velocity[0]);
+            writeln!(text, "{},{},{},{},{}", sample.t, at[0], at[1], rate[1], sample.phi[1])
+                .expect("a string");
+            Ok(())
+        })
+        .expect("a run");
+    let data = Data::parse(&text, "data.csv").expect("a table");
+    let found = fitted(&template("cart_pole", &["gravity[1]=-9.6"]), &data, &["gravity[1]"], 1);
+    let number = &found.numbers[0];
+    assert!((number.value + 9.81).abs() < 1e-7, "{} with {}", number.value, number.error);
+}
+
 #[test]
 fn what_data_do_not_tell_is_refused() {
     let known = template("free", &[]);

@@ -2,7 +2,7 @@
 
 use crate::formulas::{adaptive, run, scene};
 use crate::sensitivity::{assert_near, derived, template};
-use driftless::run::{MethodId, Outcome, Request};
+use driftless::run::{MethodId, Outcome, Request, Stabilization};
 
 fn methods() -> [Request; 4] {
     [
@@ -99,4 +99,47 @@ fn a_clutch_makes_events_happen_when_it_closes() {
     assert_eq!(found.lost, None);
     assert_near(found.measures[0].slopes[0], 1.0, 1e-12, "turned");
     assert_near(found.measures[1].slopes[0], 3.0, 1e-9, "a.phi");
+}
+
+/// A rotor of 1 kg m² whose torque has a corner where an event sets its parameter: w² grows by twice the torque over
+/// half a turn, and over half of that at both ends.
+#[test]
+fn an_event_sets_a_parameter_where_a_formula_has_its_corner() {
+    let text = r#"{"name": "rotor", "gravity": [0, 0], "parameters": {"k": 1},
+        "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "torques": [{"name": "drive", "body": "bar", "torque": "1*k*if(bar.sin > 0, 1, 2)"}],
+        "events": [{"name": "next", "when": "bar.sin", "direction": "rising", "set": {"k": "k + 1"}},
+            {"name": "end", "when": "bar.phi - 2.5*pi", "action": "stop"}],
+        "start": {"bar": {"phi": "-pi/2", "omega": 1}}, "until": 9, "every": 9}"#;
+    for request in methods() {
+        let outcome = run(&scene(text), &request);
+        assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+        assert_eq!(outcome.ended_by.as_deref(), Some("end"));
+        let turned = std::f64::consts::PI * (2.0 + 4.0 + 8.0 + 3.0);
+        assert_near(outcome.last.omega[0], (1.0 + turned).sqrt(), 1e-9, "rate");
+        assert_eq!(times(&outcome, "next").len(), 2);
+    }
+}
+
+/// A motor that rests for half a second, kept beside a spring with a corner: the sine of its angle is rounding, and
+/// no event comes of that.
+#[test]
+fn a_function_that_stays_at_zero_makes_no_events() {
+    let text = r#"{"name": "rests", "gravity": [0, -9.81], "parameters": {"k": 1},
+        "bars": [{"name": "a", "mass": 1, "centre": [0.3, 0], "inertia": 0.1, "length": 0.77},
+                 {"name": "b", "mass": 1, "centre": [0.25, 0], "inertia": 0.1, "length": 0.5}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                   {"name": "B", "between": [{"body": "a", "point": [0.77, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "motors": [{"name": "m", "body": "a", "law": "if(t < 0.5, 0, (t - 0.5)^2)*(1 s^-2)"}],
+        "torques": [{"name": "tk", "body": "a", "torque": "1*k*sin(a.phi)"}],
+        "events": [{"name": "es", "when": "a.sin", "direction": "falling", "set": {"k": "k + 1"}}],
+        "start": {"b": {"phi": -1, "omega": 4}}, "until": 1.5, "every": 1.5}"#;
+    for request in methods() {
+        let request = Request { stabilize: Some(Stabilization::Projection), ..request };
+        let outcome = run(&scene(text), &request);
+        assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+        assert_eq!(times(&outcome, "es"), [0.0; 0], "{:?}", request.method);
+        assert_near(outcome.last.phi[0], 1.0, 1e-10, "angle");
+    }
 }

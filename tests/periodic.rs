@@ -219,3 +219,37 @@ fn starts_from_which_small_differences_explode_within_a_period_are_left() {
     println!("{} of {} starts left", found.unstable, found.starts[0]);
     assert!(found.unstable > 0 && found.unstable + found.starts[1] <= found.starts[0]);
 }
+
+/// w' + 2 w + 4 x = sin 2πt from its start at zero, where all forces vanish but for rounding; beside events that
+/// switch a torque on or end the run, which have no part in it: x = Im(e^(2πit)/(4 - 4π² + 4πi)).
+#[test]
+fn a_forced_oscillator_has_the_motion_of_its_closed_form_whatever_events_do() {
+    let scene = |phi: f64, events: &str| {
+        parsed(&format!(
+            r#"{{"name": "forced", "gravity": [0, 0],
+            "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "torsion_springs": [{{"name": "spring", "body": "b", "stiffness": 4, "free_angle": 0, "damping": 2}}],
+            "torques": [{{"name": "push", "body": "b", "torque": 10}},
+                {{"name": "drive", "body": "b", "torque": 1,
+                  "law": {{"start": 0, "sines": [{{"amplitude": 1, "frequency": "2*pi"}}]}}}}],
+            "inactive": ["push"], {events}
+            "start": {{"b": {{"phi": {phi}, "omega": 0}}}}, "until": 20, "every": 1}}"#
+        ))
+    };
+    let (real, imaginary) = (4.0 - TAU * TAU, 2.0 * TAU);
+    let square = real * real + imaginary * imaginary;
+    let expected = [-imaginary / square, TAU * real / square];
+    for (phi, events) in [
+        (0.0, ""),
+        (0.3, r#""events": [{"name": "on", "when": "t - 0.37", "on": ["push"]}],"#),
+        (0.3, r#""events": [{"name": "end", "when": "t - 0.37", "action": "stop"}],"#),
+    ] {
+        let found = found(&scene(phi, events), 4, Some(1.0)).expect("a search");
+        assert_eq!(found.motions.len(), 1, "{events}");
+        let motion = &found.motions[0];
+        let off = (motion.phi[0] - expected[0]).abs().max((motion.omega[0] - expected[1]).abs());
+        assert!(off < 1e-9, "{events}: {motion:?}");
+        assert_eq!(found.left_out.contains(&"events"), !events.is_empty());
+    }
+}

@@ -531,3 +531,35 @@ fn what_makes_no_sense_is_told() {
         assert!(error.contains(told), "{error}");
     }
 }
+
+/// A point that flies at (2, 3) m/s up to x = 1: the largest y is the last one, 3/2, and moves with the end.
+#[test]
+fn an_extreme_as_an_event_ends_the_run_moves_with_the_event() {
+    let text = r#"{"name": "ends", "gravity": [0, 0],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "points": [{"name": "p", "body": "b", "point": [0, 0]}], "outputs": {"y": "p.y"},
+        "events": [{"name": "end", "when": "p.x - 1", "action": "stop"}],
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [2, 3]}}, "until": 5, "every": 5}"#;
+    let to = ["b.velocity[0]", "b.velocity[1]"];
+    let found = derived(&template(text), &["max:y", "min:y", "event:end"], &to, 5.0);
+    for (measure, expected) in found.measures.iter().zip([[-0.75, 0.5], [0.0, 0.0], [-0.25, 0.0]]) {
+        let slopes = measure.slopes.iter().zip(expected);
+        slopes.for_each(|(found, expected)| assert_near(*found, expected, 1e-9, &measure.name));
+    }
+}
+
+/// The velocity of a ball is least just before its impact, where it is not derived, whatever else is asked for.
+#[test]
+fn an_extreme_at_an_impact_is_a_corner_though_nothing_else_is_asked_for() {
+    let text = r#"{"name": "drop", "gravity": [0, -9.81],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "points": [{"name": "p", "body": "b", "point": [0, 0]}], "outputs": {"vy": "p.vy", "y": "p.y"},
+        "walls": [{"name": "floor", "body": "b", "point": [0, 0], "restitution": 0.5,
+                   "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 0.6, "every": 0.6}"#;
+    for of in [&["min:vy"][..], &["min:vy", "y"], &["max:vy"]] {
+        let found = derived(&template(text), of, &["b.origin[1]"], 0.6);
+        let why = found.measures[0].why.as_deref().unwrap_or("derived");
+        assert!(why.contains("corner"), "{of:?}: {why}");
+    }
+}

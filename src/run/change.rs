@@ -107,7 +107,14 @@ impl ContactDriver {
             let next = parameters.unwrap_or_else(|| known.clone());
             keeps_parameters = next == *known;
             if moved || next != *known {
-                modes = self.whole.seen(&after, |at| formulas.modes(at, &next));
+                let motions = [&before, &after];
+                let stays = self.events.as_ref().map(|events| events.conditions_at_zero(motions, &next));
+                let there = self.whole.seen(&after, |at| formulas.modes(at, &next));
+                // Where a condition is zero, rounding does not choose its branch.
+                for (number, (mode, there)) in modes.iter_mut().zip(there).enumerate() {
+                    let stays = stays.as_ref().and_then(|stays| stays.get(number).copied());
+                    *mode = if stays == Some(true) { *mode } else { there };
+                }
             } else if let Some(mode) = flips.and_then(|number| modes.get_mut(number)) {
                 *mode = !*mode;
             }

@@ -7,6 +7,7 @@
 //! interpolation of the motion.
 
 use super::inside::{Inside, StepWatcher};
+use super::magnitude::changes;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
@@ -30,6 +31,9 @@ const FALLS: f64 = 0.3;
 /// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
 const PASSED: f64 = 1e-8;
+/// Part of what an output changes by in one unit of a coordinate or rate that is rounding: what is no more stays
+/// at zero.
+const ROUNDING: f64 = 1e-13;
 /// Variation up to which an output is constant, over its size.
 const CONSTANT: f64 = 1e-14;
 /// Steps until the next one is tried to be passed over, after one that was not.
@@ -84,14 +88,17 @@ impl Default for Found {
 }
 
 impl Found {
-    /// True where a curve that is known well enough stays well between the extremes.
-    fn holds(&self, curve: &Chebyshev) -> bool {
+    /// True where a curve that is known well enough stays well between the extremes, or is `rounding` as they
+    /// are.
+    fn holds(&self, curve: &Chebyshev, rounding: f64) -> bool {
         let ([lowest, highest], size) = (curve.range(), curve.most());
+        if size <= rounding && self.min[0] <= rounding && self.max[0] >= -rounding {
+            return true;
+        }
         let is_constant = highest - lowest <= CONSTANT * size;
         // The value of a constant is known to its last digits only.
         let margin = if is_constant { -4.0 * CONSTANT } else { MARGIN } * size;
         curve.tail() <= PASSED * size && lowest - margin > self.min[0] && highest + margin < self.max[0]
-            || size == 0.0 && self.min[0] <= 0.0 && self.max[0] >= 0.0
     }
 
     /// Adds the integrals over a step of an interpolant and of its square.
@@ -121,6 +128,8 @@ pub(super) struct ExtremesMemory {
     waits: u8,
     /// True where the lower degree was enough for the last step that was tried.
     is_short: bool,
+    /// Magnitudes of the outputs that are rounding.
+    rounding: Vec<f64>,
 }
 
 /// Looks at the outputs of every step.
@@ -156,7 +165,8 @@ impl ExtremesDetector {
 
     /// Takes what a run before remembered; false where it is of other outputs.
     pub fn restore(&mut self, memory: ExtremesMemory) -> bool {
-        let fits = memory.found.len() == self.memory.found.len();
+        let count = self.memory.found.len();
+        let fits = memory.found.len() == count && [0, count].contains(&memory.rounding.len());
         if fits {
             self.memory = memory;
         }
@@ -197,6 +207,15 @@ impl ExtremesDetector {
         );
     }
 
+    /// What the outputs change by where one coordinate or rate moves by a unit, at most.
+    pub fn changes(&mut self, motion: &Motion) -> Vec<f64> {
+        changes(&Arc::clone(&self.mechanism), motion, |motion| {
+            let mut values = Vec::new();
+            self.values(motion, &mut values);
+            values
+        })
+    }
+
     /// True where no output comes near a new extreme, as the interpolants of a low degree tell, of which the
     /// means are taken then.
     fn passes(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> bool {
@@ -205,13 +224,19 @@ impl ExtremesDetector {
             return false;
         }
         let degrees = if self.memory.is_short { &FIRST[..] } else { &FIRST[1..] };
+        let rounding = self.memory.rounding.clone();
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
-        let is_known =
-            |_: usize, curve: &Chebyshev, _: Option<&Chebyshev>| curve.tail() <= PASSED * curve.most();
+        let is_known = |k: usize, curve: &Chebyshev, _: Option<&Chebyshev>| {
+            curve.tail() <= (PASSED * curve.most()).max(rounding[k])
+        };
         let Interpolants { curves, nodes, values, .. } = interpolated(degrees, at, is_known);
-        self.memory.is_short = curves.iter().all(|curve| curve.tail_of(FIRST[0]) <= PASSED * curve.most());
+        let is_short = |(curve, &rounding): (&Chebyshev, &f64)| {
+            curve.tail_of(FIRST[0]) <= (PASSED * curve.most()).max(rounding)
+        };
+        self.memory.is_short = curves.iter().zip(&rounding).all(is_short);
         let found = &mut self.memory.found;
-        if !curves.iter().zip(&*found).all(|(curve, found)| found.holds(curve)) {
+        let holds = |((curve, found), &rounding): ((&Chebyshev, &Found), &f64)| found.holds(curve, rounding);
+        if !curves.iter().zip(&*found).zip(&rounding).all(holds) {
             self.memory.waits = WAITS;
             return false;
         }
@@ -223,11 +248,12 @@ impl ExtremesDetector {
     }
 
     fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
+        let rounding = self.memory.rounding.clone();
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
-        let is_enough = |_: usize, curve: &Chebyshev, lower: Option<&Chebyshev>| {
+        let is_enough = |k: usize, curve: &Chebyshev, lower: Option<&Chebyshev>| {
             let (tail, size) = (curve.tail(), curve.most());
             let is_noise = lower.is_some_and(|lower| tail > FALLS * lower.tail());
-            tail <= RESOLVED * size || tail <= NOISE * size && is_noise
+            tail <= (RESOLVED * size).max(rounding[k]) || tail <= NOISE * size && is_noise
         };
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
         if !is_resolved && depth < HALVINGS {
@@ -242,7 +268,7 @@ impl ExtremesDetector {
             for (value, node) in values.iter().zip(&nodes.places) {
                 found.see(*value, (begin + node * span).hi);
             }
-            if found.holds(curve) {
+            if found.holds(curve, rounding[k]) {
                 continue;
             }
             let known = [found.min[0], found.max[0]];
@@ -290,9 +316,60 @@ impl StepWatcher for ExtremesDetector {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let (begin, end) = inside.span();
         let span = (end - begin).hi;
+        if self.memory.rounding.is_empty() {
+            let changes = self.changes(inside.at(begin)).into_iter();
+            self.memory.rounding =
+                changes.map(|change| if change.is_finite() { ROUNDING * change } else { 0.0 }).collect();
+        }
         if span > 0.0 && !self.passes(inside, begin, span) {
             self.look(inside, begin, span, 0);
         }
         None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dynamics::Mechanism;
+    use crate::scene::parse_scene;
+
+    /// A bar at rest but for rounding, and how often it was looked at.
+    struct Resting(Motion, usize);
+
+    impl Inside for Resting {
+        fn span(&self) -> (Time, Time) {
+            (Time::from(0.0), Time::from(1.0))
+        }
+
+        fn at(&mut self, time: Time) -> &Motion {
+            self.0.time = time;
+            self.0.phi[0] = DoubleDouble::from(1e-17 * libm::sin(1e6 * time.hi));
+            self.1 += 1;
+            &self.0
+        }
+
+        fn roughly_at(&mut self, time: Time) -> &Motion {
+            self.at(time)
+        }
+    }
+
+    /// No interpolant resolves it, nor halves of the step, of which there were 64 with 33 points each.
+    #[test]
+    fn rounding_of_an_output_is_not_looked_into() {
+        let text = r#"{"name": "bar", "gravity": [0, 0], "outputs": {"one": "b.sin"},
+            "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "start": {"b": {"phi": 0, "omega": 0}}, "until": 1, "every": 1}"#;
+        let scene = parse_scene(text, "scene", &[]).expect("a scene");
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        let mut detector = ExtremesDetector::new(&mechanism).expect("an output");
+        let mut inside = Resting(mechanism.start(&scene), 0);
+        for _ in 0..4 {
+            detector.step(&mut inside);
+        }
+        assert!(inside.1 < 100, "{} looks", inside.1);
+        let found = &detector.extremes()[0];
+        assert!(found.max[0] <= 1e-17 && found.min[0] >= -1e-17 && found.rms <= 1e-17, "{found:?}");
     }
 }

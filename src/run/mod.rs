@@ -55,6 +55,7 @@ pub mod inside;
 pub mod kinematics;
 #[doc(hidden)]
 mod latch;
+mod magnitude;
 pub mod methods;
 pub mod modes;
 mod monitor;

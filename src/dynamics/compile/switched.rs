@@ -41,6 +41,18 @@ impl Mechanism {
         Ok(mechanism)
     }
 
+    /// The mechanism without the events of its scene, as it is before any of them.
+    pub(crate) fn without_events(&self) -> Self {
+        let mut mechanism = self.clone();
+        if let Some(laws) = &mut mechanism.laws {
+            Arc::make_mut(&mut laws.formulas).events.clear();
+        }
+        if let Some((whole, _)) = &mut mechanism.whole {
+            *whole = Arc::new(whole.without_events());
+        }
+        mechanism
+    }
+
     /// The mechanism with motors and locks, by row number, going on so much further than they said \[rad,
     /// m\].
     pub(crate) fn shifted(&self, shifts: &[(usize, f64)]) -> Self {

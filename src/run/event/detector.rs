@@ -7,6 +7,7 @@ use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::friction::FrictionWatch;
 use crate::run::inside::{Inside, StepWatcher};
+use crate::run::magnitude::changes;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -24,7 +25,8 @@ const KEPT: usize = 100_000;
 pub(in crate::run) struct EventMemory {
     /// The side of zero each function was on last: -1, 1, or 0 where that is not known.
     pub(super) sides: Vec<i8>,
-    /// The largest magnitude of each function so far.
+    /// The largest magnitude of each function so far, or what it changes by in one unit of a coordinate or rate
+    /// where it was seen first.
     pub(super) largest: Vec<f64>,
     /// The events of the moment at which one happened last.
     pub(super) last: Vec<(usize, Time)>,
@@ -309,6 +311,30 @@ impl EventDetector {
         }
     }
 
+    /// Which conditions are at their zeros, to rounding, before and after the motion changes and parameters are
+    /// set.
+    pub fn conditions_at_zero(&self, [before, after]: [&Motion; 2], set: &[f64]) -> Vec<bool> {
+        let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Vec::new() };
+        let values = |motion: &Motion, parameters: &[f64]| {
+            self.mechanism.seen(motion, |at| formulas.condition_values(at, parameters, modes))
+        };
+        let largest = self.memory.largest.iter().skip(self.of_the_scene() + self.events.len());
+        let values = values(before, parameters).into_iter().zip(values(after, set));
+        values.zip(largest).map(|((a, b), largest)| a.abs().max(b.abs()) <= NO_VALUE * largest).collect()
+    }
+
+    /// Takes what functions change by in one unit of a coordinate or rate for their magnitude, those not seen
+    /// before: one that stays at zero has no other.
+    fn measure(&mut self, motion: &Motion) {
+        let changes = changes(&self.mechanism, motion, |motion| self.values(motion));
+        let count = self.before_friction();
+        for (largest, change) in self.memory.largest.iter_mut().zip(changes).take(count) {
+            if *largest == 0.0 && change.is_finite() {
+                *largest = change;
+            }
+        }
+    }
+
     /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
         let mut values: Vec<f64> = self.mechanism.seen(motion, |at| {
@@ -329,6 +355,9 @@ impl StepWatcher for EventDetector {
         let span = (end - begin).hi;
         if span <= 0.0 || self.functions() == 0 {
             return None;
+        }
+        if self.memory.largest[..self.before_friction()].contains(&0.0) {
+            self.measure(inside.at(begin));
         }
         let mut passages = Vec::new();
         self.passages(inside, begin, span, 0, &mut passages);
@@ -373,6 +402,8 @@ impl StepWatcher for EventDetector {
             });
             let action = self.action(event, &motion);
             if action != Action::Record {
+                // What acts from then on may drive a motion back that has just flipped a condition.
+                self.memory.flipped.clear();
                 self.memory.pending = Some((event, action));
                 self.put_off(&passages[number + 1..], t, span);
                 return Some(t);

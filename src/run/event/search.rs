@@ -91,6 +91,12 @@ impl EventDetector {
             if mode.is_some() && span <= INSTANT * begin.hi.abs() {
                 continue;
             }
+            let is_condition = matches!(self.owner(event), Owner::Condition(..));
+            let most = curve.most();
+            let stays_at_zero = most <= NO_VALUE * self.memory.largest[event].max(most);
+            if is_condition && stays_at_zero {
+                continue;
+            }
             if let Some(mode) = mode {
                 // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
                 // An impact may have carried it across.
@@ -100,7 +106,6 @@ impl EventDetector {
                     all.push(Passage { t: begin, event, rises: !mode });
                 }
             }
-            let is_condition = matches!(self.owner(event), Owner::Condition(..));
             let EventMemory { sides, largest, last, .. } = &mut self.memory;
             let (side, largest) = (&mut sides[event], &mut largest[event]);
             *largest = largest.max(curve.most());

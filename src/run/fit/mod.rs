@@ -21,6 +21,7 @@ mod segment;
 pub use data::Data;
 
 use super::driver::Pause;
+use super::extremes::ExtremesDetector;
 use super::sensitivity::{Measure, SensitivityError, SensitivityRequest, Study};
 use crate::scene::{Output, OutputNames, Scene, SceneError, Template, Variable};
 use nalgebra::DMatrix;
@@ -28,6 +29,8 @@ use problem::Problem;
 
 /// Share of a column's spread taken for its noise where nobody says, to begin with and at least.
 const SPREAD: [f64; 2] = [1e-2, 1e-10];
+/// Least spread a column counts with, over what it changes by in one unit of a coordinate or rate.
+const KEPT: f64 = 1e-3;
 /// How often noise is estimated anew.
 const ROUNDS: usize = 3;
 /// Weights of continuity, over the least noise, one after the other.
@@ -199,6 +202,10 @@ pub fn fit(
         return Err(FitError::Data(format!("{}: {text}\nhint: more rows or columns", data.source)));
     }
     let indices = indices(&first, &columns);
+    let sizes = sizes(&first, &indices, &columns);
+    for (column, size) in columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given) {
+        column.sigma = SPREAD[0] * size;
+    }
     let mut problem = Problem::new(
         template,
         (variables, guess.clone()),
@@ -217,8 +224,9 @@ pub fn fit(
         }
         problem.take_model(&mut columns).map_err(FitError::Failed)?;
         let share = (count as f64 / (count - guess.len()) as f64).sqrt();
-        for column in columns.iter_mut().filter(|column| !column.is_given && rounds > 1) {
-            column.sigma = (share * rms(column)).max(SPREAD[1] * spread(&column.measured));
+        let found = columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given && rounds > 1);
+        for (column, size) in found {
+            column.sigma = (share * rms(column)).max(SPREAD[1] * size);
         }
     }
     let covariance = problem.covariance(&columns).map_err(FitError::Failed)?;
@@ -253,6 +261,19 @@ fn indices(study: &Study, columns: &[FittedColumn]) -> Vec<usize> {
     let heads: Vec<&str> =
         study.mechanism.outputs.iter().flat_map(|outputs| outputs.heads()).map(|(name, _)| name).collect();
     columns.iter().filter_map(|column| heads.iter().position(|head| *head == column.name)).collect()
+}
+
+/// What the noise of columns is measured by: their spread, or where constraints keep them in one place, for the
+/// rounding of values there not to outweigh all others, a part of what a unit of a coordinate changes.
+fn sizes(study: &Study, indices: &[usize], columns: &[FittedColumn]) -> Vec<f64> {
+    let detector = ExtremesDetector::new(&study.mechanism);
+    let changes = detector.map(|mut detector| detector.changes(&study.start)).unwrap_or_default();
+    let change = |index: &usize| changes.get(*index).copied().filter(|change| change.is_finite());
+    let size = |(index, column): (&usize, &FittedColumn)| {
+        let size = spread(&column.measured).max(KEPT * change(index).unwrap_or_default());
+        if size > 0.0 { size } else { 1.0 }
+    };
+    indices.iter().zip(columns).map(size).collect()
 }
 
 /// Outputs of the columns that count, and the names of those that mean nothing.
@@ -298,7 +319,7 @@ fn columns(data: &Data, outputs: &[Output], request: &FitRequest) -> Result<Vec<
         let measured = data.columns.iter().find(|(name, _)| *name == output.name);
         let measured = measured.map(|(_, values)| values.clone()).unwrap_or_default();
         let given = request.sigmas.iter().find(|(name, _)| *name == output.name).map(|(_, sigma)| *sigma);
-        let sigma = given.unwrap_or_else(|| SPREAD[0] * spread(&measured));
+        let sigma = given.unwrap_or_default();
         let (name, unit, model) = (output.name.clone(), String::new(), Vec::new());
         FittedColumn { name, unit, sigma, is_given: given.is_some(), model, measured }
     };
@@ -315,10 +336,9 @@ fn rms(column: &FittedColumn) -> f64 {
     (residuals(column).map(|residual| residual * residual).sum::<f64>() / count).sqrt()
 }
 
-/// Root mean square about the mean, or where that is nothing 1.
+/// Root mean square about the mean.
 fn spread(values: &[Option<f64>]) -> f64 {
     let count = values.iter().flatten().count().max(1) as f64;
     let mean = values.iter().flatten().sum::<f64>() / count;
-    let spread = (values.iter().flatten().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt();
-    if spread > 0.0 { spread } else { 1.0 }
+    (values.iter().flatten().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
 }

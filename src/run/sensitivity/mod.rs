@@ -10,7 +10,8 @@
 //!
 //! ```text
 //! dy/dp = Y_x δ + Y_p       of an output Y(t, x; p)       δ  the column of p
-//! dt/dp = -(g_x δ + g_p)/g'  of the time of g = 0          extremes: as of an output at their own time, which does not count there
+//! dt/dp = -(g_x δ + g_p)/g'  of the time of g = 0          extremes: as of an output at their own time, which counts
+//!                                                           only where an event has ended the run: dy/dp + y' dt/dp
 //! ```
 
 mod collocation;
@@ -19,15 +20,18 @@ mod expanded;
 mod lyapunov;
 mod measure;
 mod neighbours;
+mod recorder;
 mod result;
 mod variation;
 
 use expanded::Expanded;
 pub use lyapunov::{Regime, Spectrum, lyapunov};
+pub(super) use measure::Derived;
 pub use measure::Measure;
-pub(super) use measure::{Derived, outputs};
-use measure::{event_slopes, flip_slopes};
+#[cfg(feature = "fit")]
+pub(super) use measure::outputs;
 use neighbours::Neighbours;
+use recorder::{Recorder, Seen};
 pub use result::{InputNumber, Measured, Sensitivity, SensitivityError, SensitivityRequest, SensitivityRow};
 pub(super) use variation::{Look, Variation};
 
@@ -59,6 +63,9 @@ struct Asked {
     t: Result<f64, String>,
     /// The bar that turns over, or the event, by number.
     number: usize,
+    /// True where an extreme is taken as the run ends, and the event that ends it.
+    is_end: bool,
+    ended_by: Option<usize>,
 }
 
 /// Derivatives of measures of a scene's run by numbers of it.
@@ -192,7 +199,8 @@ impl Study {
                 let known: Vec<&str> = self.scene.walls.iter().map(|wall| wall.name.as_str()).collect();
                 position(&known, name, "wall")?;
             }
-            Ok(Asked { measure: measure.clone(), output, t: Ok(self.plan.until), number })
+            let t = Ok(self.plan.until);
+            Ok(Asked { measure: measure.clone(), output, t, number, is_end: false, ended_by: None })
         };
         request.of.iter().map(asked).collect()
     }
@@ -223,6 +231,9 @@ impl Study {
         driver.extremes = ExtremesDetector::new(&self.mechanism);
         driver.go(Time::from(self.plan.until), &mut outcome, pause).map_err(stopped)?;
         let extremes = driver.extremes.as_ref().map(ExtremesDetector::extremes).unwrap_or_default();
+        let end = driver.motion().time.hi;
+        let ended_by = driver.ended_by.as_ref();
+        let ended_by = self.scene.events.iter().position(|event| ended_by == Some(&event.name));
         for asked in asked {
             let extreme = asked.output.and_then(|output| extremes.get(output));
             let nothing = |what: &str| format!("{what} up to {} s", self.plan.until);
@@ -242,6 +253,10 @@ impl Study {
                 }
                 Measure::Output(_) | Measure::Impact(_) => Ok(self.plan.until),
             };
+            if matches!(asked.measure, Measure::Max(_) | Measure::Min(_)) {
+                asked.is_end = asked.t.as_ref().is_ok_and(|t| (end - t).abs() <= 4.0 * f64::EPSILON * end);
+                asked.ended_by = ended_by.filter(|_| asked.is_end);
+            }
         }
         Ok(())
     }
@@ -361,48 +376,19 @@ fn taken(
     };
     let Derived { values, slopes, rates } = &at.derived;
     let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
-    let is_end = [0.0, seen.last().map_or(0.0, |last| last.t)].contains(&t);
+    let is_end = asked.is_end || t == 0.0;
     let size = values[output].abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
     if is_extreme && !is_end && rates[output].abs() > CORNER * size {
         return Err(format!("the extreme at {t} s is a corner of the curve, at an impact or an event"));
     }
-    Ok((t, values[output], slopes[output].clone()))
-}
-
-/// What was seen at one time.
-struct Seen {
-    t: f64,
-    derived: Derived,
-    /// Derivatives of times, by the number of their measure.
-    times: Vec<(usize, Vec<f64>)>,
-}
-
-struct Recorder<'a> {
-    times: Vec<f64>,
-    next: usize,
-    asked: &'a [Asked],
-    seen: Vec<Seen>,
-}
-
-impl Look for Recorder<'_> {
-    fn next(&self) -> Option<f64> {
-        self.times.get(self.next).copied()
+    let mut slopes = slopes[output].clone();
+    if asked.ended_by.is_some() {
+        // The end moves with the event.
+        let times = at.times.iter().find(|(measure, _)| *measure == number);
+        let times = &times.ok_or("the function of the event that ends the run only touches zero")?.1;
+        slopes.iter_mut().zip(times).for_each(|(slope, time)| *slope += rates[output] * time);
     }
-
-    fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
-        self.next += 1;
-        let mut times = Vec::new();
-        for (k, asked) in self.asked.iter().enumerate().filter(|(_, asked)| asked.t == Ok(time)) {
-            match asked.measure {
-                Measure::Flip => times.push((k, flip_slopes(variation, motion, asked.number))),
-                Measure::Event(_) => {
-                    times.extend(event_slopes(variation, motion, asked.number).map(|slopes| (k, slopes)));
-                }
-                _ => {}
-            }
-        }
-        self.seen.push(Seen { t: time, derived: outputs(variation, motion), times });
-    }
+    Ok((t, values[output], slopes))
 }
 
 fn position(known: &[&str], name: &str, what: &str) -> Result<usize, SensitivityError> {

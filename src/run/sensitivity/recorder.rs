@@ -1,0 +1,48 @@
+//! Values and derivatives of outputs, and derivatives of times, at the times that are asked for.
+
+use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
+use super::{Asked, Look, Variation};
+use crate::dynamics::Motion;
+
+/// What was seen at one time.
+pub(super) struct Seen {
+    pub t: f64,
+    pub derived: Derived,
+    /// Derivatives of times, by the number of their measure.
+    pub times: Vec<(usize, Vec<f64>)>,
+}
+
+/// Sees a run at the times asked for.
+pub(super) struct Recorder<'a> {
+    /// The times \[s\], rising.
+    pub times: Vec<f64>,
+    /// How many are over.
+    pub next: usize,
+    pub asked: &'a [Asked],
+    pub seen: Vec<Seen>,
+}
+
+impl Look for Recorder<'_> {
+    fn next(&self) -> Option<f64> {
+        self.times.get(self.next).copied()
+    }
+
+    fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        self.next += 1;
+        let mut times = Vec::new();
+        for (k, asked) in self.asked.iter().enumerate().filter(|(_, asked)| asked.t == Ok(time)) {
+            match asked.measure {
+                Measure::Flip => times.push((k, flip_slopes(variation, motion, asked.number))),
+                Measure::Event(_) => {
+                    times.extend(event_slopes(variation, motion, asked.number).map(|slopes| (k, slopes)));
+                }
+                Measure::Max(_) | Measure::Min(_) => {
+                    let ended_by = asked.ended_by.and_then(|event| event_slopes(variation, motion, event));
+                    times.extend(ended_by.map(|slopes| (k, slopes)));
+                }
+                _ => {}
+            }
+        }
+        self.seen.push(Seen { t: time, derived: outputs(variation, motion), times });
+    }
+}
