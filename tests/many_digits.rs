@@ -281,13 +281,7 @@ fn the_digits_a_horizon_takes_are_forecast_and_proved() {
 
 #[test]
 fn what_is_not_carried_is_refused_by_name() {
-    for (name, word) in [
-        ("bang_bang", "torques.motor"),
-        ("one_sided_spring", "forces.buffer"),
-        ("pid", "torques.wind"),
-        ("friction_pendulum", "friction"),
-        ("latch", "events"),
-    ] {
+    for (name, word) in [("pid", "torques.wind"), ("friction_pendulum", "friction"), ("latch", "events")] {
         let source = source(&shipped(name), &[], "1", "1");
         let error = long_run(&source, Precision::new(30, false)).err().expect("refused").to_string();
         assert!(error.contains(word) && error.contains("many digits"), "{name}: {error}");

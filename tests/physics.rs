@@ -61,7 +61,10 @@ mod looped;
 #[cfg(feature = "digits")]
 mod many_digits;
 #[cfg(feature = "digits")]
+mod many_digits_corners;
+#[cfg(feature = "digits")]
 mod many_digits_events;
+#[cfg(feature = "digits")]
 mod many_digits_walls;
 mod metamorphic;
 mod modes;

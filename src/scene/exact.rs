@@ -3,8 +3,8 @@
 //! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
 //! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  Formulas of
 //! time and state are kept as texts and read as exactly when the mechanism is compiled.  What a formula takes
-//! from a table has no such digits, and what has corners no series; both are refused by name.  Numbers may
-//! also be given beside the text, with derivatives that no text holds.
+//! from a table has no such digits, and is refused by name.  Numbers may also be given beside the text, with
+//! derivatives that no text holds.
 
 mod laws;
 mod parts;
@@ -15,7 +15,7 @@ use super::locate::{Node, Source, Span, Value, push_index, push_key};
 use super::number::Decimal;
 use super::read::put_together;
 use super::template::Template;
-use super::{Scene, SceneEvent};
+use super::{Scene, SceneEvent, Wall};
 use std::cell::RefCell;
 
 /// The times of a scene.
@@ -76,12 +76,12 @@ impl Template {
     }
 }
 
-/// Who watches for the events of a scene.
+/// Who watches for the events of a scene, for the corners of its formulas and for walls that move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watched {
     /// Whoever runs the scene: they are part of it.
     Here,
-    /// Another run, which this one goes beside.
+    /// Another run, which this one goes beside: events are left out, what changes the equations is refused.
     Beside,
 }
 
@@ -162,7 +162,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     /// An error about a part that has no series in many digits.
     fn refuse_part(&self, at: &Cursor, why: &str) -> SceneError {
         let problem = format!("cannot be carried in many digits: {why}");
-        let allowed = "parts are carried whose numbers are constant, or smooth formulas of time and state";
+        let allowed = "parts are carried whose numbers are constant, or formulas of time and state";
         let hint = "without --digits it runs in doubles, and --trust estimates the error";
         self.source.refusal(at.node.span, &at.path, &problem, allowed, hint)
     }
@@ -171,23 +171,33 @@ impl<'a, C: Decimal> Reader<'a, C> {
     fn refuse_parts(&self, scene: &Scene) -> Result<(), SceneError> {
         let changes =
             |event: &SceneEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
+        let is_watched = self.watched == Watched::Here;
         let parts = [
             ("events", scene.events.iter().any(changes), "events change what acts"),
             ("inactive", !scene.inactive.is_empty(), "events change what acts"),
         ];
         for (key, is_there, why) in parts {
-            if is_there && let Some(at) = self.root.child(key) {
+            if is_there
+                && !is_watched
+                && let Some(at) = self.root.child(key)
+            {
                 return Err(self.refuse_part(&at, why));
             }
         }
+        self.refuse_switched_joints(scene)?;
         if !scene.frictions.is_empty() {
             let mut items = ["hinges", "sliders", "walls"].iter().flat_map(|list| self.root.items(list));
             let at = items.find_map(|at| at.child("friction")).unwrap_or_else(|| self.root.clone());
             return Err(self.refuse_part(&at, "dry friction has corners"));
         }
-        if let Some(wall) = scene.walls.iter().position(|wall| wall.moves() || wall.on.is_some()) {
+        let is_refused = |wall: &Wall| {
+            let moves = wall.moves() || wall.on.is_some();
+            wall.aim.is_some() || moves && !is_watched
+        };
+        if let Some(wall) = scene.walls.iter().position(is_refused) {
             let at = self.root.items("walls").into_iter().nth(wall).unwrap_or_else(|| self.root.clone());
-            return Err(self.refuse_part(&at, "the wall moves"));
+            let why = if is_watched { "its wall follows a formula of the state" } else { "the wall moves" };
+            return Err(self.refuse_part(&at, why));
         }
         if let Some(coupling) = scene.couplings.first() {
             let mut items = self.root.items("motors").into_iter();
@@ -201,7 +211,25 @@ impl<'a, C: Decimal> Reader<'a, C> {
             return Err(self
                 .refuse_part(at.unwrap_or(&self.root), "a rigid spring has the mean force of a vibration"));
         }
-        self.refuse_corners()
+        self.refuse_tables()
+    }
+
+    /// Refuses hinges, motors and locks that events switch: what closes takes a jump.
+    fn refuse_switched_joints(&self, scene: &Scene) -> Result<(), SceneError> {
+        let joints = (scene.hinges.iter().map(|joint| &joint.name))
+            .chain(scene.locks.iter().map(|joint| &joint.name))
+            .chain(scene.motors.iter().map(|joint| &joint.name))
+            .chain(scene.drives.iter().map(|joint| &joint.name))
+            .chain(scene.couplings.iter().map(|joint| &joint.name));
+        let joints: Vec<&String> = joints.collect();
+        let of_events = scene.events.iter().map(|event| ("events", event.on.iter().chain(&event.off)));
+        let switched = std::iter::once(("inactive", scene.inactive.iter().chain(&[]))).chain(of_events);
+        for (key, mut parts) in switched {
+            if let (Some(part), Some(at)) = (parts.find(|part| joints.contains(part)), self.root.child(key)) {
+                return Err(self.refuse_part(&at, &format!("{part} is released and closed")));
+            }
+        }
+        Ok(())
     }
 
     fn known_parameters(&self, scene: &Scene) -> Result<Vec<(String, C)>, SceneError> {

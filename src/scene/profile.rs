@@ -27,23 +27,18 @@ pub struct Profile<C = f64> {
     peaks: [f64; 2],
 }
 
-impl Profile {
+impl<C: Decimal> Profile<C> {
     /// The law of a formula on the branches that hold at t = 0; `values` are those of its names, `None` for
     /// t.
-    pub(crate) fn new(formula: &Formula, values: &[Option<f64>]) -> Self {
-        let at = |t: f64| values.iter().map(|value| value.unwrap_or(t)).collect::<Vec<f64>>();
-        let modes = formula.modes(&at(0.0));
+    pub(crate) fn new(formula: &Formula, values: &[Option<C>]) -> Self {
+        let modes = formula.modes(&at(values, 0.0));
         Self::on_branch(formula, values, &modes)
     }
 
     /// The same on the branches where the conditions whose `modes` are set are positive.
-    pub(crate) fn on_branch(formula: &Formula, values: &[Option<f64>], modes: &[bool]) -> Self {
+    pub(crate) fn on_branch(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
         let law = Self::recorded(formula, values, modes);
-        let looks = (0..LOOKS).map(|look| {
-            let t = look as f64 / 8.0;
-            formula.value(&values.iter().map(|value| value.unwrap_or(t)).collect::<Vec<f64>>())
-        });
-        let looks: Vec<f64> = looks.collect();
+        let looks: Vec<f64> = (0..LOOKS).map(|look| formula.value(&at(values, look as f64 / 8.0))).collect();
         let most = |values: &mut dyn Iterator<Item = f64>| {
             values.map(f64::abs).filter(|value| value.is_finite()).fold(0.0, f64::max)
         };
@@ -53,7 +48,14 @@ impl Profile {
         ];
         Self { peaks, ..law }
     }
+}
 
+/// The names of a formula in doubles at a time.
+fn at<C: Decimal>(values: &[Option<C>], t: f64) -> Vec<f64> {
+    values.iter().map(|value| value.map_or(t, |value| value.value())).collect()
+}
+
+impl Profile {
     /// Powers 0 … `order` of the law about a time \[u/s^m\].
     pub fn series<T: Real>(&self, t: DoubleDouble, order: usize) -> Vec<T> {
         let mut series = TapeSeries::<T>::new(&self.tape, order);
@@ -94,7 +96,7 @@ impl<C> Profile<C> {
 
 impl<C: Decimal> Profile<C> {
     /// The law on these branches, without its peaks; `values` are those of its names, `None` for t.
-    pub(crate) fn recorded(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
+    fn recorded(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
         let inputs = RefCell::new(Vec::new());
         let constant = |value: C| match C::HAS_CONSTANTS {
             // The tape folds constants in doubles.

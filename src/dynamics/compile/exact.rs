@@ -2,10 +2,16 @@
 //! digits.
 
 use super::parts;
-use super::{Body, Mechanism, dense_constants};
+use super::{Body, CompileError, Mechanism, dense_constants};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
+#[cfg(feature = "digits")]
+use crate::dynamics::configuration::{Configuration, Source};
+#[cfg(feature = "digits")]
+use crate::dynamics::constraint::Site;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
-use crate::dynamics::force::formula::Formulas;
+#[cfg(feature = "digits")]
+use crate::dynamics::force::formula::FormulaEvent;
+use crate::dynamics::force::formula::{Driven, Formulas};
 use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::dot;
@@ -28,16 +34,24 @@ pub struct ExactMechanism<C> {
     pub tree: Tree<C>,
     /// The driven angles.
     pub partition: CoordinatePartition<C>,
-    /// Springs and dampers.
+    /// Springs and dampers that act.
     pub springs: Vec<Spring<C>>,
-    /// Torsion springs and dampers.
+    /// Torsion springs and dampers that act.
     pub torsions: Vec<Torsion<C>>,
-    /// Applied forces and torques.
+    /// Applied forces and torques that act.
     pub actions: Vec<Action<C>>,
-    /// Forces by formulas.
+    /// Forces by formulas that act.
     pub forces: Vec<UserForce<C>>,
     /// Events.
-    pub events: Vec<ExactEvent<C>>,
+    pub events: Vec<ExactEvent>,
+    /// Their functions, recorded as torques.
+    pub functions: Vec<UserForce<C>>,
+    /// The conditions that choose the branches of formulas, recorded as torques.
+    pub conditions: Vec<UserForce<C>>,
+    /// What acts.
+    pub acting: Acting<C>,
+    laws: Option<Arc<Formulas<C>>>,
+    all: Arc<ForceElements<C>>,
     /// Constraint equations.
     pub constraints: Vec<ConstraintEquation<C>>,
     /// The gap of each wall, and its restitution.
@@ -46,17 +60,36 @@ pub struct ExactMechanism<C> {
     ground_energy: C,
 }
 
-/// An event that only tells when it happens, or ends the run.
+/// All springs, torsion springs, and applied forces and torques, whatever acts.
+#[derive(Debug)]
+struct ForceElements<C> {
+    springs: Vec<Spring<C>>,
+    torsions: Vec<Torsion<C>>,
+    actions: Vec<Action<C>>,
+}
+
+/// What acts at a moment, and how.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Acting<C> {
+    /// Parameters of formulas.
+    pub parameters: Vec<C>,
+    /// Which conditions of formulas are positive.
+    pub modes: Vec<bool>,
+    /// Parts that rest, by name.
+    pub off: Vec<String>,
+}
+
+/// An event.
 #[derive(Clone, Debug)]
-pub struct ExactEvent<C> {
+pub struct ExactEvent {
     /// Name.
     pub name: String,
     /// Which zeros of its function count.
     pub direction: Direction,
     /// True where the run ends there.
     pub stop: bool,
-    /// Its function, recorded as a torque.
-    pub function: UserForce<C>,
+    /// True where it switches parts or sets parameters.
+    pub changes: bool,
 }
 
 /// Positions and rates of all coordinates at the start, and which of the angles and rates the scene gives.
@@ -96,40 +129,85 @@ impl<C: Decimal> ExactMechanism<C> {
             .map_err(|error| error.to_string())?;
         parts::joints(scene, &forest, &mut constraints);
         constraints.extend(parts::guides(scene, &forest));
-        let formulas = Formulas::of(scene, &forest).map_err(|error| error.to_string())?;
-        let (forces, functions) = match &formulas {
-            Some(formulas) => (formulas.record(&formulas.parameters, &[]), formulas.record_events()),
-            None => (Ok(Vec::new()), Ok(Vec::new())),
+        let laws = Formulas::of(scene, &forest).map_err(|error| error.to_string())?.map(Arc::new);
+        let acting = Acting {
+            parameters: laws.as_ref().map_or_else(Vec::new, |laws| laws.parameters.clone()),
+            modes: structure.laws.as_ref().map_or_else(Vec::new, |laws| laws.modes.clone()),
+            off: structure.whole.as_ref().map_or_else(Vec::new, |(_, inactive)| inactive.clone()),
         };
-        let functions = functions.map_err(|error| error.to_string())?;
-        let event = |(event, function): (&SceneEvent, UserForce<C>)| ExactEvent {
+        let event = |event: &SceneEvent| ExactEvent {
             name: event.name.clone(),
             direction: event.direction,
             stop: event.stop,
-            function,
+            changes: !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty()),
         };
-        let ground_energy = (bodies.iter().zip(&forest.roots()))
-            .fold(C::ZERO, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
-        Ok(Self {
-            structure: Arc::clone(structure),
-            tree: dense_constants(&bodies, &forest, gravity),
-            partition,
+        let all = ForceElements {
             springs: parts::springs(scene, &forest),
             torsions: parts::torsions(scene),
             actions: parts::actions(scene, &forest),
-            forces: forces.map_err(|error| error.to_string())?,
-            events: scene.events.iter().zip(functions).map(event).collect(),
+        };
+        let ground_energy = (bodies.iter().zip(&forest.roots()))
+            .fold(C::ZERO, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
+        let mechanism = Self {
+            structure: Arc::clone(structure),
+            tree: dense_constants(&bodies, &forest, gravity),
+            partition,
+            springs: Vec::new(),
+            torsions: Vec::new(),
+            actions: Vec::new(),
+            forces: Vec::new(),
+            events: scene.events.iter().map(event).collect(),
+            functions: Vec::new(),
+            conditions: Vec::new(),
+            acting: Acting::default(),
+            laws,
+            all: Arc::new(all),
             walls: (scene.walls.iter())
                 .map(|wall| {
                     let normal = Complex::new(wall.normal[0], wall.normal[1]);
-                    (parts::along_wall(&forest, wall, normal, None).0, wall.restitution)
+                    (parts::along_wall(&forest, wall, normal, wall.law.clone()).0, wall.restitution)
                 })
                 .collect(),
             constraints,
             ground_energy,
             bodies,
             forest,
-        })
+        };
+        mechanism.with(acting).map_err(|error| error.to_string())
+    }
+
+    /// The mechanism where other parts act, or in another way.
+    ///
+    /// # Errors
+    /// A formula cannot be recorded so.
+    pub fn with(&self, acting: Acting<C>) -> Result<Self, CompileError> {
+        let mut next = self.clone();
+        let acts = |name: &String| !acting.off.contains(name);
+        let ForceElements { springs, torsions, actions } = &*self.all;
+        next.springs = springs.iter().filter(|spring| acts(&spring.name)).cloned().collect();
+        next.torsions = torsions.iter().filter(|torsion| acts(&torsion.name)).cloned().collect();
+        next.actions = actions.iter().filter(|action| acts(&action.name)).cloned().collect();
+        if let Some(laws) = &self.laws {
+            let Acting { parameters, modes, .. } = &acting;
+            next.forces = laws.record(parameters, modes)?;
+            next.forces.retain(|force| acts(&force.name));
+            next.functions = laws.record_events(parameters, modes)?;
+            next.functions.truncate(next.events.len());
+            next.conditions = laws.record_conditions(parameters, modes)?;
+            for (Driven { name, is_wall }, profile) in laws.profiles(parameters, modes) {
+                let mut walls = next.walls.iter_mut().map(|(row, _)| row);
+                let row = match is_wall {
+                    true => walls.find(|row| row.name == *name),
+                    false => next.constraints.iter_mut().find(|row| row.name == *name),
+                };
+                if let Some(law) = row.and_then(|row| row.law.as_mut()) {
+                    law.profile = Some(profile);
+                }
+            }
+            next.partition = next.partition.renewed(&next.constraints)?;
+        }
+        next.acting = acting;
+        Ok(next)
     }
 
     /// The terms of its equations.
@@ -273,6 +351,63 @@ impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
             [whole_turns_off(measured - wanted, row.is_angle()), dot(jacobian, omega) - rate]
         })
         .collect()
+    }
+}
+
+#[cfg(feature = "digits")]
+impl<C: Decimal + Over<C>> ExactMechanism<C> {
+    /// What acts after an event at a time, coordinates and rates.
+    pub fn after(&self, event: usize, t: C, phi: &[C], omega: &[C]) -> Acting<C> {
+        let mut next = self.acting.clone();
+        let Some(laws) = &self.laws else { return next };
+        let z = self.elements(phi);
+        let at = Values { t, phi, z: &z, omega };
+        let Acting { parameters, modes, .. } = &self.acting;
+        next.parameters = laws.set_exactly_by(event, &Configuration::new(&at), parameters, modes);
+        let FormulaEvent { on, off, .. } = &laws.events[event];
+        next.off.retain(|part| !on.contains(part));
+        next.off.extend(off.iter().filter(|part| !self.acting.off.contains(part)).cloned());
+        next
+    }
+}
+
+/// A configuration given by numbers.
+#[cfg(feature = "digits")]
+struct Values<'a, C> {
+    t: C,
+    phi: &'a [C],
+    z: &'a [Complex<C>],
+    omega: &'a [C],
+}
+
+#[cfg(feature = "digits")]
+impl<C: Decimal + Over<C>> Source<C, C> for Values<'_, C> {
+    fn time(&self) -> C {
+        self.t
+    }
+
+    fn angle(&self, body: usize) -> C {
+        self.phi[body]
+    }
+
+    fn rate(&self, body: usize) -> C {
+        self.omega[body]
+    }
+
+    fn direction(&self, body: usize) -> Complex<C> {
+        self.z[body]
+    }
+
+    fn position(&self, site: &Site<C>) -> Complex<C> {
+        site.point.position(self.z)
+    }
+
+    fn velocity(&self, site: &Site<C>) -> Complex<C> {
+        site.point.velocity(self.z, self.omega)
+    }
+
+    fn constant(&self, value: C) -> C {
+        value
     }
 }
 

@@ -4,8 +4,7 @@
 //! choose, the *modes*; a run that meets a zero of a condition ends its step there and records the laws anew
 //! on the other branch, so that no method ever steps across a corner.
 
-use super::UserForce;
-use super::law::{Acts, Law, Recorded};
+use super::law::{Acts, Law};
 use crate::arithmetic::tape::Symbol;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::{Aim, Site};
@@ -13,7 +12,7 @@ use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::Formula;
 use crate::scene::{
-    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, Profile, Scene, Scope, Wall,
+    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, Scene, Scope, Wall,
 };
 use std::sync::Arc;
 
@@ -58,8 +57,8 @@ impl<C: Copy> Meaning<Site<C>> {
 /// A formula that can be evaluated on a mechanism.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Expression<C = f64> {
-    formula: Formula,
-    meanings: Vec<Meaning<Site<C>>>,
+    pub formula: Formula,
+    pub meanings: Vec<Meaning<Site<C>>>,
     /// The numbers of its nodes, where they may be no doubles.
     numbers: Vec<C>,
     /// The number of its first condition among all.
@@ -67,7 +66,7 @@ pub(super) struct Expression<C = f64> {
 }
 
 impl<C: Real> Expression<C> {
-    fn values<S: Scalar>(&self, at: &Configuration<S, C>, parameters: &[C], signals: &[S]) -> Vec<S> {
+    pub fn values<S: Scalar>(&self, at: &Configuration<S, C>, parameters: &[C], signals: &[S]) -> Vec<S> {
         self.meanings.iter().map(|meaning| meaning.value(at, parameters, signals)).collect()
     }
 
@@ -86,6 +85,23 @@ impl<C: Real> Expression<C> {
         self.formula.evaluate_over(&values, modes, |node| at.constant(self.numbers[node]))
     }
 
+    /// Adds the values of its conditions on those branches.
+    fn conditions<S: Scalar>(
+        &self,
+        at: &Configuration<S, C>,
+        parameters: &[C],
+        signals: &[S],
+        modes: &[bool],
+        all: &mut Vec<S>,
+    ) {
+        let (values, modes) = (self.values(at, parameters, signals), self.modes(modes));
+        let number = |node: usize, value: f64| match self.numbers.get(node) {
+            Some(&number) => at.constant(number),
+            None => S::of(value),
+        };
+        self.formula.condition_values_over(&values, modes, &number, all);
+    }
+
     /// Its value on those branches where `value` says what its names stand for; `None` where it does not.
     pub fn over<S: Scalar>(
         &self,
@@ -96,7 +112,7 @@ impl<C: Real> Expression<C> {
         Some(self.formula.evaluate(&values?, self.modes(modes)))
     }
 
-    fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
+    pub fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
         modes.get(self.first..self.first + self.formula.conditions()).unwrap_or(&[])
     }
 }
@@ -115,7 +131,7 @@ pub(crate) struct FormulaEvent<C = f64> {
     pub on: Vec<String>,
     /// Parts that act no longer.
     pub off: Vec<String>,
-    set: Vec<(usize, Expression<C>)>,
+    pub(super) set: Vec<(usize, Expression<C>)>,
 }
 
 impl<C> FormulaEvent<C> {
@@ -140,9 +156,9 @@ pub(crate) struct Formulas<C = f64> {
     /// Values of the parameters at the start.
     pub parameters: Vec<C>,
     pub(super) signals: Vec<Expression<C>>,
-    laws: Vec<Law<C>>,
+    pub(super) laws: Vec<Law<C>>,
     /// Laws of motors and walls that are formulas.
-    profiles: Vec<(Driven, Expression<C>)>,
+    pub(super) profiles: Vec<(Driven, Expression<C>)>,
     /// Aims of motors and walls that depend on the mechanism, with the angles they are of.
     aims: Vec<(Driven, Vec<usize>, Expression<C>)>,
     /// Events.
@@ -302,13 +318,31 @@ impl<C: Decimal> Formulas<C> {
         signals
     }
 
-    /// Records its laws on the branches that `modes` say.
-    ///
-    /// # Errors
-    /// A potential that depends on time or rates.
-    pub fn record(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<UserForce<C>>, CompileError> {
-        let record = |law| Recorded { law, formulas: self, parameters, modes }.record();
-        self.laws.iter().map(record).collect()
+    /// The values of all conditions, on the branches that `modes` say.
+    pub fn condition_values<S: Scalar>(
+        &self,
+        at: &Configuration<S, C>,
+        parameters: &[C],
+        modes: &[bool],
+    ) -> Vec<S> {
+        let mut all = Vec::with_capacity(self.conditions.len());
+        if self.conditions.is_empty() {
+            return all;
+        }
+        let signals = self.signals(at, parameters, modes);
+        for expression in self.switched() {
+            if expression.formula.conditions() > 0 {
+                expression.conditions(at, parameters, &signals, modes, &mut all);
+            }
+        }
+        all
+    }
+
+    /// Every formula whose conditions count, in the order in which they are numbered.
+    fn switched(&self) -> impl Iterator<Item = &Expression<C>> {
+        let laws = self.laws.iter().flat_map(Law::expressions);
+        let profiles = self.profiles.iter().map(|profile| &profile.1);
+        self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
     }
 }
 
@@ -330,18 +364,6 @@ impl Formulas {
         !self.profiles.is_empty() || !self.aims.is_empty()
     }
 
-    /// The laws of motors and walls on the same branches.
-    pub fn profiles(&self, parameters: &[f64], modes: &[bool]) -> impl Iterator<Item = (&Driven, Profile)> {
-        self.profiles.iter().map(move |(part, expression)| {
-            let value = |meaning: &Meaning<Site>| match meaning {
-                Meaning::Parameter(number) => Some(parameters[*number]),
-                _ => None,
-            };
-            let values: Vec<Option<f64>> = expression.meanings.iter().map(value).collect();
-            (part, Profile::on_branch(&expression.formula, &values, expression.modes(modes)))
-        })
-    }
-
     /// The aims of motors and walls that depend on the mechanism, on the branches that `modes` say.
     ///
     /// # Errors
@@ -359,22 +381,6 @@ impl Formulas {
         self.aims.iter().map(|of| Ok((&of.0, aim(of)?))).collect()
     }
 
-    /// The values of all conditions, on the branches that `modes` say.
-    pub fn condition_values(&self, at: &Configuration<f64>, parameters: &[f64], modes: &[bool]) -> Vec<f64> {
-        let mut all = Vec::with_capacity(self.conditions.len());
-        if self.conditions.is_empty() {
-            return all;
-        }
-        let signals = self.signals(at, parameters, modes);
-        for expression in self.switched() {
-            if expression.formula.conditions() > 0 {
-                let values = expression.values(at, parameters, &signals);
-                expression.formula.condition_values(&values, expression.modes(modes), &mut all);
-            }
-        }
-        all
-    }
-
     /// The modes at a configuration, by the signs of the conditions there.
     pub fn modes(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<bool> {
         let mut modes = Vec::with_capacity(self.conditions.len());
@@ -388,13 +394,6 @@ impl Formulas {
             }
         }
         modes
-    }
-
-    /// Every formula whose conditions count, in the order in which they are numbered.
-    fn switched(&self) -> impl Iterator<Item = &Expression> {
-        let laws = self.laws.iter().flat_map(Law::expressions);
-        let profiles = self.profiles.iter().map(|profile| &profile.1);
-        self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
     }
 
     /// The bodies whose whole turns matter to them, on whichever branches.

@@ -1,13 +1,13 @@
 //! A law of a scene as it is recorded: on the branches of some modes, with some parameters.
 
-use super::formula::{Expression, FormulaEvent, Formulas, span};
+use super::formula::{Driven, Expression, FormulaEvent, Formulas, span};
 use super::span::SpanLaw;
 use super::{Loads, UserForce};
 use crate::arithmetic::Scalar;
 use crate::arithmetic::tape::Symbol;
 use crate::dynamics::constraint::Site;
 use crate::dynamics::{CompileError, Configuration};
-use crate::scene::{Decimal, Meaning};
+use crate::scene::{Decimal, Meaning, Profile};
 
 /// Where a law acts.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,17 +67,77 @@ pub(super) struct Recorded<'a, C> {
 }
 
 impl<C: Decimal> Formulas<C> {
-    /// Records the functions of its events, which have no branches: each as a torque on the first body.
+    /// Records its laws on the branches that `modes` say.
+    ///
+    /// # Errors
+    /// A potential that depends on time or rates.
+    pub fn record(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<UserForce<C>>, CompileError> {
+        let record = |law| Recorded { law, formulas: self, parameters, modes }.record();
+        self.laws.iter().map(record).collect()
+    }
+
+    /// The laws of motors and walls on the same branches.
+    pub fn profiles(&self, parameters: &[C], modes: &[bool]) -> impl Iterator<Item = (&Driven, Profile<C>)> {
+        self.profiles.iter().map(move |(part, expression)| {
+            let value = |meaning: &Meaning<Site<C>>| match meaning {
+                Meaning::Parameter(number) => Some(parameters[*number]),
+                _ => None,
+            };
+            let values: Vec<Option<C>> = expression.meanings.iter().map(value).collect();
+            (part, Profile::on_branch(&expression.formula, &values, expression.modes(modes)))
+        })
+    }
+
+    /// Records the functions of its events on the branches that `modes` say: each as a torque on the first
+    /// body.
     ///
     /// # Errors
     /// None: they are no potentials.
-    pub fn record_events(&self) -> Result<Vec<UserForce<C>>, CompileError> {
+    pub fn record_events(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<UserForce<C>>, CompileError> {
         let record = |event: &FormulaEvent<C>| {
             let place = Acts::Torque { body: 0, base: None, torque: event.when.clone() };
             let law = Law { name: event.name.clone(), potential: None, place };
-            Recorded { law: &law, formulas: self, parameters: &self.parameters, modes: &[] }.record()
+            Recorded { law: &law, formulas: self, parameters, modes }.record()
         };
         self.events.iter().map(record).collect()
+    }
+
+    /// Records its conditions on the branches that `modes` say: each as a torque on the first body.
+    ///
+    /// # Errors
+    /// None: they are no potentials.
+    pub fn record_conditions(
+        &self,
+        parameters: &[C],
+        modes: &[bool],
+    ) -> Result<Vec<UserForce<C>>, CompileError> {
+        let record = |(number, owner): (usize, &String)| {
+            UserForce::recorded(
+                owner,
+                |_| Symbol::ZERO,
+                |at, loads| loads.torque(0, self.condition_values(at, parameters, modes)[number]),
+            )
+        };
+        self.conditions.iter().enumerate().map(record).collect()
+    }
+}
+
+#[cfg(feature = "digits")]
+impl<C: Decimal + crate::arithmetic::Over<C>> Formulas<C> {
+    /// The parameters after an event, all numbers as they are written.
+    pub fn set_exactly_by(
+        &self,
+        event: usize,
+        at: &Configuration<C, C>,
+        parameters: &[C],
+        modes: &[bool],
+    ) -> Vec<C> {
+        let signals = self.signals(at, parameters, modes);
+        let mut next = parameters.to_vec();
+        for (number, expression) in &self.events[event].set {
+            next[*number] = expression.formula.exact_value(&expression.values(at, parameters, &signals));
+        }
+        next
     }
 }
 

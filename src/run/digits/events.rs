@@ -1,15 +1,17 @@
 //! Events of a scene in many digits: the zeros of their formulas, by Newton's iteration on the formulas' series.
 //!
+//! A step ends at the first event that changes what acts.
+//!
 //! That there is a zero, and where about, is told in doubles ([`search`](crate::stepping::search)), as it is
 //! for walls: two zeros within 1e-9 of a step are one, or none.  Steps are so short that the series of the
 //! formulas converge in them, too.
 
-use super::motion::{JUDGES, Motion};
+use super::functions::Functions;
+use super::motion::Motion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
-use crate::dynamics::series::FormulaSeries;
 use crate::scene::Direction;
 use crate::stepping::search::{Curve, Powers, root};
 
@@ -21,8 +23,6 @@ const NO_VALUE: f64 = 1e-12;
 const LEAVES: f64 = 1e-3;
 /// Times within a step at which its largest value is looked for.
 const LOOKS: usize = 8;
-/// Rounds in which a step is shortened, at most.
-const ROUNDS: usize = 20;
 /// Events kept.
 const KEPT: usize = 100_000;
 
@@ -42,12 +42,9 @@ pub struct Happened<const W: usize> {
 /// Watches the events of a motion.
 #[derive(Clone, Debug, Default)]
 pub struct Watch<const W: usize> {
-    series: Vec<FormulaSeries<Digits<W>>>,
-    /// The powers of their formulas in the step that is next.
-    powers: Vec<Vec<Digits<W>>>,
-    /// What is in that step: events with their times after its begin \[s\], and the sides of zero the
-    /// formulas are on at its end.
-    ahead: Vec<(usize, Digits<W>)>,
+    pub functions: Functions<W>,
+    /// What is in the step that is next, and the sides of zero the formulas are on at its end.
+    ahead: Vec<Ahead<W>>,
     ends: Vec<i8>,
     /// The sides they were on at the end of the last one: -1, 1, or 0 where that is not known.
     pub sides: Vec<i8>,
@@ -55,64 +52,65 @@ pub struct Watch<const W: usize> {
     pub happened: Vec<Happened<W>>,
 }
 
+/// An event in the step that is next.
+#[derive(Clone, Copy, Debug)]
+struct Ahead<const W: usize> {
+    event: usize,
+    /// How long after the step's begin \[s\].
+    after: Digits<W>,
+    rises: bool,
+}
+
 impl<const W: usize> Watch<W> {
     /// For the events of a mechanism.
     pub fn new(mechanism: &ExactMechanism<Digits<W>>, order: usize) -> Self {
-        let events = &mechanism.events;
-        Self {
-            series: events.iter().map(|event| FormulaSeries::new(&event.function, order)).collect(),
-            sides: vec![0; events.len()],
-            ..Self::default()
-        }
+        let functions = Functions::new(&mechanism.functions, order);
+        Self { functions, sides: vec![0; mechanism.events.len()], ..Self::default() }
     }
 
-    /// Expands the formulas where the motion is expanded.
-    pub fn expand(&mut self, motion: &Motion<W>) {
-        self.powers.clear();
-        if self.series.is_empty() {
-            return;
-        }
-        let posture = motion.state_posture();
-        for (event, series) in motion.mechanism.events.iter().zip(&mut self.series) {
-            let from = (motion.state().t, &posture.phi[..]);
-            self.powers.push(motion.series.formula(&event.function, series, from).to_vec());
-        }
+    /// The same where the functions are those of a mechanism in which other parts act, or other parameters are
+    /// `set`, with which functions may jump.
+    pub fn renewed(self, mechanism: &ExactMechanism<Digits<W>>, order: usize, set: bool) -> Self {
+        let functions = Functions::new(&mechanism.functions, order);
+        let sides = if set { vec![0; self.sides.len()] } else { self.sides };
+        Self { functions, sides, happened: self.happened, ..Self::default() }
     }
 
-    /// The part of a step \[s\] within which the formulas converge as far as log2 of the tolerance says.
-    pub fn allows(&self, wanted: f64, tolerance: f64) -> f64 {
-        if wanted.is_nan() {
-            return wanted;
-        }
-        let shortened = |mut step: f64, powers: &Vec<Digits<W>>| {
-            let Some((terms, last)) = powers.len().checked_sub(JUDGES).map(|first| powers.split_at(first))
-            else {
-                return step;
-            };
-            // A shorter step has smaller terms.
-            for _ in 0..ROUNDS {
-                let weight = |(k, power): (usize, &Digits<W>)| power.log2() + k as f64 * libm::log2(step);
-                let size = terms.iter().enumerate().map(weight).fold(f64::NEG_INFINITY, f64::max);
-                let allowed = |(j, power): (usize, &Digits<W>)| {
-                    libm::exp2((tolerance + size - power.log2()) / (terms.len() + j) as f64)
-                };
-                let least = last.iter().enumerate().map(allowed).filter(|step| !step.is_nan());
-                let least = least.fold(step, f64::min);
-                if size == f64::NEG_INFINITY || least > 0.99 * step {
-                    break;
-                }
-                step = least;
-            }
-            step
+    /// Looks for what happens in a step of so many seconds; where an event changes what acts, the step is to end
+    /// there, after so many seconds.
+    pub fn look(&mut self, motion: &Motion<W>, step: f64) -> Option<Digits<W>> {
+        (self.ahead, self.ends) = self.passing(motion, step);
+        let is_last = |ahead: &Ahead<W>| {
+            let event = &motion.mechanism.events[ahead.event];
+            event.stop || event.changes
         };
-        self.powers.iter().fold(wanted, shortened)
+        let end = self.ahead.iter().position(is_last)?;
+        self.ahead.truncate(end + 1);
+        let last = self.ahead[end];
+        if !motion.mechanism.events[last.event].changes {
+            return None;
+        }
+        // What happens at this moment as well is left to the next step: it begins on the side before.
+        let (passing, ends) = self.passing(motion, last.after.value());
+        self.ends = ends;
+        for (event, side) in self.ends.iter_mut().enumerate() {
+            let of_event = |ahead: &&Ahead<W>| ahead.event == event;
+            let kept = self.ahead.iter().filter(of_event).count();
+            let seen = passing.iter().filter(of_event).count();
+            let of = if seen > kept { &passing } else { &self.ahead };
+            let rises = of.iter().rfind(of_event).is_some_and(|last| last.rises);
+            if seen != kept {
+                *side = if rises == (seen < kept) { 1 } else { -1 };
+            }
+        }
+        Some(last.after)
     }
 
-    /// Looks for what happens in a step of so many seconds.
-    pub fn look(&mut self, motion: &Motion<W>, step: f64) {
-        self.ahead.clear();
-        self.ends.clear();
-        for (event, powers) in self.powers.iter().enumerate() {
+    /// The passages that count in a step of so many seconds, in the order of their times, and the sides of all
+    /// functions at its end.
+    fn passing(&self, motion: &Motion<W>, step: f64) -> (Vec<Ahead<W>>, Vec<i8>) {
+        let (mut ahead, mut ends) = (Vec::new(), Vec::new());
+        for (event, powers) in self.functions.powers.iter().enumerate() {
             let shares = in_shares(powers, 1.0, step);
             let direction = motion.mechanism.events[event].direction;
             let counts =
@@ -121,26 +119,34 @@ impl<const W: usize> Watch<W> {
                 .take_while(|last| (motion.state().t - last.t).value() <= SAME * step)
                 .any(|last| last.event == event);
             let (passages, end) = passages(&shares, self.sides[event], began);
-            self.ends.push(end);
-            for (share, _) in passages.into_iter().filter(|(_, rises)| counts(*rises)) {
+            ends.push(end);
+            for (share, rises) in passages.into_iter().filter(|(_, rises)| counts(*rises)) {
                 let near = Digits::of(share * step);
                 let after = if share == 0.0 { Digits::ZERO } else { refined(motion, powers, near) };
-                self.ahead.push((event, after));
+                ahead.push(Ahead { event, after, rises });
             }
         }
-        self.ahead.sort_by(|a, b| (a.1 - b.1).value().total_cmp(&0.0).then(a.0.cmp(&b.0)));
-        let end = self.ahead.iter().position(|(event, _)| motion.mechanism.events[*event].stop);
-        self.ahead.truncate(end.map_or(usize::MAX, |end| end + 1));
+        ahead.sort_by(|a: &Ahead<W>, b| {
+            (a.after - b.after).value().total_cmp(&0.0).then(a.event.cmp(&b.event))
+        });
+        (ahead, ends)
     }
 
     /// The event of the step that is next which ends the run, and how much later \[s\].
     pub fn stop(&self, mechanism: &ExactMechanism<Digits<W>>) -> Option<(usize, Digits<W>)> {
-        self.ahead.last().copied().filter(|(event, _)| mechanism.events[*event].stop)
+        let last = self.ahead.last().filter(|last| mechanism.events[last.event].stop)?;
+        Some((last.event, last.after))
+    }
+
+    /// The event at the end of the step that is next which changes what acts.
+    pub fn change(&self, mechanism: &ExactMechanism<Digits<W>>) -> Option<usize> {
+        let last = self.ahead.last().filter(|last| mechanism.events[last.event].changes)?;
+        Some(last.event)
     }
 
     /// What happens in the step that is next, as far as there is room for it.
     fn happening(&self, motion: &Motion<W>) -> impl Iterator<Item = Happened<W>> {
-        let happens = |&(event, after): &(usize, Digits<W>)| {
+        let happens = |&Ahead { event, after, .. }: &Ahead<W>| {
             let t = motion.state().t + after;
             let posture = motion.at(t);
             Happened { event, t, phi: posture.phi, omega: posture.omega }
@@ -163,11 +169,15 @@ impl<const W: usize> Watch<W> {
     }
 }
 
+/// The side of zero a number is on.
+pub(super) fn sign(value: f64) -> i8 {
+    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
+}
+
 /// Passages of a formula through zero, in shares of a step and whether it rises, and its side at the end;
 /// `began` says that one of them ended the step before.
 fn passages(shares: &[f64], before: i8, began: bool) -> (Vec<(f64, bool)>, i8) {
     let curve = Powers { powers: shares, end: 1.0 };
-    let sign = |value: f64| if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
     let at = |share: f64| curve.at(share)[0];
     let most = (0..=LOOKS).map(|k| at(k as f64 / LOOKS as f64).abs()).fold(0.0, f64::max);
     let mut all = Vec::new();

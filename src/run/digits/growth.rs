@@ -5,7 +5,6 @@
 //! characteristic exponents*, Meccanica 15 (1980) 9).  The path itself is right for a few seconds only; what
 //! is wanted of it is how fast its neighbours leave it.
 
-use super::events::Watch;
 use super::motion::{LongState, Motion};
 use super::precision::{DIGITS, Precision};
 use super::{LongError, LongRun, Runner, Source};
@@ -55,7 +54,7 @@ pub struct Forecast {
 /// As a run in many digits, or more than 2000 digits would be needed (a refusal).
 pub fn forecast(source: &Source, within: f64, has_loops: bool) -> Result<Forecast, LongError> {
     let mut pilot = Runner::<ROOM>::new(source, Precision::new(PILOT, has_loops))?;
-    pilot.motion.watch = Watch::default();
+    pilot.motion.ends_nowhere();
     let horizon = pilot.rows.until;
     let until = horizon.value();
     let growth = measured(&mut pilot.motion, until)? / std::f64::consts::LN_10;

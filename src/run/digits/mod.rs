@@ -4,12 +4,16 @@
 //! numbers are read as written from row to row; [`Pair`] runs two side by side and tells to how many digits
 //! they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
+mod acting;
+mod branches;
 mod confirm;
 mod events;
+mod functions;
 mod growth;
 mod keep;
 mod motion;
 mod pair;
+mod posture;
 mod precision;
 mod several;
 mod wall;
@@ -24,7 +28,7 @@ use super::plan::Refusal;
 use crate::arithmetic::digits::{Digits, MOST};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Mechanism;
-use crate::dynamics::compile::exact::ExactMechanism;
+use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::scene::exact::exact_number;
 use crate::scene::{Scene, SceneError, Template};
 use crate::stepping::StepError;
@@ -114,6 +118,10 @@ pub struct Saved {
     /// Events with the numbers of each, and the sides of zero their formulas are on.
     happened: Vec<(usize, Vec<Vec<u64>>)>,
     sides: Vec<i8>,
+    /// Parameters, branches and parts that rest.
+    parameters: Vec<Vec<u64>>,
+    modes: Vec<bool>,
+    off: Vec<String>,
 }
 
 impl Saved {
@@ -208,6 +216,11 @@ fn refusal(what: &str, reason: &str, alternative: &str) -> Refusal {
     Refusal { what: what.into(), reason: reason.into(), alternative: alternative.into(), is_usage: true }
 }
 
+/// Numbers that were saved.
+fn numbers_of<const W: usize>(words: &[Vec<u64>]) -> Option<Vec<Digits<W>>> {
+    words.iter().map(|words| Digits::from_words(words)).collect()
+}
+
 /// A run on numbers of `W` limbs.
 struct Runner<const W: usize> {
     motion: Motion<W>,
@@ -233,7 +246,13 @@ impl<const W: usize> Runner<W> {
             time(&source.every, times.every).ok_or_else(missing)?,
         );
         let rows = Rows::new(until, if every > until { until } else { every })?;
-        let mechanism = ExactMechanism::new(&scene, &source.mechanism).map_err(|reason| {
+        // Formulas begin on the branches of the start.
+        let start = source.mechanism.start(&source.scene);
+        let structure = match source.mechanism.on_branches_of(&start) {
+            Ok(Some(structure)) => Arc::new(structure),
+            _ => Arc::clone(&source.mechanism),
+        };
+        let mechanism = ExactMechanism::new(&scene, &structure).map_err(|reason| {
             let alternative = "run it without --digits".into();
             Refusal { what: "--digits".into(), reason, alternative, is_usage: false }
         })?;
@@ -287,8 +306,8 @@ impl<const W: usize> LongRun for Runner<W> {
     }
 
     fn save(&self) -> Saved {
-        let LongState { t, u, rate, work, impact_energy, steps, impacts, radius } = self.motion.state();
-        let numbers = [t, work, impact_energy].into_iter().chain(u).chain(rate);
+        let LongState { t, u, rate, work, jump_energy, steps, impacts, radius, acting } = self.motion.state();
+        let numbers = [t, work, jump_energy].into_iter().chain(u).chain(rate);
         let words = numbers.map(Digits::to_words).collect();
         let happened = self.motion.watch.happened.iter().map(|Happened { event, t, phi, omega }| {
             (*event, std::iter::once(t).chain(phi).chain(omega).map(Digits::to_words).collect())
@@ -301,16 +320,16 @@ impl<const W: usize> LongRun for Runner<W> {
             radius: *radius,
             happened: happened.collect(),
             sides: self.motion.watch.sides.clone(),
+            parameters: acting.parameters.iter().map(Digits::to_words).collect(),
+            modes: acting.modes.clone(),
+            off: acting.off.clone(),
         }
     }
 
     fn resume(&mut self, saved: &Saved) -> bool {
-        let numbers = |words: &[Vec<u64>]| {
-            words.iter().map(|words| Digits::from_words(words)).collect::<Option<Vec<_>>>()
-        };
         let n = self.motion.mechanism.structure.coordinates();
         let happened = |(event, words): &(usize, Vec<Vec<u64>>)| {
-            let numbers = numbers(words).filter(|numbers| numbers.len() == 1 + 2 * n)?;
+            let numbers = numbers_of(words).filter(|numbers| numbers.len() == 1 + 2 * n)?;
             let (phi, omega) = numbers[1..].split_at(n);
             let is_known = *event < self.motion.mechanism.events.len();
             is_known.then(|| Happened {
@@ -321,28 +340,30 @@ impl<const W: usize> LongRun for Runner<W> {
             })
         };
         let happened: Option<Vec<Happened<W>>> = saved.happened.iter().map(happened).collect();
-        let (Some(numbers), Some(happened)) = (numbers(&saved.words), happened) else { return false };
+        let (Some(numbers), Some(happened)) = (numbers_of(&saved.words), happened) else { return false };
         if saved.sides.len() != self.motion.watch.sides.len() {
             return false;
         }
         let f = self.motion.state().u.len();
-        let (&[t, work, impact_energy], rest) = match numbers.split_first_chunk::<3>() {
+        let Some(parameters) = numbers_of(&saved.parameters) else { return false };
+        let (&[t, work, jump_energy], rest) = match numbers.split_first_chunk::<3>() {
             Some(split) if split.1.len() == 2 * f && saved.precision == self.precision() => split,
             _ => return false,
         };
         let (u, rate) = rest.split_at(f);
-        self.motion.resume(LongState {
+        let is_known = self.motion.resume(LongState {
             t,
             u: u.to_vec(),
             rate: rate.to_vec(),
             work,
-            impact_energy,
+            jump_energy,
             steps: saved.steps,
             impacts: saved.impacts,
             radius: saved.radius,
+            acting: Acting { parameters, modes: saved.modes.clone(), off: saved.off.clone() },
         });
         (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
-        true
+        is_known
     }
 
     fn counts(&self) -> [u64; 2] {

@@ -8,18 +8,22 @@
 //! many limbs as it weighs.  A step's length is a double, so that time is a sum of such and exact, and output
 //! times are read off the steps.  Angles are not wrapped: turns cost no digits worth the name.  Rows that are
 //! not eliminated are put back by Newton's iteration after every step (module `keep`), walls located by it
-//! (module `wall`).
+//! (module `wall`), and so are events (module `events`) and the corners of formulas (module `branches`): a step
+//! ends where one of them changes the equations.
 
+use super::branches::Branches;
 use super::confirm::{Probe, confirmed};
 use super::events::Watch;
+use super::functions::Functions;
 use super::keep::Keeper;
 use super::precision::Precision;
 use super::wall;
 use crate::arithmetic::digits::{Digits, Scale};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
-use crate::dynamics::compile::exact::{ExactMechanism, ExactStart};
-use crate::dynamics::series::{Constants, Series};
+use crate::dynamics::compile::exact::{Acting, ExactMechanism, ExactStart};
+use crate::dynamics::constraint::ConstraintEquation;
+use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
 
 /// log2 of the factor by which a step may be longer than the one before.
@@ -40,8 +44,8 @@ pub struct LongState<const W: usize> {
     pub rate: Vec<Digits<W>>,
     /// Work of motors, dampers and applied forces since t = 0 \[J\].
     pub work: Digits<W>,
-    /// Energy impacts have put in since t = 0 \[J\], negative.
-    pub impact_energy: Digits<W>,
+    /// Energy that impacts, corners of potentials and events have put in since t = 0 \[J\].
+    pub jump_energy: Digits<W>,
     /// Steps made.
     pub steps: u64,
     /// Impacts passed.
@@ -49,24 +53,15 @@ pub struct LongState<const W: usize> {
     /// log2 of the radius of convergence of the last step's series \[s\], as far as its last powers tell;
     /// `None` before there is one.
     pub radius: Option<f64>,
-}
-
-/// All coordinates at a moment.
-#[derive(Clone, Debug)]
-pub struct Posture<const W: usize> {
-    /// Angles, then positions of origins \[rad, m\].
-    pub phi: Vec<Digits<W>>,
-    /// Their rates \[rad/s, m/s\].
-    pub omega: Vec<Digits<W>>,
-    /// Work, and energy of impacts \[J\].
-    pub work: [Digits<W>; 2],
+    /// What acts.
+    pub acting: Acting<Digits<W>>,
 }
 
 /// A mechanism in motion.
 pub struct Motion<const W: usize> {
     pub(super) mechanism: ExactMechanism<Digits<W>>,
     pub(super) precision: Precision,
-    coordinates: Coordinates,
+    pub(super) coordinates: Coordinates,
     pub(super) series: Series<Digits<W>>,
     pub(super) state: LongState<W>,
     pub(super) keeper: Keeper<W>,
@@ -74,13 +69,15 @@ pub struct Motion<const W: usize> {
     pub(super) probe: Option<Probe<W>>,
     /// Watches for events.
     pub(super) watch: Watch<W>,
+    /// The branches of formulas.
+    pub(super) branches: Branches<W>,
     /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends
     /// on.
     step: Option<(Digits<W>, Option<usize>)>,
     /// The radius its series has: see [`LongState`].
     radius: Option<f64>,
     /// Limbs that each power is kept to.
-    kept: Vec<usize>,
+    pub(super) kept: Vec<usize>,
     /// Steps may be as long at most \[s\].
     longest: f64,
     zeros: Vec<Digits<W>>,
@@ -113,6 +110,7 @@ impl<const W: usize> Motion<W> {
             keeper,
             probe: Probe::of(&mechanism, coordinates),
             watch: Watch::new(&mechanism, precision.order),
+            branches: Branches::new(Functions::new(&mechanism.conditions, precision.order)),
             step: None,
             radius: None,
             longest: until,
@@ -123,10 +121,11 @@ impl<const W: usize> Motion<W> {
                 u: Vec::new(),
                 rate: Vec::new(),
                 work: Digits::ZERO,
-                impact_energy: Digits::ZERO,
+                jump_energy: Digits::ZERO,
                 steps: 0,
                 impacts: 0,
                 radius: None,
+                acting: mechanism.acting.clone(),
             },
             mechanism,
         };
@@ -138,43 +137,6 @@ impl<const W: usize> Motion<W> {
         let (u, rate) = motion.independent(&phi, &omega, &start.given);
         (motion.state.u, motion.state.rate) = (u, rate);
         Ok(motion)
-    }
-
-    /// Independent coordinates and rates of a posture at t = 0, from the first of the bodies they move whose
-    /// value is given.
-    fn independent(
-        &self,
-        phi: &[Digits<W>],
-        omega: &[Digits<W>],
-        given: &[Vec<bool>; 2],
-    ) -> (Vec<Digits<W>>, Vec<Digits<W>>) {
-        if self.coordinates == Coordinates::All {
-            return (phi.to_vec(), omega.to_vec());
-        }
-        let partition = &self.mechanism.partition;
-        let from = |coordinate: usize, given: &[bool], values: &[Digits<W>], is_rate: bool| {
-            let own = partition.independent[coordinate];
-            let moved = (0..values.len()).filter(|&i| partition.bodies[i].base == Some(coordinate));
-            let best = Some(own).filter(|&own| given[own]).or_else(|| moved.clone().find(|&i| given[i]));
-            let body = best.unwrap_or(own);
-            let t = self.state.t;
-            partition.bodies[body].laws.iter().fold(values[body], |sum, (sign, law)| {
-                let part = if is_rate { Digits::phase(law, t).rate } else { Digits::law_value(law, t) };
-                sum - part.scale(*sign)
-            })
-        };
-        let count = 0..partition.count();
-        (
-            count.clone().map(|c| from(c, &given[0], phi, false)).collect(),
-            count.map(|c| from(c, &given[1], omega, true)).collect(),
-        )
-    }
-
-    /// All coordinates at the last step's end.
-    pub(super) fn state_posture(&self) -> Posture<W> {
-        let LongState { t, u, rate, work, impact_energy, .. } = &self.state;
-        let (phi, omega) = self.bodies(*t, u, rate);
-        Posture { phi, omega, work: [*work, *impact_energy] }
     }
 
     /// The state at a time inside the step that is next.
@@ -192,6 +154,7 @@ impl<const W: usize> Motion<W> {
             keeper: self.keeper.clone(),
             probe: self.probe.clone(),
             watch: self.watch.clone(),
+            branches: self.branches.clone(),
             zeros: self.zeros.clone(),
             kept: self.kept.clone(),
             step: None,
@@ -208,10 +171,20 @@ impl<const W: usize> Motion<W> {
         Ok(())
     }
 
-    /// Goes on from a state of this motion.
-    pub fn resume(&mut self, state: LongState<W>) {
+    /// Goes on from a state of this motion; false where it is none.
+    pub fn resume(&mut self, state: LongState<W>) -> bool {
+        let is_known = state.acting == self.mechanism.acting || {
+            let fits = |acting: &Acting<Digits<W>>| (acting.parameters.len(), acting.modes.len());
+            fits(&state.acting) == fits(&self.mechanism.acting) && self.exchange(&state.acting).is_ok()
+        };
         self.state = state;
         self.step = None;
+        is_known
+    }
+
+    /// True for a wall that lets its point pass.
+    pub(super) fn is_off(&self, wall: &ConstraintEquation<Digits<W>>) -> bool {
+        self.state.acting.off.contains(&wall.name)
     }
 
     /// The state at the last step's end.
@@ -230,9 +203,11 @@ impl<const W: usize> Motion<W> {
             if until <= self.state.t + step || self.end().is_some() {
                 return Ok(true);
             }
+            let change = self.watch.change(&self.mechanism);
             self.watched(Watch::pass);
             self.advance(step)?;
             wall.map_or(Ok(()), |wall| wall::impact(self, wall))?;
+            change.map_or(Ok(()), |event| self.change(event))?;
             if pause() {
                 return Ok(false);
             }
@@ -240,10 +215,11 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Shows the motion to what watches for its events.
-    fn watched(&mut self, show: impl FnOnce(&mut Watch<W>, &Self)) {
+    fn watched<R>(&mut self, show: impl FnOnce(&mut Watch<W>, &Self) -> R) -> R {
         let mut watch = std::mem::take(&mut self.watch);
-        show(&mut watch, self);
+        let result = show(&mut watch, self);
         self.watch = watch;
+        result
     }
 
     /// The event that ends the run within the step that is next, and its time \[s\].
@@ -251,41 +227,37 @@ impl<const W: usize> Motion<W> {
         self.watch.stop(&self.mechanism).map(|(event, after)| (event, self.state.t + after))
     }
 
-    /// All coordinates at a time inside the step that is next.
-    pub fn at(&self, t: Digits<W>) -> Posture<W> {
-        let (u, rate, work) = self.evaluate(t - self.state.t);
-        let (phi, omega) = self.bodies(t, &u, &rate);
-        Posture { phi, omega, work: [self.state.work + work, self.state.impact_energy] }
-    }
-
-    /// Angles and rates of all bodies.
-    pub(super) fn bodies(
-        &self,
-        t: Digits<W>,
-        u: &[Digits<W>],
-        rate: &[Digits<W>],
-    ) -> (Vec<Digits<W>>, Vec<Digits<W>>) {
-        if self.coordinates == Coordinates::All {
-            return (u.to_vec(), rate.to_vec());
-        }
-        let body = |dependent: &crate::dynamics::partition::DependentAngle<Digits<W>>| {
-            let of = |values: &[Digits<W>]| dependent.base.map_or(Digits::ZERO, |base| values[base]);
-            dependent.laws.iter().fold((of(u), of(rate)), |(angle, speed), (sign, law)| {
-                let turned = Digits::law_value(law, t).scale(*sign);
-                (angle + turned, speed + Digits::phase(law, t).rate.scale(*sign))
-            })
-        };
-        self.mechanism.partition.bodies.iter().map(body).unzip()
-    }
-
-    /// The series of the state, and the length of the step it makes, which ends on a wall where one is met.
+    /// The series of the state, and the length of the step it makes, which ends where a wall is met, a formula
+    /// has a corner, or an event changes what acts.
     fn ready(&mut self) -> Result<(Digits<W>, Option<usize>), StepError> {
         if let Some(step) = self.step {
             return Ok(step);
         }
+        let step = self.on_its_branches()?;
+        let mut end = match self.branches.change(self, step) {
+            Some(corner) => (corner, None),
+            None => (Digits::of(step), None),
+        };
+        if let Some((wall, length)) = wall::first(self, end.0.value())? {
+            end = (length, Some(wall));
+        }
+        if let Some(event) = self.watched(|watch, motion| watch.look(motion, end.0.value())) {
+            end = (event, end.1.filter(|_| event >= end.0));
+        }
+        self.step = Some(end);
+        Ok(end)
+    }
+
+    /// Expands the state and all functions, and tells how long a step the series makes \[s\].
+    pub(super) fn expanded(&mut self) -> Result<f64, StepError> {
         let wanted = self.expand();
-        self.watched(Watch::expand);
-        let allowed = self.watch.allows(wanted, self.precision.tolerance());
+        self.watched(|watch, motion| watch.functions.expand(motion, &motion.mechanism.functions));
+        let mut branches = std::mem::take(&mut self.branches);
+        branches.functions.expand(self, &self.mechanism.conditions);
+        self.branches = branches;
+        let tolerance = self.precision.tolerance();
+        let allowed = self.watch.functions.allows(wanted, tolerance);
+        let allowed = self.branches.functions.allows(allowed, tolerance);
         let wanted = if allowed < wanted { short(allowed) } else { wanted };
         let step = confirmed(self, wanted);
         let seconds = self.state.t.value();
@@ -302,12 +274,6 @@ impl<const W: usize> Motion<W> {
                 hint,
             ));
         }
-        let step = match wall::first(self, step)? {
-            Some((wall, length)) => (length, Some(wall)),
-            None => (Digits::of(step), None),
-        };
-        self.watched(|watch, motion| watch.look(motion, step.0.value()));
-        self.step = Some(step);
         Ok(step)
     }
 
@@ -405,7 +371,7 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Coordinates, rates and the work done since the state's time at a time after that.
-    fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
+    pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
         let f = self.state.u.len();
         let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
         let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;

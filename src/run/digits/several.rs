@@ -11,10 +11,12 @@
 //! digits.  Walls whose point does not approach have no restitution.
 
 use super::motion::Motion;
+use super::wall::{Jump, travel_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::Measure;
 use crate::dynamics::kernel::dot;
+use crate::dynamics::series::Constants;
 use crate::stepping::{Cause, StepError};
 
 /// Walls that are taken at once.
@@ -29,7 +31,9 @@ pub(super) struct Meeting<const W: usize> {
     pub walls: Vec<usize>,
     /// G, wall by wall.
     gradients: Vec<Vec<Digits<W>>>,
-    /// v⁻ \[m/s\].
+    /// How fast the walls move along their normals \[m/s\].
+    rates: Vec<Digits<W>>,
+    /// v⁻, as seen from the walls \[m/s\].
     velocity: Vec<Digits<W>>,
     /// log2 of the part of a number that is rounding.
     rounding: f64,
@@ -45,10 +49,13 @@ impl<const W: usize> Meeting<W> {
         let rounding = -SURE * motion.precision.bits as f64;
         let posture = motion.state_posture();
         let z = motion.mechanism.elements(&posture.phi);
+        let t = motion.state().t;
         let touches = |&other: &usize| {
-            let gap = motion.mechanism.walls[other].0.gap(&z).abs();
+            let row = &motion.mechanism.walls[other].0;
+            let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, t));
+            let gap = (row.gap(&z) - travel).abs();
             let length = motion.mechanism.structure.contacts[other].length;
-            other == wall || gap.log2() - libm::log2(length) < rounding
+            other == wall || !motion.is_off(row) && gap.log2() - libm::log2(length) < rounding
         };
         let walls: Vec<usize> = (0..motion.mechanism.walls.len()).filter(touches).collect();
         let gradient = |&wall: &usize| {
@@ -59,17 +66,23 @@ impl<const W: usize> Meeting<W> {
             gradient
         };
         let gradients: Vec<_> = walls.iter().map(gradient).collect();
-        let velocity: Vec<_> = gradients.iter().map(|gradient| dot(gradient, &posture.omega)).collect();
+        let rates: Vec<_> =
+            walls.iter().map(|&wall| travel_rate(&motion.mechanism.walls[wall].0, t)).collect();
+        let velocity: Vec<_> = gradients
+            .iter()
+            .zip(&rates)
+            .map(|(gradient, &rate)| dot(gradient, &posture.omega) - rate)
+            .collect();
         let still = largest(&velocity) + rounding;
         let approached = velocity.iter().filter(|v| **v < Digits::ZERO && v.log2() > still).count();
-        (approached > 1).then_some(Self { walls, gradients, velocity, rounding })
+        (approached > 1).then_some(Self { walls, gradients, rates, velocity, rounding })
     }
 
-    /// The change of the rates, and how many of the walls press.
+    /// What the impulses do.
     ///
     /// # Errors
     /// No impulses fit.
-    pub fn change(&self, motion: &mut Motion<W>) -> Result<(Vec<Digits<W>>, u64), StepError> {
+    pub fn jump(&self, motion: &mut Motion<W>) -> Result<Jump<W>, StepError> {
         let names: Vec<&str> =
             self.walls.iter().map(|&wall| motion.mechanism.structure.contacts[wall].row.name()).collect();
         let names = names.join(", ");
@@ -104,7 +117,7 @@ impl<const W: usize> Meeting<W> {
         }
         let least = largest(&impulses) + self.rounding;
         let pressing = impulses.iter().filter(|impulse| impulse.log2() > least).count();
-        Ok((change, pressing as u64))
+        Ok(Jump { change, work: dot(&impulses, &self.rates), walls: pressing as u64 })
     }
 }
 

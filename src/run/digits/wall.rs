@@ -2,7 +2,8 @@
 //! by Newton's law of impact; at several walls at one moment see module `several`.
 //!
 //! ```text
-//! gap(t) = c + Σ_m t^m Σ_k Re(conj(g_k) z_k,m) = 0;      w⁺ = w⁻ - (1 + e) (g·w⁻) a / (g·a),   a = response to an impulse along g
+//! gap(t) = c + Σ_m t^m (Σ_k Re(conj(g_k) z_k,m) + Σ_jk Σ_l Re(conj(z_j,l) h_jk z_k,m-l) - s_m) = 0
+//! w⁺ = w⁻ - (1 + e) (g·w⁻ - s') a / (g·a),   a = response to an impulse along g,   s: travel of the wall
 //! ```
 //!
 //! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12
@@ -11,9 +12,10 @@
 use super::motion::Motion;
 use super::several::Meeting;
 use crate::arithmetic::digits::Digits;
-use crate::arithmetic::{Real, Scalar};
+use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::kernel::dot;
+use crate::dynamics::series::Constants;
 use crate::stepping::search::{Crossing, Powers, crossing};
 use crate::stepping::{Cause, StepError};
 
@@ -24,6 +26,9 @@ const MOST: usize = 1000;
 pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(usize, Digits<W>)>, StepError> {
     let mut found: Option<(usize, Digits<W>)> = None;
     for (wall, (row, _)) in motion.mechanism.walls.iter().enumerate() {
+        if motion.is_off(row) {
+            continue;
+        }
         let powers = gap(motion, row);
         let length = motion.mechanism.structure.contacts[wall].length;
         let shares = in_shares(&powers, 1.0 / length, step);
@@ -67,13 +72,35 @@ pub(super) fn in_shares<const W: usize>(powers: &[Digits<W>], factor: f64, step:
 fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) -> Vec<Digits<W>> {
     let Measure::Place(place) = &row.measure else { return Vec::new() };
     let n = motion.mechanism.structure.coordinates();
-    let elements = motion.series.z.chunks_exact(n);
-    let mut powers: Vec<_> =
-        elements.map(|z| place.linear.iter().fold(Digits::ZERO, |sum, &(k, g)| sum + g.dot(z[k]))).collect();
+    let elements: Vec<&[Complex<Digits<W>>]> = motion.series.z.chunks_exact(n).collect();
+    let linear =
+        |z: &&[Complex<Digits<W>>]| place.linear.iter().fold(Digits::ZERO, |sum, &(k, g)| sum + g.dot(z[k]));
+    let mut powers: Vec<_> = elements.iter().map(linear).collect();
+    for &(j, k, h) in &place.bilinear {
+        let turned: Vec<_> = elements.iter().map(|z| h * z[k]).collect();
+        for (m, power) in powers.iter_mut().enumerate() {
+            *power = (0..=m).fold(*power, |sum, l| sum + elements[l][j].dot(turned[m - l]));
+        }
+    }
     if let Some(first) = powers.first_mut() {
         *first += place.constant;
     }
+    if let Some(law) = &row.law {
+        let mut rates = vec![Digits::ZERO; powers.len()];
+        Digits::add_law(law, 1.0, motion.state.t, &mut rates, 0, 1);
+        for (m, power) in powers.iter_mut().enumerate() {
+            *power -= match m.checked_sub(1) {
+                None => Digits::law_value(law, motion.state.t),
+                Some(before) => rates[before].over_whole(m as u64),
+            };
+        }
+    }
     powers
+}
+
+/// How fast a wall moves along its normal \[m/s\].
+pub(super) fn travel_rate<const W: usize>(row: &ConstraintEquation<Digits<W>>, t: Digits<W>) -> Digits<W> {
+    row.law.as_ref().map_or(Digits::ZERO, |law| Digits::phase(law, t).rate)
 }
 
 /// The zero of a polynomial near a time, as far as its digits tell.
@@ -104,8 +131,8 @@ pub(super) fn refined<const W: usize>(
 /// The jump of the rates at a wall, and at all others that are met at the same moment.
 pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(), StepError> {
     if let Some(meeting) = Meeting::at(motion, wall) {
-        let (change, pressing) = meeting.change(motion)?;
-        jump(motion, &change, pressing);
+        let jump = meeting.jump(motion)?;
+        jumped(motion, &jump);
         return Ok(());
     }
     let state = motion.state.clone();
@@ -117,7 +144,8 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     if let Measure::Place(place) = &row.measure {
         place.slopes(&z, |k, slope| gradient[k] += slope);
     }
-    let (approach, restitution, name) = (dot(&gradient, &omega), *restitution, row.name.clone());
+    let (rate, restitution, name) = (travel_rate(row, state.t), *restitution, row.name.clone());
+    let approach = dot(&gradient, &omega) - rate;
     if approach >= Digits::ZERO {
         return Ok(());
     }
@@ -129,12 +157,22 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
         return Err(motion.stop(Cause::Unsuited, 0.0, &what, "move the wall"));
     }
     let change: Vec<_> = response.iter().map(|&a| a * impulse).collect();
-    jump(motion, &change, 1);
+    jumped(motion, &Jump { change, work: impulse * rate, walls: 1 });
     Ok(())
 }
 
-/// Changes the rates of all coordinates by the impulses of so many walls.
-fn jump<const W: usize>(motion: &mut Motion<W>, change: &[Digits<W>], walls: u64) {
+/// What impulses do at one moment.
+pub(super) struct Jump<const W: usize> {
+    /// Change of the rates of all coordinates.
+    pub change: Vec<Digits<W>>,
+    /// Work of walls that move \[J\].
+    pub work: Digits<W>,
+    /// Walls that press.
+    pub walls: u64,
+}
+
+/// Changes the rates of all coordinates by impulses.
+fn jumped<const W: usize>(motion: &mut Motion<W>, Jump { change, work, walls }: &Jump<W>) {
     let (posture, limbs) = (motion.state_posture(), motion.precision.limbs);
     let (phi, omega) = (&posture.phi, &posture.omega);
     let z = motion.mechanism.elements(phi);
@@ -143,14 +181,15 @@ fn jump<const W: usize>(motion: &mut Motion<W>, change: &[Digits<W>], walls: u64
         let [kinetic, potential] = motion.mechanism.energy(phi, omega, &z);
         kinetic + potential
     };
-    motion.state.impact_energy += energy(&after) - energy(omega);
+    motion.state.jump_energy += energy(&after) - energy(omega) - *work;
+    motion.state.work += *work;
     let independent = motion.mechanism.partition.independent.clone();
     let has_all = motion.state.rate.len() == phi.len();
     for (c, rate) in motion.state.rate.iter_mut().enumerate() {
         let k = if has_all { c } else { independent[c] };
         *rate += after[k] - omega[k];
     }
-    motion.state.impacts += walls;
+    motion.state.impacts += *walls;
     // The next series is another one.
     motion.state.radius = None;
 }

@@ -84,7 +84,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         at.child(key).map_or_else(|| Ok(plain.to_owned()), |at| self.formula_at(&at, plain))
     }
 
-    /// The text of a formula, which must be smooth; a number by all its digits.
+    /// The text of a formula; a number by all its digits.
     fn formula_at(&self, at: &Cursor, plain: &str) -> Result<String, SceneError> {
         if self.known_at(at.node).is_some() {
             return Err(self.refuse_part(at, "it stands where a formula may"));
@@ -92,46 +92,56 @@ impl<'a, C: Decimal> Reader<'a, C> {
         if let Value::Number(value) = at.node.value {
             return Ok(format!("{:?}", self.literal(at.node, value)));
         }
-        self.smooth(at, plain)?;
+        self.read(at, plain)?;
         Ok(plain.to_owned())
     }
 
-    /// Events, where they are those of this run; their formulas are smooth.
+    /// Events, where they are those of this run; their functions are smooth.
     pub(super) fn events(&self, plain: &Scene) -> Result<Vec<SceneEvent>, SceneError> {
         if self.watched == Watched::Beside {
             return Ok(Vec::new());
         }
-        for (at, event) in self.root.items("events").iter().zip(&plain.events) {
-            self.smooth(&at.child("when").unwrap_or_else(|| at.clone()), &event.when)?;
-        }
-        Ok(plain.events.clone())
+        let event = |(at, event): (&Cursor, &SceneEvent)| {
+            let when = at.child("when").unwrap_or_else(|| at.clone());
+            if self.read(&when, &event.when)?.conditions() > 0 {
+                return Err(self.refuse_part(&when, "the function of the event has corners"));
+            }
+            let values = at.child("set");
+            let value = |(name, text): &(String, String)| {
+                let at = values.as_ref().and_then(|values| values.child(name));
+                Ok((name.clone(), self.formula_at(at.as_ref().unwrap_or(&when), text)?))
+            };
+            let set = event.set.iter().map(value).collect::<Result<_, SceneError>>()?;
+            Ok(SceneEvent { set, ..event.clone() })
+        };
+        self.root.items("events").iter().zip(&plain.events).map(event).collect()
     }
 
-    /// A formula without corners and tables.
-    pub(super) fn smooth(&self, at: &Cursor, text: &str) -> Result<Formula, SceneError> {
+    /// A formula without tables, and without corners where nobody watches for them.
+    fn read(&self, at: &Cursor, text: &str) -> Result<Formula, SceneError> {
         let tables = &self.plain.tables;
         let tables: Vec<_> =
             tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
-        match Formula::parse_with(text, &tables) {
-            Ok(formula) if formula.conditions() == 0 => Ok(formula),
-            Ok(_) => {
-                Err(self
-                    .refuse_part(at, "its formula has corners or tables, across which there is no series"))
-            }
-            Err(error) => {
-                Err(self.refuse(at, &format!("is no formula: {}", error.problem), "give a formula"))
-            }
+        let formula = Formula::parse_with(text, &tables).map_err(|error| {
+            self.refuse(at, &format!("is no formula: {}", error.problem), "give a formula")
+        })?;
+        if formula.has_tables() {
+            return Err(self.refuse_part(at, "its formula has tables, whose splines are known in doubles"));
         }
+        if formula.conditions() > 0 && self.watched == Watched::Beside {
+            return Err(self.refuse_part(at, "its formula has corners, across which there is no series"));
+        }
+        Ok(formula)
     }
 
-    /// Refuses signals and integrals with corners or tables.
-    pub(super) fn refuse_corners(&self) -> Result<(), SceneError> {
+    /// Refuses signals and integrals with tables, and with corners that nobody watches for.
+    pub(super) fn refuse_tables(&self) -> Result<(), SceneError> {
         for key in ["signals", "integrals"] {
             let Some(holder) = self.root.child(key) else { continue };
             let Value::Object(members) = &holder.node.value else { continue };
             for member in members {
                 if let (Value::Text(text), Some(at)) = (&member.node.value, holder.child(&member.key)) {
-                    self.smooth(&at, text)?;
+                    self.read(&at, text)?;
                 }
             }
         }
@@ -140,12 +150,12 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// A law of time.
     pub(super) fn profile(&self, at: &Cursor, text: &str) -> Result<Profile<C>, SceneError> {
-        let formula = self.smooth(at, text)?;
+        let formula = self.read(at, text)?;
         let value = |name: &str| {
             let known = self.parameters.iter().find(|known| known.0 == name);
             known.map(|known| known.1)
         };
         let values: Vec<Option<C>> = formula.names().map(value).collect();
-        Ok(Profile::recorded(&formula, &values, &[]))
+        Ok(Profile::new(&formula, &values))
     }
 }

@@ -159,6 +159,11 @@ impl Formula {
         self.conditions.len()
     }
 
+    /// True where it has tables.
+    pub(crate) fn has_tables(&self) -> bool {
+        !self.tables.is_empty()
+    }
+
     /// An error at a name of this formula that nothing has.
     pub fn unknown(&self, name: &str, known: &[&str]) -> FormulaError {
         let start = self.names.iter().find(|one| one.0 == name).map_or(0, |one| one.1);
@@ -207,12 +212,23 @@ impl Formula {
 
     /// The values of its conditions on the same branches.
     pub fn condition_values<S: Scalar>(&self, values: &[S], bits: &[bool], all: &mut Vec<S>) {
+        self.condition_values_over(values, bits, &|_, value| S::of(value), all);
+    }
+
+    /// The same where `number` gives the numbers of its nodes.
+    pub(crate) fn condition_values_over<S: Scalar>(
+        &self,
+        values: &[S],
+        bits: &[bool],
+        number: &impl Fn(usize, f64) -> S,
+        all: &mut Vec<S>,
+    ) {
         if self.conditions.is_empty() {
             return;
         }
         let begin = all.len();
         all.resize(begin + self.conditions.len(), S::ZERO);
-        self.run(values, &mut Watched { given: Given(bits), values: &mut all[begin..] });
+        self.run_over(values, number, &mut Watched { given: Given(bits), values: &mut all[begin..] });
     }
 
     fn run<S: Scalar>(&self, values: &[S], branches: &mut impl Branches<S>) -> S {

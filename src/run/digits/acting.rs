@@ -1,0 +1,96 @@
+//! What acts on a motion in many digits changes: events switch parts and set parameters, formulas come to their
+//! corners.
+
+use super::branches::Branches;
+use super::confirm::Probe;
+use super::events::Watch;
+use super::functions::Functions;
+use super::motion::Motion;
+use super::posture::Posture;
+use crate::arithmetic::digits::Digits;
+use crate::dynamics::CompileError;
+use crate::dynamics::compile::exact::{Acting, ExactMechanism};
+use crate::dynamics::series::Series;
+use crate::stepping::{Cause, StepError};
+
+/// Part of the bits carried in which the laws of motors agree on both sides of a corner.
+const SAME: f64 = 0.5;
+
+impl<const W: usize> Motion<W> {
+    /// Lets no event end the motion; where none changes what acts, none is looked for.
+    pub(super) fn ends_nowhere(&mut self) {
+        let ExactMechanism { events, functions, .. } = &mut self.mechanism;
+        events.iter_mut().for_each(|event| event.stop = false);
+        if !events.iter().any(|event| event.changes) {
+            events.clear();
+            functions.clear();
+            self.watch = Watch::default();
+        }
+    }
+
+    /// Expands the state on the branches of formulas that hold there, and tells how long a step the series
+    /// makes \[s\].
+    pub(super) fn on_its_branches(&mut self) -> Result<f64, StepError> {
+        let mut changes = 0;
+        loop {
+            let step = self.expanded()?;
+            let Some(modes) = self.branches.others(self, step) else { return Ok(step) };
+            if changes == Branches::most(self) {
+                return Err(Branches::slides(self, &modes));
+            }
+            changes += 1;
+            self.let_act(Acting { modes, ..self.state.acting.clone() })?;
+        }
+    }
+
+    /// Lets an event take effect that changes what acts.
+    pub(super) fn change(&mut self, event: usize) -> Result<(), StepError> {
+        let Posture { phi, omega, .. } = self.state_posture();
+        let acting = self.mechanism.after(event, self.state.t, &phi, &omega);
+        self.let_act(acting)
+    }
+
+    /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.
+    fn let_act(&mut self, acting: Acting<Digits<W>>) -> Result<(), StepError> {
+        let before = (self.state_posture(), self.energy());
+        let unsuited = |motion: &Self, what: &str, hint: &str| motion.stop(Cause::Unsuited, 0.0, what, hint);
+        if let Err(error) = self.exchange(&acting) {
+            return Err(unsuited(self, &format!("the run cannot go on: {error}"), "look at that formula"));
+        }
+        self.state.acting = acting;
+        // The next series is another one.
+        self.state.radius = None;
+        let after = self.state_posture();
+        let apart = |(a, b): (&Digits<W>, &Digits<W>)| (*a - *b).log2() - a.log2().max(0.0);
+        let moved = |a: &[Digits<W>], b: &[Digits<W>]| a.iter().zip(b).map(apart).fold(f64::MIN, f64::max);
+        let jump = moved(&before.0.phi, &after.phi).max(moved(&before.0.omega, &after.omega));
+        if jump > -SAME * self.precision.bits as f64 {
+            let what = format!("the law of a motor jumps by {:.1e}", libm::exp2(jump));
+            return Err(unsuited(self, &what, "it must keep its value and its rate through its corners"));
+        }
+        self.state.jump_energy += self.energy() - before.1;
+        Ok(())
+    }
+
+    /// The mechanism where other parts act, or on other branches.
+    pub(super) fn exchange(&mut self, acting: &Acting<Digits<W>>) -> Result<(), CompileError> {
+        let set = acting.parameters != self.mechanism.acting.parameters;
+        let mechanism = self.mechanism.with(acting.clone())?;
+        let order = self.precision.order;
+        self.series = Series::of_terms(&mechanism.terms(), self.coordinates, order);
+        self.series.keep(self.kept.clone());
+        self.probe = Probe::of(&mechanism, self.coordinates);
+        self.watch = std::mem::take(&mut self.watch).renewed(&mechanism, order, set);
+        self.branches = Branches::new(Functions::new(&mechanism.conditions, order));
+        self.mechanism = mechanism;
+        Ok(())
+    }
+
+    /// Kinetic and potential energy of the state \[J\].
+    fn energy(&self) -> Digits<W> {
+        let Posture { phi, omega, .. } = self.state_posture();
+        let z = self.mechanism.elements(&phi);
+        let [kinetic, potential] = self.mechanism.energy(&phi, &omega, &z);
+        kinetic + potential
+    }
+}

@@ -1,0 +1,67 @@
+//! Functions of a motion in many digits, as series: those of events, and the conditions of formulas.
+
+use super::motion::{JUDGES, Motion};
+use crate::arithmetic::digits::Digits;
+use crate::dynamics::force::UserForce;
+use crate::dynamics::series::FormulaSeries;
+
+/// Rounds in which a step is shortened, at most.
+const ROUNDS: usize = 20;
+
+/// Functions, and their powers in the step that is next.
+#[derive(Clone, Debug, Default)]
+pub struct Functions<const W: usize> {
+    series: Vec<FormulaSeries<Digits<W>>>,
+    /// The powers, function by function.
+    pub powers: Vec<Vec<Digits<W>>>,
+}
+
+impl<const W: usize> Functions<W> {
+    /// Room for some functions, each recorded as a torque.
+    pub fn new(functions: &[UserForce<Digits<W>>], order: usize) -> Self {
+        let series = functions.iter().map(|function| FormulaSeries::new(function, order)).collect();
+        Self { series, powers: Vec::new() }
+    }
+
+    /// Expands them where the motion is expanded.
+    pub fn expand(&mut self, motion: &Motion<W>, functions: &[UserForce<Digits<W>>]) {
+        self.powers.clear();
+        if self.series.is_empty() {
+            return;
+        }
+        let posture = motion.state_posture();
+        for (function, series) in functions.iter().zip(&mut self.series) {
+            let from = (motion.state().t, &posture.phi[..]);
+            self.powers.push(motion.series.formula(function, series, from).to_vec());
+        }
+    }
+
+    /// The part of a step \[s\] within which they converge as far as log2 of the tolerance says.
+    pub fn allows(&self, wanted: f64, tolerance: f64) -> f64 {
+        if wanted.is_nan() {
+            return wanted;
+        }
+        let shortened = |mut step: f64, powers: &Vec<Digits<W>>| {
+            let Some((terms, last)) = powers.len().checked_sub(JUDGES).map(|first| powers.split_at(first))
+            else {
+                return step;
+            };
+            // A shorter step has smaller terms.
+            for _ in 0..ROUNDS {
+                let weight = |(k, power): (usize, &Digits<W>)| power.log2() + k as f64 * libm::log2(step);
+                let size = terms.iter().enumerate().map(weight).fold(f64::NEG_INFINITY, f64::max);
+                let allowed = |(j, power): (usize, &Digits<W>)| {
+                    libm::exp2((tolerance + size - power.log2()) / (terms.len() + j) as f64)
+                };
+                let least = last.iter().enumerate().map(allowed).filter(|step| !step.is_nan());
+                let least = least.fold(step, f64::min);
+                if size == f64::NEG_INFINITY || least > 0.99 * step {
+                    break;
+                }
+                step = least;
+            }
+            step
+        };
+        self.powers.iter().fold(wanted, shortened)
+    }
+}

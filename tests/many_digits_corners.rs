@@ -1,0 +1,222 @@
+//! Formulas with corners, events that change what acts, and walls that move, in many digits: against closed forms
+//! in integer arithmetic.
+
+use super::many_digits::{cosine, fixed, last, near, number, one, pi, source, text, times};
+use driftless::arithmetic::Real;
+use driftless::run::digits::{LongRun, Precision, Source, long_run};
+use driftless::stepping::Cause;
+use num_bigint::BigInt;
+
+const DIGITS: usize = 60;
+const PLACES: u32 = 56;
+
+/// A rotor of moment of inertia 1 kg m², with what acts on it.
+fn rotor(parts: &str, phi: &str, omega: &str) -> String {
+    format!(
+        r#"{{"name": "rotor", "gravity": [0, 0],
+        "bars": [{{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "rotor", "point": [0, 0]}}]}}],
+        {parts}, "start": {{"rotor": {{"phi": {phi}, "omega": {omega}}}}}, "until": 9, "every": 9}}"#
+    )
+}
+
+fn at(parts: &str, [phi, omega]: [&str; 2], until: &str) -> [BigInt; 2] {
+    let row = last(&source(&rotor(parts, phi, omega), &[], until, until), DIGITS);
+    assert!(row.drift.abs() < 1e-56, "{parts}: {:e}", row.drift);
+    [number(row.bodies[0][0]), number(row.bodies[0][1])]
+}
+
+fn over(a: &BigInt, b: &BigInt) -> BigInt {
+    a * one() / b
+}
+
+fn root(x: &BigInt) -> BigInt {
+    (x * one()).sqrt()
+}
+
+fn begun(source: &Source) -> Box<dyn LongRun> {
+    long_run(source, Precision::new(DIGITS, false)).expect("a run")
+}
+
+/// A spring of 4 N·m/rad on one side of zero and of 1 N·m/rad on the other: half a period of π/2, and one of π, by
+/// corners of every kind, and by events.
+#[test]
+fn an_oscillator_with_two_stiffnesses_returns_after_both_of_its_half_periods() {
+    let torque =
+        |law: &str| format!(r#""torques": [{{"name": "spring", "body": "rotor", "torque": "{law}"}}]"#);
+    let cases = [
+        torque("-if(rotor.phi > 0, 4, 1)*rotor.phi"),
+        torque("-max(4*rotor.phi, 1*rotor.phi)"),
+        torque("-2.5*rotor.phi - 1.5*abs(rotor.phi)"),
+        format!(r#""signals": {{"k": "2.5 + 1.5*sign(rotor.phi)"}}, {}"#, torque("-k*rotor.phi")),
+        r#""torsion_springs": [{"name": "spring", "body": "rotor", "potential": "if(angle > 0, 2, 0.5)*angle^2"}]"#
+            .to_owned(),
+        r#""parameters": {"k": 4}, "events": [{"name": "through", "when": "rotor.phi", "set": {"k": "5 - k"}}],
+           "torsion_springs": [{"name": "spring", "body": "rotor", "potential": "k/2*angle^2"}]"#
+            .to_owned(),
+        r#""torsion_springs": [{"name": "hard", "body": "rotor", "stiffness": 4, "free_angle": 0},
+                               {"name": "soft", "body": "rotor", "stiffness": 1, "free_angle": 0}],
+           "inactive": ["soft"], "events": [
+               {"name": "down", "when": "rotor.phi", "direction": "falling", "off": ["hard"], "on": ["soft"]},
+               {"name": "up", "when": "rotor.phi", "direction": "rising", "off": ["soft"], "on": ["hard"]}]"#
+            .to_owned(),
+    ];
+    let until = text(&(pi() * 3));
+    for parts in &cases {
+        let [phi, omega] = at(parts, ["0", "1"], &until);
+        near(&phi, &BigInt::ZERO, PLACES);
+        near(&omega, &one(), PLACES);
+    }
+}
+
+/// A torque of constant size against the angle: parabolas of two seconds.
+#[test]
+fn a_torque_with_the_sign_of_the_angle_makes_parabolas() {
+    let torque = r#""torques": [{"name": "sign", "body": "rotor", "torque": "-1*sign(rotor.phi)"}]"#;
+    let [phi, omega] = at(torque, ["0", "1"], "7.25");
+    // 1.25 s into the fourth half: -(1.25 - 1.25²/2).
+    near(&phi, &-fixed("0.46875"), PLACES);
+    near(&omega, &fixed("0.25"), PLACES);
+}
+
+/// Where both branches drive the motion back, there is none.
+#[test]
+fn a_law_that_holds_the_motion_at_its_corner_stops_the_run() {
+    let torque = r#""torques": [{"name": "brake", "body": "rotor", "torque": "-0.3*sign(rotor.omega)"}]"#;
+    let mut run = begun(&source(&rotor(torque, "0", "1"), &[], "9", "9"));
+    let stop = run.row(1, &mut || false).expect_err("no motion beyond");
+    assert_eq!(stop.cause, Cause::Sliding);
+    assert!(stop.what.contains("`brake`") && (stop.t - 1.0 / 0.3).abs() < 1e-14, "{stop:?}");
+}
+
+/// A spring of 4 N·m/rad that is let go where it turns back, and acts again from 3 s on: what it stored is gone.
+#[test]
+fn a_spring_that_events_switch_leaves_the_rotor_where_it_is() {
+    let parts = r#""torsion_springs": [{"name": "spring", "body": "rotor", "stiffness": 4, "free_angle": 0}],
+        "events": [{"name": "back", "when": "rotor.omega", "direction": "falling", "off": ["spring"]},
+                   {"name": "again", "when": "t - 3", "on": ["spring"]}]"#;
+    let [phi, omega] = at(parts, ["0", "1"], "2.9");
+    near(&phi, &fixed("0.5"), PLACES);
+    near(&omega, &BigInt::ZERO, PLACES);
+    let [phi, _] = at(parts, ["0", "1"], "3.7");
+    near(&phi, &(cosine(&fixed("1.4")) / 2), PLACES);
+}
+
+/// A motor that begins to turn after 1 s, evenly accelerated; one that jumps is refused.
+#[test]
+fn a_motor_keeps_its_law_through_a_corner() {
+    let motor = |law: &str| {
+        rotor(&format!(r#""motors": [{{"name": "motor", "body": "rotor", "law": "{law}"}}]"#), "0", "0")
+            .replace(r#""start": {"rotor": {"phi": 0, "omega": 0}}, "#, "")
+    };
+    let row = last(&source(&motor("if(t > 1, 0.3*(t - 1)^2, 0)"), &[], "2.5", "2.5"), DIGITS);
+    near(&number(row.bodies[0][0]), &fixed("0.675"), PLACES);
+    near(&number(row.bodies[0][1]), &fixed("0.9"), PLACES);
+    let mut run = begun(&source(&motor("if(t > 1, 0.3, 0)"), &[], "2.5", "2.5"));
+    let stop = run.row(1, &mut || false).expect_err("a jump");
+    assert!(stop.what.contains("jumps") && stop.cause == Cause::Unsuited, "{stop:?}");
+}
+
+/// A ball of 2 kg.
+fn ball(parts: &str) -> String {
+    format!(
+        r#"{{"name": "ball", "gravity": [0, -10],
+        "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 1}}],
+        "points": [{{"name": "p", "body": "ball", "point": [0, 0]}}], {parts},
+        "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}}}, "until": 1, "every": 1}}"#
+    )
+}
+
+fn floor(law: &str) -> String {
+    format!(
+        r#""walls": [{{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0.6{law},
+                       "line": {{"through": [0, 0], "normal": [0, 1]}}}}]"#
+    )
+}
+
+/// A drag of 3 N against the velocity changes its sign at the impact, as the velocity does.
+#[test]
+fn a_formula_comes_to_its_corner_by_an_impact() {
+    let drag =
+        r#""forces": [{"name": "drag", "body": "ball", "point": [0, 0], "force": [0, "-3*sign(p.vy)"]}]"#;
+    let text = ball(&format!("{}, {drag}", floor("")));
+    let row = last(&source(&text, &[], "0.75", "0.75"), DIGITS);
+    let fall = root(&over(&fixed("2"), &fixed("8.5")));
+    let (after, speed) = (fixed("0.75") - &fall, times(&fixed("5.1"), &fall));
+    // Up to its top, and down again.
+    let rise = over(&speed, &fixed("11.5"));
+    assert!(rise < after);
+    let sink = &after - &rise;
+    let top = times(&speed, &rise) / 2;
+    near(&number(row.bodies[0][3]), &(top - times(&fixed("4.25"), &times(&sink, &sink))), PLACES);
+    near(&number(row.bodies[0][5]), &-times(&fixed("8.5"), &sink), PLACES);
+    assert!(row.drift.abs() < 1e-57, "{:e}", row.drift);
+}
+
+/// From a floor that is evenly accelerated upwards the ball falls faster and bounces as from one that rests; the
+/// work of the floor is in the balance.
+#[test]
+fn a_ball_bounces_on_a_floor_that_moves_as_seen_from_it() {
+    let law = r#", "law": {"start": -0.1, "rate": 0.5, "acceleration": 2}"#;
+    let long = source(&ball(&floor(law)), &[], "0.8", "0.8");
+    let row = last(&long, DIGITS);
+    // 1.1 - t/2 - 6 t² = 0
+    let t = (root(&fixed("26.65")) - fixed("0.5")) / 12;
+    let after = fixed("0.8") - &t;
+    let up = times(&fixed("0.6"), &(fixed("0.5") + times(&fixed("12"), &t)));
+    let above = times(&up, &after) - times(&fixed("6"), &times(&after, &after));
+    assert!(above > BigInt::ZERO);
+    let travel = fixed("-0.1") + fixed("0.4") + fixed("0.64");
+    near(&number(row.bodies[0][3]), &(above + travel), PLACES);
+    let speed = up - times(&fixed("12"), &after) + fixed("0.5") + fixed("1.6");
+    near(&number(row.bodies[0][5]), &speed, PLACES);
+    assert!(row.drift.abs() < 1e-57 && row.energy[2].value() > 1.0, "{:e} {:?}", row.drift, row.energy[2]);
+}
+
+/// Two balls on a line, of which one carries the wall: momentum is kept, and 0.6 of their approach comes back.
+#[test]
+fn a_wall_on_a_body_is_pushed_back() {
+    let text = r#"{"name": "two", "gravity": [0, 0],
+        "bars": [{"name": "a", "mass": 2, "centre": [0, 0], "inertia": 1}, {"name": "b", "mass": 3, "centre": [0, 0], "inertia": 1}],
+        "walls": [{"name": "buffer", "body": "a", "point": [0, 0], "restitution": 0.6,
+                   "line": {"body": "b", "through": [0, 0], "normal": [1, 0]}}],
+        "start": {"a": {"phi": 0, "omega": 0, "origin": [1, 0], "velocity": [-1, 0]},
+                  "b": {"phi": 0, "omega": 0, "origin": [-1, 0], "velocity": [0.7, 0]}}, "until": 2, "every": 2}"#;
+    let row = last(&source(text, &[], "2", "2"), DIGITS);
+    // They meet after 2/1.7 s; the impulse is 1.6·1.7·6/5.
+    let after = fixed("2") - over(&fixed("2"), &fixed("1.7"));
+    let place = over(&fixed("2"), &fixed("1.7"));
+    for (body, change, before, from) in [(0, "1.632", "-1", "1"), (1, "-1.088", "0.7", "-1")] {
+        let speed = fixed(before) + fixed(change);
+        near(&number(row.bodies[body][4]), &speed, PLACES);
+        let at = fixed(from) + times(&fixed(before), &place) + times(&speed, &after);
+        near(&number(row.bodies[body][2]), &at, PLACES);
+    }
+    assert!(row.drift.abs() < 1e-57, "{:e}", row.drift);
+}
+
+/// A run that is interrupted after corners and events comes to the same bits.
+#[test]
+fn a_run_goes_on_with_what_acts() {
+    let parts = r#""parameters": {"k": 4}, "events": [{"name": "through", "when": "rotor.phi - 0.1", "set": {"k": "5 - k"}},
+            {"name": "free", "when": "t - 3.1", "off": ["coil"]}],
+        "torques": [{"name": "spring", "body": "rotor", "torque": "-k*rotor.phi - 0.1*sign(rotor.omega)"}],
+        "torsion_springs": [{"name": "coil", "body": "rotor", "stiffness": 1, "free_angle": 0.2}]"#;
+    let long = source(&rotor(parts, "0", "1"), &[], "6", "0.5");
+    let mut whole = begun(&long);
+    let mut row_of = |number: u64| whole.row(number, &mut || false).expect("no stop").expect("no pause");
+    let rows: Vec<_> = (0..=12).map(&mut row_of).collect();
+    for interrupted in [1, 4, 7, 9] {
+        let mut first = begun(&long);
+        for number in 0..=interrupted {
+            first.row(number, &mut || false).expect("no stop").expect("no pause");
+        }
+        let mut second = begun(&long);
+        assert!(second.resume(&first.save()));
+        for number in interrupted + 1..=12 {
+            let row = second.row(number, &mut || false).expect("no stop").expect("no pause");
+            assert!(row.bodies == rows[number as usize].bodies, "{interrupted}: row {number}");
+        }
+    }
+    assert!(rows[12].drift.abs() < 1e-56, "{:e}", rows[12].drift);
+}
