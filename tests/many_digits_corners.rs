@@ -173,6 +173,19 @@ fn a_ball_bounces_on_a_floor_that_moves_as_seen_from_it() {
     assert!(row.drift.abs() < 1e-57 && row.energy[2].value() > 1.0, "{:e} {:?}", row.drift, row.energy[2]);
 }
 
+/// A motor that drives a point into a wall.
+#[test]
+fn a_point_that_a_motor_drives_into_a_wall_has_no_way_back() {
+    let parts = r#""motors": [{"name": "motor", "body": "rotor", "law": "2*t/(1 s)"}],
+        "walls": [{"name": "stop", "body": "rotor", "point": [1, 0], "restitution": 0.6,
+                   "line": {"through": [0, 0], "normal": [1, 0]}}]"#;
+    let text = rotor(parts, "0", "0").replace(r#""start": {"rotor": {"phi": 0, "omega": 0}}, "#, "");
+    let mut run = begun(&source(&text, &[], "9", "9"));
+    let stop = run.row(1, &mut || false).expect_err("no way back");
+    assert!(stop.what.contains("no way back") && stop.what.contains("stop"), "{stop:?}");
+    assert!((stop.t - 0.25 * std::f64::consts::PI).abs() < 1e-14, "{stop:?}");
+}
+
 /// Two balls on a line, of which one carries the wall: momentum is kept, and 0.6 of their approach comes back.
 #[test]
 fn a_wall_on_a_body_is_pushed_back() {

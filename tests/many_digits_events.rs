@@ -190,3 +190,28 @@ fn a_pair_resumed_at_its_end_has_all_events() {
         }
     }
 }
+
+/// Events of one moment all happen, whichever changes what acts: a rotor of 1 rad/s passes 1, 2 and 3 rad.
+#[test]
+fn events_of_the_moment_at_which_one_sets_a_parameter_happen() {
+    for (one, two) in [("set", "plain"), ("plain", "set")] {
+        let event = |name: &str| {
+            let set = if name == "set" { r#", "set": {"k": "k + 1"}"# } else { "" };
+            format!(r#"{{"name": "{name}", "when": "(rotor.phi - 1)*(rotor.phi - 2)*(rotor.phi - 3)"{set}}}"#)
+        };
+        let text = format!(
+            r#"{{"name": "rotor", "gravity": [0, 0], "parameters": {{"k": 0}},
+            "bars": [{{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "rotor", "point": [0, 0]}}]}}],
+            "torques": [{{"name": "none", "body": "rotor", "torque": "0*k*rotor.phi"}}],
+            "events": [{}, {}], "start": {{"rotor": {{"phi": 0.5, "omega": 1}}}}, "until": 3, "every": 3}}"#,
+            event(one),
+            event(two)
+        );
+        let run = ended(&source(&text, &[], "3", "3"));
+        let at = |whole: &str| fixed(whole);
+        let times = [at("0.5"), at("1.5"), at("2.5")];
+        let expected: Vec<_> = times.iter().flat_map(|t| [(one, t.clone()), (two, t.clone())]).collect();
+        agree(&run.events(), &expected);
+    }
+}

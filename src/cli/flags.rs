@@ -210,7 +210,7 @@ pub struct RunFlags {
     pub plan: PlanFlags,
     /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30
     /// % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations
-    /// than --effort)
+    /// than --max-evaluations)
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
     pub trust: Level,
     #[allow(missing_docs)]

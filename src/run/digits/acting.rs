@@ -74,13 +74,12 @@ impl<const W: usize> Motion<W> {
 
     /// The mechanism where other parts act, or on other branches.
     pub(super) fn exchange(&mut self, acting: &Acting<Digits<W>>) -> Result<(), CompileError> {
-        let set = acting.parameters != self.mechanism.acting.parameters;
         let mechanism = self.mechanism.with(acting.clone())?;
         let order = self.precision.order;
         self.series = Series::of_terms(&mechanism.terms(), self.coordinates, order);
         self.series.keep(self.kept.clone());
         self.probe = Probe::of(&mechanism, self.coordinates);
-        self.watch = std::mem::take(&mut self.watch).renewed(&mechanism, order, set);
+        self.watch = std::mem::take(&mut self.watch).renewed([&self.mechanism, &mechanism], order);
         self.branches = Branches::new(Functions::new(&mechanism.conditions, order));
         self.mechanism = mechanism;
         Ok(())

@@ -68,12 +68,12 @@ impl<const W: usize> Watch<W> {
         Self { functions, sides: vec![0; mechanism.events.len()], ..Self::default() }
     }
 
-    /// The same where the functions are those of a mechanism in which other parts act, or other parameters are
-    /// `set`, with which functions may jump.
-    pub fn renewed(self, mechanism: &ExactMechanism<Digits<W>>, order: usize, set: bool) -> Self {
-        let functions = Functions::new(&mechanism.functions, order);
-        let sides = if set { vec![0; self.sides.len()] } else { self.sides };
-        Self { functions, sides, happened: self.happened, ..Self::default() }
+    /// The same where another mechanism acts than before: functions that are others now may have jumped.
+    pub fn renewed(self, [before, now]: [&ExactMechanism<Digits<W>>; 2], order: usize) -> Self {
+        let functions = Functions::new(&now.functions, order);
+        let is_same = before.functions.iter().zip(&now.functions).map(|(before, now)| before == now);
+        let sides = self.sides.iter().zip(is_same).map(|(&side, is_same)| if is_same { side } else { 0 });
+        Self { functions, sides: sides.collect(), happened: self.happened, ..Self::default() }
     }
 
     /// Looks for what happens in a step of so many seconds; where an event changes what acts, the step is to end

@@ -19,6 +19,8 @@ use crate::dynamics::series::Constants;
 use crate::stepping::search::{Crossing, Powers, crossing};
 use crate::stepping::{Cause, StepError};
 
+/// Part of the bits carried in which an impact leaves nothing of an approach.
+const SURE: f64 = 0.5;
 /// Newton iterations at most; each doubles the digits, at a zero of higher order it adds a part of one.
 const MOST: usize = 1000;
 
@@ -130,35 +132,55 @@ pub(super) fn refined<const W: usize>(
 
 /// The jump of the rates at a wall, and at all others that are met at the same moment.
 pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(), StepError> {
-    if let Some(meeting) = Meeting::at(motion, wall) {
-        let jump = meeting.jump(motion)?;
-        jumped(motion, &jump);
+    let (gradient, approach) = gap_rate(motion, wall);
+    let several = Meeting::at(motion, wall);
+    if several.is_none() && approach >= Digits::ZERO {
         return Ok(());
     }
-    let state = motion.state.clone();
-    let (phi, omega) = motion.bodies(state.t, &state.u, &state.rate);
-    let n = phi.len();
-    let z = motion.mechanism.elements(&phi);
-    let (row, restitution) = &motion.mechanism.walls[wall];
-    let mut gradient = vec![Digits::ZERO; n];
+    let jump = match several {
+        Some(meeting) => meeting.jump(motion)?,
+        None => alone(motion, wall, &gradient, approach),
+    };
+    jumped(motion, &jump);
+    // What motors drive there no impulse turns back.
+    let (_, after) = gap_rate(motion, wall);
+    let is_left = after < Digits::ZERO && (after / approach).log2() > -SURE * motion.precision.bits as f64;
+    if is_left || !after.is_finite() {
+        let name = &motion.mechanism.walls[wall].0.name;
+        let what = format!("the constraints leave a point that meets wall {name} no way back");
+        let hint = "look for motors that drive it there and change their laws, or end the run before";
+        return Err(motion.stop(Cause::Unsuited, 0.0, &what, hint));
+    }
+    Ok(())
+}
+
+/// Gradient of the gap of a wall by all coordinates, and its rate \[m/s\].
+fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> (Vec<Digits<W>>, Digits<W>) {
+    let posture = motion.state_posture();
+    let z = motion.mechanism.elements(&posture.phi);
+    let row = &motion.mechanism.walls[wall].0;
+    let mut gradient = vec![Digits::ZERO; posture.phi.len()];
     if let Measure::Place(place) = &row.measure {
         place.slopes(&z, |k, slope| gradient[k] += slope);
     }
-    let (rate, restitution, name) = (travel_rate(row, state.t), *restitution, row.name.clone());
-    let approach = dot(&gradient, &omega) - rate;
-    if approach >= Digits::ZERO {
-        return Ok(());
-    }
-    let response = motion.keeper.response(&motion.mechanism, state.t, [&phi, &omega], &gradient);
-    let freedom = dot(&gradient, &response);
-    let impulse = -(Digits::ONE + restitution) * approach / freedom;
-    if !impulse.is_finite() {
-        let what = format!("the constraints leave the point no freedom at wall `{name}`");
-        return Err(motion.stop(Cause::Unsuited, 0.0, &what, "move the wall"));
-    }
-    let change: Vec<_> = response.iter().map(|&a| a * impulse).collect();
-    jumped(motion, &Jump { change, work: impulse * rate, walls: 1 });
-    Ok(())
+    let rate = dot(&gradient, &posture.omega) - travel_rate(row, motion.state.t);
+    (gradient, rate)
+}
+
+/// What the impulse of one wall does.
+fn alone<const W: usize>(
+    motion: &mut Motion<W>,
+    wall: usize,
+    gradient: &[Digits<W>],
+    approach: Digits<W>,
+) -> Jump<W> {
+    let (t, posture) = (motion.state.t, motion.state_posture());
+    let at = [&posture.phi[..], &posture.omega[..]];
+    let response = motion.keeper.response(&motion.mechanism, t, at, gradient);
+    let (row, restitution) = &motion.mechanism.walls[wall];
+    let impulse = -(Digits::ONE + *restitution) * approach / dot(gradient, &response);
+    let change = response.iter().map(|&a| a * impulse).collect();
+    Jump { change, work: impulse * travel_rate(row, t), walls: 1 }
 }
 
 /// What impulses do at one moment.
