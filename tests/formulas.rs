@@ -439,6 +439,50 @@ fn a_table_of_time_acts_as_its_spline() {
     assert!(wrong.contains("tables.ramp[2]") && wrong.contains("sort the points"), "{wrong}");
 }
 
+/// Laws that come to numbers, or to a parabola, are formulas where an event sets what they are made of: a torque of
+/// 1.5 N·m and then of 4.5, and a motor at (t - 1)² that goes on at 3 (t - 1)².
+#[test]
+fn an_event_sets_a_parameter_of_every_law() {
+    let event = r#""events": [{"name": "e", "when": "t - 1", "set": {"k": 3}}], "parameters": {"k": 1}"#;
+    let torque = format!(r#"{event}, "torques": [{{"name": "T", "body": "bar", "torque": "k*(1.5 N*m)"}}]"#);
+    let motor =
+        format!(r#"{event}, "motors": [{{"name": "M", "body": "bar", "law": "k*(t - 1 s)^2*(1 s^-2)"}}]"#);
+    for request in methods() {
+        let outcome = run(&scene(&rotor([0.0, 0.0], 2.0, &torque)), &request);
+        assert!((outcome.last.omega[0] - 4.0).abs() < 1e-9, "{:?}: {:?}", request.method, outcome.last);
+        let text = rotor([1.0, -2.0], 2.0, &motor);
+        let text = text.replace(r#""start": {"bar": {"phi": 1, "omega": -2}}, "#, "");
+        let outcome = run(&scene(&text), &request);
+        assert!(outcome.stop.is_none(), "{:?}", outcome.stop);
+        let last = [outcome.last.phi[0], outcome.last.omega[0]];
+        assert!((last[0] - 3.0).abs() + (last[1] - 6.0).abs() < 1e-9, "{:?}: {last:?}", request.method);
+    }
+    let factor =
+        format!(r#"{event}, "torques": [{{"name": "T", "body": "bar", "torque": 1, "law": "k*t/(1 s)"}}]"#);
+    let refused = refused(&rotor([0.0, 0.0], 2.0, &factor));
+    assert!(refused.contains("torques[0].law") && refused.contains("which an event sets"), "{refused}");
+}
+
+/// A function that is zero as a run begins has not passed it there, whichever way it goes on.
+#[test]
+fn a_function_at_zero_at_the_start_makes_no_event_there() {
+    for (phi, omega) in [(0.3, 1.0), (0.3, -1.0), (0.7, 1.0), (0.7, -1.0), (0.0, 1.0)] {
+        let events = format!(
+            r#""events": [{{"name": "e", "when": "bar.phi - {phi}"}}, {{"name": "t", "when": "sin(pi*t)"}}]"#
+        );
+        let text = rotor([phi, omega], 1.5, &events);
+        for request in methods() {
+            let outcome = run(&scene(&text), &request);
+            let names: Vec<_> = outcome.events.iter().map(|event| (event.name.as_str(), event.t)).collect();
+            assert!(
+                matches!(names[..], [("t", t)] if (t - 1.0).abs() < 1e-9),
+                "{:?} from {phi} at {omega}: {names:?}",
+                request.method
+            );
+        }
+    }
+}
+
 proptest! {
     #[test]
     fn no_text_makes_the_parser_panic(text in ".{0,200}", bytes in "[-+*/^()., a-z0-9<>=]{0,200}") {

@@ -3,7 +3,7 @@
 
 use super::many_digits::{cosine, fixed, last, near, number, one, pi, source, text, times};
 use driftless::arithmetic::Real;
-use driftless::run::digits::{LongRun, Precision, Source, long_run};
+use driftless::run::digits::{LongRun, Pair, Precision, Progress, Saved, Source, long_run};
 use driftless::stepping::Cause;
 use num_bigint::BigInt;
 
@@ -232,4 +232,54 @@ fn a_run_goes_on_with_what_acts() {
         }
     }
     assert!(rows[12].drift.abs() < 1e-56, "{:e}", rows[12].drift);
+}
+
+/// A wall that is switched on in front of which a point is not: where a ball has fallen to 4 m below the floor.
+#[test]
+fn a_wall_is_not_switched_on_in_front_of_its_point() {
+    let parts = format!(
+        r#"{}, "inactive": ["floor"], "events": [{{"name": "late", "when": "t - 1", "on": ["floor"]}}]"#,
+        floor("")
+    );
+    let mut run = begun(&source(&ball(&parts), &[], "2", "2"));
+    let stop = run.row(1, &mut || false).expect_err("a wall in front of its point");
+    assert!(stop.what.contains("floor") && stop.what.contains("behind") && stop.t == 1.0, "{stop:?}");
+}
+
+/// Runs that are interrupted again and again on their way to a row come to it all the same, to the same bits.
+#[test]
+fn a_pair_goes_on_from_the_middle_of_a_row() {
+    let parts =
+        r#""torques": [{"name": "spring", "body": "rotor", "torque": "-if(rotor.phi > 0, 9, 5)*rotor.phi"}]"#;
+    let long = source(&rotor(parts, "0", "1"), &[], "8", "8");
+    let precisions = [Precision::new(DIGITS, false), Precision::new(DIGITS + 10, false)];
+    let begun = || Pair::new(&long, &precisions).expect("two runs");
+    let rows = |pair: &mut Pair, pause: &(dyn Fn() -> bool + Sync)| {
+        let mut rows = Vec::new();
+        loop {
+            match pair.go(pause).expect("no stop") {
+                Progress::Rows(more) => rows.extend(more.into_iter().map(|(row, _)| row.bodies)),
+                Progress::Over => return (rows, true),
+                Progress::Paused => return (rows, false),
+            }
+        }
+    };
+    let (expected, _) = rows(&mut begun(), &|| false);
+    let mut saved: Option<Vec<Saved>> = None;
+    let (mut next, mut found) = (0, Vec::new());
+    for _ in 0..100 {
+        // Each step is followed by a pause, and by a new process.
+        let mut pair = begun();
+        if let Some(saved) = &saved {
+            assert!(pair.resume(saved, next));
+        }
+        let (more, is_over) = rows(&mut pair, &|| true);
+        found.extend(more);
+        if is_over {
+            break;
+        }
+        let (states, number) = pair.save();
+        (saved, next) = (Some(states.to_vec()), number);
+    }
+    assert!(found == expected, "{} rows instead of {}", found.len(), expected.len());
 }

@@ -183,7 +183,10 @@ impl ExtremesDetector {
             min: found.min,
             max: found.max,
             mean: found.integral.hi / span,
-            rms: (found.square.hi / span).max(0.0).sqrt(),
+            rms: match found.square.hi / span {
+                square if square < 0.0 => 0.0,
+                square => square.sqrt(),
+            },
         };
         outputs.heads().zip(&self.memory.found).map(extremes).collect()
     }

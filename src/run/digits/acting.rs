@@ -7,7 +7,9 @@ use super::events::Watch;
 use super::functions::Functions;
 use super::motion::Motion;
 use super::posture::Posture;
+use super::wall;
 use crate::arithmetic::digits::Digits;
+use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::CompileError;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::dynamics::series::Series;
@@ -15,6 +17,8 @@ use crate::stepping::{Cause, StepError};
 
 /// Part of the bits carried in which the laws of motors agree on both sides of a corner.
 const SAME: f64 = 0.5;
+/// How far behind a wall a point may be when it begins to stand in the way, over the size of the mechanism.
+const BEHIND: f64 = 1e-9;
 
 impl<const W: usize> Motion<W> {
     /// Lets no event end the motion; where none changes what acts, none is looked for.
@@ -53,6 +57,8 @@ impl<const W: usize> Motion<W> {
     /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.
     fn let_act(&mut self, acting: Acting<Digits<W>>) -> Result<(), StepError> {
         let before = (self.state_posture(), self.energy());
+        let walls: Vec<_> =
+            self.mechanism.walls.iter().map(|(row, _)| (self.is_off(row), row.law.clone())).collect();
         let unsuited = |motion: &Self, what: &str, hint: &str| motion.stop(Cause::Unsuited, 0.0, what, hint);
         if let Err(error) = self.exchange(&acting) {
             return Err(unsuited(self, &format!("the run cannot go on: {error}"), "look at that formula"));
@@ -60,6 +66,20 @@ impl<const W: usize> Motion<W> {
         self.state.acting = acting;
         // The next series is another one.
         self.state.radius = None;
+        for ((was_off, law), (row, _)) in walls.into_iter().zip(&self.mechanism.walls) {
+            let gap = wall::distance(self, row);
+            let has_changed = was_off || law != row.law;
+            if has_changed
+                && !self.is_off(row)
+                && gap < Digits::of(-BEHIND * self.mechanism.structure.size_of_parts())
+            {
+                let does = if was_off { "switches on" } else { "moves" };
+                let (name, by) = (&row.name, -gap.value());
+                let what = format!("an event {does} wall {name}, behind which its point is by {by:.3e} m");
+                let hint = "let the event be while the point is in front of it";
+                return Err(unsuited(self, &what, hint));
+            }
+        }
         let after = self.state_posture();
         let apart = |(a, b): (&Digits<W>, &Digits<W>)| (*a - *b).log2() - a.log2().max(0.0);
         let moved = |a: &[Digits<W>], b: &[Digits<W>]| a.iter().zip(b).map(apart).fold(f64::MIN, f64::max);

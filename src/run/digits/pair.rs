@@ -112,16 +112,17 @@ impl Pair {
         }
         let last = self.last_row().min(first + self.rows - 1);
         let begin = Instant::now();
-        let gather = |run: &mut Box<dyn LongRun>| -> Result<Option<Vec<Row>>, StepError> {
+        // Rows up to a pause, and whether there was none.
+        let gather = |run: &mut Box<dyn LongRun>| -> Result<(Vec<Row>, bool), StepError> {
             let mut rows = Vec::new();
             // An event may end the run on the way.
             for number in first..=last {
                 if number <= run.last_row() {
-                    let Some(row) = run.row(number, &mut || pause())? else { return Ok(None) };
+                    let Some(row) = run.row(number, &mut || pause())? else { return Ok((rows, false)) };
                     rows.push(row);
                 }
             }
-            Ok(Some(rows))
+            Ok((rows, true))
         };
         let found: Vec<_> = match &mut self.runs[..] {
             [only] => vec![gather(only)],
@@ -130,13 +131,20 @@ impl Pair {
                 threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
             }),
         };
-        let found: Vec<Option<Vec<Row>>> = found.into_iter().collect::<Result<_, _>>()?;
-        let Some(mut found) = found.into_iter().collect::<Option<Vec<Vec<Row>>>>() else {
-            // Where a pause comes between rows, they are done again.
-            let saved = std::mem::take(&mut self.saved);
+        let found: Vec<(Vec<Row>, bool)> = found.into_iter().collect::<Result<_, _>>()?;
+        if !found.iter().all(|(_, is_through)| *is_through) {
+            // Runs that have come to rows of which others are not through do them again; those on their way to
+            // the first one go on from there.
+            let mut saved = std::mem::take(&mut self.saved);
+            for ((run, saved), (rows, _)) in self.runs.iter().zip(&mut saved).zip(&found) {
+                if rows.is_empty() {
+                    *saved = run.save();
+                }
+            }
             self.resume(&saved, first);
             return Ok(Progress::Paused);
-        };
+        }
+        let mut found: Vec<Vec<Row>> = found.into_iter().map(|(rows, _)| rows).collect();
         self.saved = self.runs.iter().map(|run| run.save()).collect();
         self.next = self.last_row().min(last) + 1;
         let spent = begin.elapsed();

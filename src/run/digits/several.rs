@@ -11,12 +11,11 @@
 //! digits.  Walls whose point does not approach have no restitution.
 
 use super::motion::Motion;
-use super::wall::{Jump, travel_rate};
+use super::wall::{Jump, distance, travel_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::Measure;
 use crate::dynamics::kernel::dot;
-use crate::dynamics::series::Constants;
 use crate::stepping::{Cause, StepError};
 
 /// Walls that are taken at once.
@@ -52,8 +51,7 @@ impl<const W: usize> Meeting<W> {
         let t = motion.state().t;
         let touches = |&other: &usize| {
             let row = &motion.mechanism.walls[other].0;
-            let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, t));
-            let gap = (row.gap(&z) - travel).abs();
+            let gap = distance(motion, row).abs();
             let length = motion.mechanism.structure.contacts[other].length;
             other == wall || !motion.is_off(row) && gap.log2() - libm::log2(length) < rounding
         };

@@ -100,6 +100,13 @@ fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) 
     powers
 }
 
+/// The gap of a wall at the state \[m\].
+pub(super) fn distance<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) -> Digits<W> {
+    let z = motion.mechanism.elements(&motion.state_posture().phi);
+    let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, motion.state.t));
+    row.gap(&z) - travel
+}
+
 /// How fast a wall moves along its normal \[m/s\].
 pub(super) fn travel_rate<const W: usize>(row: &ConstraintEquation<Digits<W>>, t: Digits<W>) -> Digits<W> {
     row.law.as_ref().map_or(Digits::ZERO, |law| Digits::phase(law, t).rate)

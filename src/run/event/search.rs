@@ -118,10 +118,11 @@ impl EventDetector {
             if mode.is_none() && is_at_zero && *side != 0 && sign(next) == -*side {
                 all.push(Passage { t: begin, event, rises: *side < 0 });
             }
+            let begins = mode.is_none() && is_at_zero && *side == 0;
             *side = if is_at_zero || last.contains(&(event, begin)) { sign(next) } else { sign(first) };
-            // What has just left zero is not sent back by rounding.
-            let mut share = if is_woken { LEAVES } else { 0.0 };
-            if is_woken {
+            // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
+            let mut share = if is_woken || begins { LEAVES } else { 0.0 };
+            if is_woken || begins {
                 *side = sign(curve.at(share)[0]);
             }
             while let Some(zero) = root(curve, 0.0, share, 1.0) {

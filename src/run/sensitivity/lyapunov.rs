@@ -97,7 +97,7 @@ pub fn lyapunov(
         Variation::new(&mechanism, Vec::new(), Vec::new()).map_err(SensitivityError::Unsuited)?;
     let freedom = variation.span(&motion);
     if freedom == 0 {
-        let why = "the motors leave no freedom: neighbouring motions are the same";
+        let why = "the constraints leave no freedom: neighbouring motions are the same";
         return Err(SensitivityError::Unsuited(why.into()));
     }
     variation.dissipation = mechanism.is_damped().then(|| Dissipation::new(&mechanism));

@@ -3,7 +3,7 @@
 use super::at::{At, Fields, listed, nearest};
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, GROUND, PLACE, Shape, Table, kind};
-use crate::scene::locate::Value;
+use crate::scene::locate::{Node, Value};
 use crate::scene::{Bar, Place};
 use std::collections::HashMap;
 
@@ -160,4 +160,19 @@ impl<'a> Bars<'a> {
         let hint = format!("a {what} between two bars, or between a bar and the ground, can do something");
         Err(at.refuse(&problem, "the two places must be on different bodies", &hint))
     }
+}
+
+/// The parameters that events set.
+pub(super) fn set_by_events(tree: &Node) -> Vec<String> {
+    let member = |node: &Node, key: &str| match &node.value {
+        Value::Object(members) => members.iter().find(|one| one.key == key).map(|one| one.node.clone()),
+        _ => None,
+    };
+    let Some(Value::List(events)) = member(tree, "events").map(|node| node.value) else { return Vec::new() };
+    let set = events.iter().filter_map(|event| member(event, "set"));
+    set.flat_map(|set| match set.value {
+        Value::Object(members) => members.into_iter().map(|one| one.key).collect(),
+        _ => Vec::new(),
+    })
+    .collect()
 }

@@ -4,6 +4,7 @@
 //! formula of time and state, where the format takes one, stays a text for the reader of loads and events.
 
 use super::at::At;
+use super::names::set_by_events;
 use super::tables;
 use crate::scene::error::SceneError;
 use crate::scene::format::{FACTOR_LAW, Quantity, SCENE, Shape, Table, about, kind};
@@ -72,7 +73,8 @@ pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Resolved, Scen
     let tables = tables::tables(&At { source, node: tree, path: String::new() })?;
     let functions: Vec<_> = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
     let parameters = parameters(source, tree, &functions)?;
-    Resolver { source, parameters: &parameters, tables: &functions }.members(tree, &SCENE, "")?;
+    let set = set_by_events(tree);
+    Resolver { source, parameters: &parameters, tables: &functions, set }.members(tree, &SCENE, "")?;
     Ok(Resolved { parameters, tables })
 }
 
@@ -215,6 +217,8 @@ struct Resolver<'a> {
     source: &'a Source,
     parameters: &'a [Known],
     tables: &'a [Interpolant],
+    /// Parameters that events set: formulas of them, where there are laws, are more than numbers.
+    set: Vec<String>,
 }
 
 impl Resolver<'_> {
@@ -304,10 +308,22 @@ impl Resolver<'_> {
         let (values, dimensions) = self.arguments(&formula, &[("t", time)]).map_err(refused)?;
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         fits(&formula, dimension, quantity).map_err(refused)?;
+        if let (Some(name), false) = (self.is_set(&formula), is_motor) {
+            let start = formula.text().find(name).unwrap_or_default();
+            let problem = format!("speaks of {name}, which an event sets");
+            let hint = "write the force or the torque itself as a formula".to_owned();
+            return Err(refused(FormulaError::new(formula.text(), start, start + name.len(), problem, hint)));
+        }
         match formula.law(&values) {
+            _ if self.is_set(&formula).is_some() => Ok(None),
             Err(_) if is_motor => Ok(None),
             law => law.map(Some).map_err(refused),
         }
+    }
+
+    /// The first parameter of a formula that an event sets.
+    fn is_set<'b>(&self, formula: &'b Formula) -> Option<&'b str> {
+        formula.names().find(|name| self.set.iter().any(|set| set == name))
     }
 
     fn find(&self, name: &str) -> Option<&Known> {
@@ -354,7 +370,8 @@ impl Resolver<'_> {
         }
         let refused = |error: FormulaError| refused(self.source, node.span, path, &shape.allowed(), &error);
         let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
-        if matches!(shape, Shape::LawNumber(_)) && !self.knows(&formula) {
+        let is_law = !self.knows(&formula) || self.is_set(&formula).is_some();
+        if matches!(shape, Shape::LawNumber(_)) && is_law {
             return Ok(());
         }
         let (values, dimensions) = self.arguments(&formula, &[]).map_err(refused)?;
