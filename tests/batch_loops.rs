@@ -8,6 +8,7 @@ use driftless::arithmetic::{Complex, DoubleDouble};
 use driftless::dynamics::constraint::{Measure, Posture};
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, State, Time};
+use driftless::scene::{Scene, parse_scene};
 use driftless::stepping::taylor::Kernel;
 use driftless::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
 use driftless::stepping::{Integrator, Seen, Taylor, Tolerance};
@@ -24,14 +25,82 @@ const SCENES: [(&str, &str, f64, f64, f64); 6] = [
     ("quick_return", "start.link.phi", 3.21, 0.0, 0.7),
 ];
 
+/// Scenes, what is varied of their numbers, from where on and by how much, and up to when \[s\].
+const NUMBERS: [(&str, [(&str, f64, f64); 3], f64); 6] = [
+    (
+        "andrews",
+        [
+            ("springs.spring.stiffness", 4000.0, 100.0),
+            ("bars.BED.mass", 0.02, 1e-3),
+            ("torques.torque.torque", 0.03, 1e-3),
+        ],
+        0.01,
+    ),
+    (
+        "kite",
+        [
+            ("hinges.A.between[0].point[0]", 0.99, 0.004),
+            ("bars.coupler.mass", 0.8, 0.05),
+            ("gravity[1]", -9.9, 0.1),
+        ],
+        0.08,
+    ),
+    (
+        "slider_crank_torque",
+        [
+            ("hinges.A.between[0].point[0]", 0.45, 0.01),
+            ("bars.rod.inertia", 0.3, 0.01),
+            ("torques.torque.torque", 8.0, 0.5),
+        ],
+        0.6,
+    ),
+    (
+        "guided",
+        [
+            ("hinges.B.between[0].point[0]", 0.57, 0.005),
+            ("bars.bar2.density", 600.0, 20.0),
+            ("gravity[0]", 9.0, 0.1),
+        ],
+        0.25,
+    ),
+    (
+        "four_bar_motor",
+        [
+            ("motors.motor.law.rate", 6.0, 0.1),
+            ("hinges.B.between[0].point[0]", 0.89, 0.002),
+            ("bars.rocker.density", 2500.0, 50.0),
+        ],
+        0.7,
+    ),
+    (
+        "quick_return",
+        [
+            ("motors.motor.law.rate", 6.0, 0.1),
+            ("hinges.C.between[0].point[0]", 0.19, 0.002),
+            ("sliders.guide.rail.point[1]", 0.195, 0.001),
+        ],
+        0.7,
+    ),
+];
+
+/// Eleven of them, all with numbers of their own.
+fn variants((scene, varied, _): &(&str, [(&str, f64, f64); 3], f64)) -> Vec<(Arc<Mechanism>, State)> {
+    let at = |i: usize| {
+        let sets = varied.map(|(path, from, by)| format!("{path}={}", from + by * i as f64));
+        started(&shipped(scene, &sets.each_ref().map(String::as_str)))
+    };
+    (0..11).map(at).collect()
+}
+
+fn started(scene: &Scene) -> (Arc<Mechanism>, State) {
+    let mechanism = compile(scene);
+    let state = Multiplier::<0, true>::new(Arc::clone(&mechanism)).state(&mechanism.start(scene));
+    (mechanism, state)
+}
+
 /// Eleven starts of a scene.
 fn starts((scene, varied, from, by, _): (&str, &str, f64, f64, f64)) -> Vec<(Arc<Mechanism>, State)> {
-    let at = |i: usize| {
-        let scene = shipped(scene, &[&format!("{varied}={}", from + by * i as f64)]);
-        let mechanism = compile(&scene);
-        let state = Multiplier::<0, true>::new(Arc::clone(&mechanism)).state(&mechanism.start(&scene));
-        (mechanism, state)
-    };
+    let at = |i: usize| started(&shipped(scene, &[&format!("{varied}={}", from + by * i as f64)]));
     (0..11).map(at).collect()
 }
 
@@ -51,45 +120,89 @@ fn ends(batch: &Batch, mut members: Vec<BatchMember>, until: Time) -> Vec<State>
     members.into_iter().map(|member| member.state).collect()
 }
 
-#[test]
-fn loops_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
-    for scene in SCENES {
-        let (all, until) = (starts(scene), Time::from(scene.4));
-        assert!(Batch::takes_alike(&all[0].0) && !Batch::takes(&all[0].0));
-        let exact = |(mechanism, state): &(Arc<Mechanism>, State)| {
-            let (mut exact, mut statistics) = (state.clone(), Default::default());
-            let mut problem = Multiplier::<0, true>::new(Arc::clone(mechanism));
-            Taylor::reference()
-                .advance(&mut problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
-                .expect("an end");
-            exact
-        };
-        let exact: Vec<State> = all.iter().map(exact).collect();
-        for order in [16, 20, 24] {
-            let batch = at(1e-17).with_order(order);
-            let found = ends(&batch, members(&all), until);
-            let mut backwards = members(&all);
-            backwards.reverse();
-            let mut backwards = ends(&batch, backwards, until);
-            backwards.reverse();
-            assert_eq!(backwards, found);
-            assert_eq!(ends(&batch, members(&all[4..5]), until)[0], found[4]);
-            assert_eq!(ends(&batch.clone().with_kernel(Kernel::Portable), members(&all), until), found);
-            for (i, ((mechanism, _), (exact, found))) in all.iter().zip(exact.iter().zip(&found)).enumerate()
-            {
-                assert_eq!((found.time, &found.turns), (exact.time, &exact.turns));
-                let n = mechanism.bodies.len();
-                let fastest = exact.y[n..2 * n].iter().fold(1.0, |most: f64, rate| most.max(rate.abs()));
-                // Angles, rates and work.
-                for k in 0..=2 * n {
-                    let energy = mechanism.energy_scale.max(exact.y[2 * n].abs());
-                    let scale = [1.0, fastest, energy][(k / n).min(2)];
-                    let error = (found.unknown(k) - exact.unknown(k)).hi.abs() / scale;
-                    assert!(error < 1e-12, "{} {i}, order {order}, unknown {k}: {error:e}", scene.0);
-                }
+/// Integrates all against double-double, in order and backwards, one alone, and without the processor's
+/// vectors.
+fn agree_with_double_double(scene: &str, all: &[(Arc<Mechanism>, State)], until: f64) {
+    let until = Time::from(until);
+    let exact = |(mechanism, state): &(Arc<Mechanism>, State)| {
+        let (mut exact, mut statistics) = (state.clone(), Default::default());
+        let mut problem = Multiplier::<0, true>::new(Arc::clone(mechanism));
+        Taylor::reference()
+            .advance(&mut problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
+            .expect("an end");
+        exact
+    };
+    let exact: Vec<State> = all.iter().map(exact).collect();
+    for order in [16, 20, 24] {
+        let batch = at(1e-17).with_order(order);
+        let found = ends(&batch, members(all), until);
+        let mut backwards = members(all);
+        backwards.reverse();
+        let mut backwards = ends(&batch, backwards, until);
+        backwards.reverse();
+        assert_eq!(backwards, found);
+        assert_eq!(ends(&batch, members(&all[4..5]), until)[0], found[4]);
+        assert_eq!(ends(&batch.clone().with_kernel(Kernel::Portable), members(all), until), found);
+        for (i, ((mechanism, _), (exact, found))) in all.iter().zip(exact.iter().zip(&found)).enumerate() {
+            assert_eq!((found.time, &found.turns), (exact.time, &exact.turns));
+            let n = mechanism.bodies.len();
+            let fastest = exact.y[n..2 * n].iter().fold(1.0, |most: f64, rate| most.max(rate.abs()));
+            // Angles, rates and work.
+            for k in 0..=2 * n {
+                let energy = mechanism.energy_scale.max(exact.y[2 * n].abs());
+                let scale = [1.0, fastest, energy][(k / n).min(2)];
+                let error = (found.unknown(k) - exact.unknown(k)).hi.abs() / scale;
+                assert!(error < 1e-12, "{scene} {i}, order {order}, unknown {k}: {error:e}");
             }
         }
     }
+}
+
+#[test]
+fn loops_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
+    for scene in SCENES {
+        let all = starts(scene);
+        assert!(Batch::takes_alike(&all[0].0) && !Batch::takes(&all[0].0));
+        agree_with_double_double(scene.0, &all, scene.4);
+    }
+}
+
+/// The same loops with other lengths, masses, springs, torques and motors for every trajectory, and those of
+/// two scenes in one batch.
+#[test]
+fn loops_with_numbers_of_their_own_agree_with_double_double_whoever_is_beside_them() {
+    for scene in &NUMBERS {
+        let all = variants(scene);
+        assert!(all.iter().all(|(mechanism, _)| Batch::takes_own_numbers(mechanism)));
+        agree_with_double_double(scene.0, &all, scene.2);
+    }
+    let mixed = [variants(&NUMBERS[1]), starts(SCENES[1]), variants(&NUMBERS[4])].concat();
+    let integrated = |few: &[(Arc<Mechanism>, State)]| -> Vec<State> {
+        let mut members = members(few);
+        at(1e-9).integrate(&mut members, Time::from(0.08), &mut |_, _| Going::On);
+        members.into_iter().map(|member| member.state).collect()
+    };
+    for (i, found) in integrated(&mixed).iter().enumerate() {
+        assert_eq!((integrated(&mixed[i..=i])[0].clone(), found.time.hi), (found.clone(), 0.08), "{i}");
+    }
+}
+
+/// A motor on the first bar and a torsion spring between both, which counts turns: the motor's angle is kept
+/// by a multiplier.
+#[test]
+fn motors_beside_torsion_springs_agree_with_double_double() {
+    let at = |i: usize| {
+        let mut text: serde_json::Value =
+            serde_json::from_str(include_str!("../examples/scenes/motor.json")).expect("JSON");
+        text["torsion_springs"] = serde_json::json!([{"name": "t", "body": "bar2", "relative_to": "bar1",
+            "stiffness": 0.2 + 0.02 * i as f64, "free_angle": 0.3, "damping": 0.01}]);
+        text["motors"][0]["law"]["rate"] = serde_json::json!(3.0 + 0.2 * i as f64);
+        started(&parse_scene(&text.to_string(), "wound", &[]).expect("a scene"))
+    };
+    let all: Vec<_> = (0..11).map(at).collect();
+    assert!(all.iter().all(|(mechanism, _)| mechanism.has_multipliers() && !mechanism.has_closed_loops()));
+    assert!(all.iter().all(|(mechanism, _)| Batch::takes_own_numbers(mechanism)));
+    agree_with_double_double("motor and torsion spring", &all, 1.0);
 }
 
 /// The largest violation of a constraint at both levels, over its longest lever and that at the fastest rate.
@@ -120,25 +233,34 @@ fn violation(mechanism: &Mechanism, t: Time, ends: &dyn Fn(usize) -> [f64; 2]) -
 fn every_step_ends_on_the_constraints() {
     for scene in SCENES {
         let all = starts(scene);
-        for tolerance in [1e-4, 1e-9, 1e-15] {
-            let mut steps = 0;
-            at(tolerance).integrate(&mut members(&all), Time::from(scene.4), &mut |k, passage| {
-                let t = passage.from + passage.step;
-                let [position, rate] = violation(&all[k].0, t, &|body| passage.ends(body)[1]);
-                assert!(position < 2e-15 && rate < 4e-15, "{}: {position:e} {rate:e}", scene.0);
-                steps += 1;
-                Going::On
-            });
-            assert!(steps >= 22, "{} at {tolerance:e}: {steps}", scene.0);
-        }
+        end_on_the_constraints(scene.0, &all, scene.4);
+    }
+    for scene in &NUMBERS {
+        end_on_the_constraints(scene.0, &variants(scene), scene.2);
+    }
+}
+
+fn end_on_the_constraints(scene: &str, all: &[(Arc<Mechanism>, State)], until: f64) {
+    for tolerance in [1e-4, 1e-9, 1e-15] {
+        let mut steps = 0;
+        at(tolerance).integrate(&mut members(all), Time::from(until), &mut |k, passage| {
+            let t = passage.from + passage.step;
+            let [position, rate] = violation(&all[k].0, t, &|body| passage.ends(body)[1]);
+            assert!(position < 2e-15 && rate < 4e-15, "{scene}: {position:e} {rate:e}");
+            steps += 1;
+            Going::On
+        });
+        assert!(steps >= 22, "{scene} at {tolerance:e}: {steps}");
     }
 }
 
 /// At a loose tolerance steps end far from the constraints, some farther than others.
 #[test]
 fn neighbours_do_not_matter_however_far_a_step_ends_from_the_constraints() {
-    for scene in SCENES {
-        let (all, until) = (starts(scene), Time::from(scene.4));
+    let of_one = SCENES.map(|scene| (scene.0, starts(scene), scene.4));
+    let of_many = NUMBERS.each_ref().map(|scene| (scene.0, variants(scene), scene.2));
+    for (scene, all, until) in of_one.into_iter().chain(of_many) {
+        let until = Time::from(until);
         let integrated = |batch: &Batch, few: &[(Arc<Mechanism>, State)]| -> Vec<State> {
             let mut members = members(few);
             batch.integrate(&mut members, until, &mut |_, _| Going::On);
@@ -147,7 +269,7 @@ fn neighbours_do_not_matter_however_far_a_step_ends_from_the_constraints() {
         let together = integrated(&at(1e-3), &all);
         assert_eq!(integrated(&at(1e-3).with_kernel(Kernel::Portable), &all), together);
         for i in 0..all.len() {
-            assert_eq!(integrated(&at(1e-3), &all[i..=i])[0], together[i], "{} {i}", scene.0);
+            assert_eq!(integrated(&at(1e-3), &all[i..=i])[0], together[i], "{scene} {i}");
         }
     }
 }
@@ -205,19 +327,24 @@ fn a_four_bar_is_where_trigonometry_has_it_with_the_energy_it_began_with() {
 /// The kite folds into a line; nothing of a step near there is made in lanes, and nobody beside is disturbed.
 #[test]
 fn a_trajectory_leaves_the_lanes_before_a_singular_position() {
-    let all = starts(("kite", "start.crank.omega", 7.0, 0.11, 0.0));
+    let heavier =
+        [("bars.coupler.mass", 0.5, 0.1), ("bars.rocker.inertia", 0.5, 0.03), ("gravity[1]", -9.9, 0.1)];
     let until = Time::from(2.0);
     let integrated = |few: &[(Arc<Mechanism>, State)]| {
         let mut members = members(few);
         at(1e-12).integrate(&mut members, until, &mut |_, _| Going::On);
         members.into_iter().map(|member| (member.has_left, member.stopped.is_none(), member.state)).collect()
     };
-    let together: Vec<(bool, bool, State)> = integrated(&all);
-    for (i, (has_left, is_sound, state)) in together.iter().enumerate() {
-        assert!(has_left & is_sound && state.time < until && state.time.hi > 0.05, "{i}: {state:?}");
-        let [position, rate] = violation(&all[i].0, state.time, &|body| [state.y[body], state.y[3 + body]]);
-        assert!(position < 2e-15 && rate < 4e-15, "{i}: {position:e} {rate:e}");
-        assert_eq!(integrated(&all[i..=i])[0].2, *state);
+    let of_one = starts(("kite", "start.crank.omega", 7.0, 0.11, 0.0));
+    for all in [of_one, variants(&("kite", heavier, 0.0))] {
+        let together: Vec<(bool, bool, State)> = integrated(&all);
+        for (i, (has_left, is_sound, state)) in together.iter().enumerate() {
+            assert!(has_left & is_sound && state.time < until && state.time.hi > 0.05, "{i}: {state:?}");
+            let ends = |body: usize| [state.y[body], state.y[3 + body]];
+            let [position, rate] = violation(&all[i].0, state.time, &ends);
+            assert!(position < 2e-15 && rate < 4e-15, "{i}: {position:e} {rate:e}");
+            assert_eq!(integrated(&all[i..=i])[0].2, *state);
+        }
     }
 }
 

@@ -272,23 +272,26 @@ fn loops_with_redundant_constraints_are_in_lanes() {
             hinge("b", 0.5),
             hinge("c", 1.0)
         );
-        let vary: Vec<Vary> = vec!["a.omega=0..1:11".parse().expect("a range")];
-        let template = Template::new(text, "cranks".into(), &[]);
-        let plan = Sweep::new(&template, vary, &request("taylor", 1.0)).expect("a sweep");
-        assert_eq!(plan.mechanism().redundant().len(), 1);
-        assert!(Batch::takes_alike(plan.mechanism()));
-        let inertia = 3.0 * (0.02 + 0.01) + 2.0 * 0.04;
-        for point in points(&plan, 1) {
-            let omega = point.values[0];
-            let (phi, rate) = (0.5 + omega + 0.015 / inertia, omega + 0.03 / inertia);
-            for k in 0..3 {
-                assert!(
-                    (point.phi[k] - phi).abs() < 1e-10 && (point.omega[k] - rate).abs() < 1e-10,
-                    "{point:?}"
-                );
+        // Starts, and the mass of the bar.
+        let vary = |range: &str| vec![range.parse().expect("a range")];
+        for (vary, masses) in [(vary("a.omega=0..1:11"), false), (vary("bars.bar.mass=1..3:11"), true)] {
+            let template = Template::new(text.clone(), "cranks".into(), &[]);
+            let plan = Sweep::new(&template, vary, &request("taylor", 1.0)).expect("a sweep");
+            assert_eq!(plan.mechanism().redundant().len(), 1);
+            assert!(Batch::takes_alike(plan.mechanism()));
+            for point in points(&plan, 1) {
+                let (omega, mass) = if masses { (0.0, point.values[0]) } else { (point.values[0], 2.0) };
+                let inertia = 3.0 * (0.02 + 0.01) + mass * 0.04;
+                let (phi, rate) = (0.5 + omega + 0.015 / inertia, omega + 0.03 / inertia);
+                for k in 0..3 {
+                    assert!(
+                        (point.phi[k] - phi).abs() < 1e-10 && (point.omega[k] - rate).abs() < 1e-10,
+                        "{point:?}"
+                    );
+                }
+                let [position, rate] = point.constraint.expect("constraints");
+                assert!(point.energy < 1e-12 && position < 1e-15 && rate < 1e-14, "{point:?}");
             }
-            let [position, rate] = point.constraint.expect("constraints");
-            assert!(point.energy < 1e-12 && position < 1e-15 && rate < 1e-14, "{point:?}");
         }
     }
 }

@@ -8,8 +8,8 @@ mod factor;
 mod landing;
 mod number;
 
-pub use self::constants::are_alike;
 use self::constants::{LaneConstants, TermSet};
+pub use self::constants::{are_alike, are_equal};
 use self::landing::{Land, Regularity};
 use self::number::InLanes;
 use super::Series;
@@ -32,7 +32,7 @@ pub struct Landing<'a> {
     /// Which lanes there are motions in; the others stay where they are.
     pub is_going: [bool; LANES],
     /// What rates count as at least \[rad/s\].
-    pub unit: f64,
+    pub unit: Octet,
 }
 
 /// Powers of eight motions.
@@ -92,6 +92,10 @@ impl WideCode for Room<'_> {
         let f = series.coordinates();
         let is_asked = series.is_tied || !self.mechanism.contacts.is_empty();
         let room = || vec![InLanes::ZERO; f];
+        let mut regularity = Regularity::new(series.rows.count(), f);
+        if !series.rows.is_empty() {
+            (0..LANES).for_each(|lane| regularity.take_in(lane, self.mechanism));
+        }
         Box::new(Whole {
             begin: [room(), room(), room()],
             rates: vec![Octet::default(); (self.order + 1) * f],
@@ -99,7 +103,7 @@ impl WideCode for Room<'_> {
             // Where they are not the coordinates' rates, or asked for at every step.
             omega: vec![Octet::default(); if is_asked { series.omega.len() } else { 0 }],
             units: vec![[Octet::default(); 2]; series.elements],
-            regularity: Regularity::new(series.rows.levers()),
+            regularity,
             constants,
             terms,
             series,
@@ -186,6 +190,9 @@ impl<W: EightLanes> SeriesInLanes for Whole<W> {
         if self.constants.put(lane, mechanism) {
             self.terms = self.constants.terms(mechanism);
             self.series = series(&self.terms, mechanism, self.series.order());
+        }
+        if !self.series.rows.is_empty() {
+            self.regularity.take_in(lane, mechanism);
         }
     }
 

@@ -12,7 +12,10 @@
 //! of earlier multipliers with later powers of z enter through the loads like those of any force.
 
 mod bordered;
+mod measures;
 
+pub use self::measures::RowMeasures;
+use self::measures::{in_force, measures};
 use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::{copy, zeros};
@@ -22,7 +25,7 @@ use crate::dynamics::constraint::{ConstraintEquation, Measure};
 use crate::dynamics::law::Law;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::quadratic::Quadratic;
-use crate::dynamics::rank::{Levers, Metric};
+use crate::dynamics::rank::Metric;
 use crate::dynamics::recursive::Evaluation;
 use crate::dynamics::schur::{self, NEAR, Weakest};
 use crate::dynamics::tree;
@@ -37,7 +40,7 @@ pub struct RowSeries<T: SeriesNumber> {
     minv_jt: Vec<T>,
     schur: Vec<T>,
     pivot: Vec<T>,
-    /// What pivots are measured against (r).
+    /// What pivots are measured against (r), where rows may be left out.
     scale: Vec<f64>,
     /// What the rank of the rows is measured with.
     metric: Metric,
@@ -126,14 +129,11 @@ impl<T: SeriesNumber> RowSeries<T> {
                     .map(|aim| Box::new(AimSeries::new(aim, mechanism.bodies.len(), order))),
             }),
         };
-        let in_force = || mechanism.constraints.iter().filter(|row| !(row.is_angle() && partition.driven()));
-        let scale = in_force().map(|row| row.scale(&mechanism.tree)).collect();
-        let size = mechanism.size_of_parts();
-        let base = |(k, b): (usize, f64)| partition.bodies[k].base.map(|base| (base, b));
-        let levers: Vec<Levers> =
-            in_force().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
-        let works = in_force().map(ConstraintEquation::is_motor).collect();
-        let metric = Metric::new(&levers, partition.count(), mechanism.assembly.redundant.len());
+        let in_force = in_force(mechanism, partition);
+        let works = in_force.iter().map(|row| row.is_motor()).collect();
+        // Where each lane has its own, whoever looks at the pivots has them.
+        let (scale, metric) =
+            if T::HAS_BORDER { Default::default() } else { measures(mechanism, partition, &in_force) };
         let kinds: Vec<Kind<T>> = terms.constraints.iter().filter_map(kind).collect();
         let (r, f) = (kinds.len(), partition.count());
         let matrix = |size: usize| zeros(if is_dense { size } else { 0 });

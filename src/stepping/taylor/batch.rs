@@ -1,5 +1,6 @@
 //! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs or without, or of
-//! two of which one is driven; and ensembles of one mechanism, any hinge tree, with closed loops or without.
+//! two of which one is driven; and ensembles of mechanisms of one structure, any hinge tree, with closed loops
+//! or without.
 //!
 //! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
 //! every lane has its own step, its own time, its own constants of the mechanism, and takes in the next
@@ -30,8 +31,11 @@ use self::vectors::{added, load, moved, root, store, unit};
 use super::{JUDGES, Kernel, Taylor, stop};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
+use crate::dynamics::looped::reduced;
+use crate::dynamics::natural::Reduced;
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
+use std::cell::OnceCell;
 
 /// Largest order there is room for.
 const MOST: usize = 24;
@@ -57,12 +61,21 @@ pub struct BatchMember<'a> {
     /// where that step begins, to be taken on by [`Taylor`](super::Taylor) with projection, or through the
     /// impact.
     pub has_left: bool,
+    /// The mechanism in natural coordinates, once it has been asked for.
+    reduced: OnceCell<Option<Box<Reduced>>>,
 }
 
 impl<'a> BatchMember<'a> {
     /// A trajectory about to start.
     pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
-        Self { mechanism, state, statistics: Statistics::default(), stopped: None, has_left: false }
+        let (statistics, reduced) = (Statistics::default(), OnceCell::new());
+        Self { mechanism, state, statistics, stopped: None, has_left: false, reduced }
+    }
+
+    /// The matrices of its mechanism in natural coordinates, without redundant rows, where there are any.
+    fn reduced(&self) -> Option<&Reduced> {
+        let find = || reduced(&self.mechanism.without_redundant_rows()).map(Box::new);
+        self.reduced.get_or_init(find).as_deref()
     }
 }
 
@@ -120,25 +133,23 @@ impl Batch {
         let springs = mechanism.springs.len();
         let is_of_few = (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS;
         goes_on(mechanism)
-            && (is_of_few && free::fits(mechanism)
-                || DrivenTeam::fits(mechanism, mechanism)
-                || SwingingTeam::fits(mechanism, mechanism))
+            && (is_of_few && free::fits(mechanism) || driven::fits(mechanism) || swinging::fits(mechanism))
     }
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
-    /// equal: trees of up to 12 bodies, hinged off their axes or floating, torsion springs, applied forces,
-    /// motors on angles, springs beside them, walls, all by smooth formulas or without, and no friction; and
-    /// the same with closed loops and sliders, their states in the form of
-    /// [`Multiplier`](crate::dynamics::multiplier::Multiplier).
+    /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off their
+    /// axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls, all by
+    /// smooth formulas or without, and no friction; and the same with closed loops and sliders, their states in
+    /// the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         goes_on(mechanism) && trees::fits(mechanism)
     }
 
-    /// True for those of the latter whose trajectories may have numbers of their own: hinge trees.  Beside each
-    /// other are mechanisms that differ in nothing but their numbers, and have the same ones zero; numbers in
-    /// laws of motors by formulas are equal.
+    /// True for those of the latter whose trajectories may have numbers of their own: all of them, with closed
+    /// loops or without.  Beside each other are mechanisms that differ in nothing but their numbers, have the
+    /// same ones zero and the same redundant constraints; numbers in laws of motors by formulas are equal.
     pub fn takes_own_numbers(mechanism: &Mechanism) -> bool {
-        Self::takes_alike(mechanism) && trees::is_tree(mechanism)
+        Self::takes_alike(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and
@@ -165,11 +176,12 @@ impl Batch {
             let like = members[next].mechanism;
             macro_rules! try_teams {
                 ($($team:ty),*) => {$(
-                    if goes_on(like) && <$team>::fits(like, like) {
-                        let fits = |one: &Mechanism| {
-                            std::ptr::eq(one, like) || goes_on(one) && <$team>::fits(one, like)
+                    if goes_on(like) && <$team>::fits(&members[next], &members[next]) {
+                        let fits = |one: &BatchMember| {
+                            let is_same = std::ptr::eq(one.mechanism, like);
+                            is_same || goes_on(one.mechanism) && <$team>::fits(one, &members[next])
                         };
-                        let fits: Vec<bool> = members.iter().map(|member| fits(member.mechanism)).collect();
+                        let fits: Vec<bool> = members.iter().map(fits).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
                         self.integrate_those::<$team>(like, &fits, members, until, (&mut *watch, &mut *alone));
                         continue;
@@ -212,8 +224,8 @@ trait Team {
     /// Empty lanes for mechanisms that fit beside this one, for series up to an order.
     fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self;
 
-    /// True for a mechanism of this kind that can be beside another one of this kind.
-    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool;
+    /// True for a trajectory of a mechanism of this kind that can be beside another one of this kind.
+    fn fits(member: &BatchMember, like: &BatchMember) -> bool;
 
     /// Puts a trajectory into a lane; returns the longest step of an order in which the terms left out still
     /// fall \[s\].

@@ -57,13 +57,23 @@ impl<C: Real> TermSet<C> {
     }
 }
 
-/// True for mechanisms that differ in their constants alone, of which the same are zero.
+/// True for mechanisms with the same terms and walls: what starts and energies are measured by may differ.
+pub fn are_equal(one: &Mechanism, other: &Mechanism) -> bool {
+    (&one.tree, &one.partition, &one.springs) == (&other.tree, &other.partition, &other.springs)
+        && (&one.constraints, &one.forces) == (&other.constraints, &other.forces)
+        && (&one.torsions, &one.actions) == (&other.torsions, &other.actions)
+        && one.contacts == other.contacts
+        && one.assembly.redundant == other.assembly.redundant
+}
+
+/// True for mechanisms that differ in their constants alone, of which the same are zero, as the same rows
+/// follow from others.
 pub fn are_alike(one: &Mechanism, other: &Mechanism) -> bool {
     let of = |constant: f64| if constant == 0.0 { 0.0 } else { 1.0 };
     let wall = |wall: &Contact| (equation(&wall.row, &mut { of }), wall.on, wall.is_off);
     let walls = |mechanism: &Mechanism| mechanism.contacts.iter().map(wall).collect::<Vec<_>>();
     let skeleton = |mechanism: &Mechanism| (TermSet::map(mechanism, of), walls(mechanism));
-    skeleton(one) == skeleton(other)
+    one.assembly.redundant == other.assembly.redundant && skeleton(one) == skeleton(other)
 }
 
 /// The constants of eight mechanisms of one structure.

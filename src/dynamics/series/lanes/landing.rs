@@ -4,12 +4,14 @@
 //! the shortest way in the metric of the mass matrix, with the factors of the step's end.  Every motion is
 //! moved as often as it needs by itself, so that none depends on the others.
 
+use super::super::rows::RowMeasures;
 use super::super::{Series, Terms};
 use super::number::InLanes;
 use super::{Landing, Times};
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Task};
+use crate::dynamics::Mechanism;
 use crate::dynamics::schur::NEAR;
 
 /// Rounds of one level, at most.
@@ -28,7 +30,12 @@ const LOSS: f64 = 1e-3;
 /// How near the lanes are to where constraints lose their independence.
 #[derive(Clone, Debug, Default)]
 pub struct Regularity {
-    levers: Vec<f64>,
+    /// One over the longest levers of the rows \[1/m; 1 of an angle\].
+    per_lever: Vec<Octet>,
+    /// What pivots of S are measured against, D, and what pivots of J D Jᵀ are measured against.
+    scale: Vec<Octet>,
+    columns: Vec<Octet>,
+    rows: Vec<Octet>,
     /// J D Jᵀ and its reciprocal pivots.
     rank: Vec<Octet>,
     /// Reciprocal shares of the weakest pivots of S and of J D Jᵀ, and M's diagonal over its pivots.
@@ -36,10 +43,27 @@ pub struct Regularity {
 }
 
 impl Regularity {
-    /// For constraints with these levers.
-    pub fn new(levers: Vec<f64>) -> Self {
-        let r = levers.len();
-        Self { rank: vec![Octet::default(); r * r], levers, ..Self::default() }
+    /// For so many constraints of so many coordinates.
+    pub fn new(r: usize, f: usize) -> Self {
+        let room = |size: usize| vec![Octet::default(); size];
+        Self {
+            per_lever: room(r),
+            scale: room(r),
+            columns: room(f),
+            rows: room(r),
+            rank: room(r * r),
+            ..Self::default()
+        }
+    }
+
+    /// Puts what the constraints of a mechanism are measured with into a lane.
+    pub fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
+        let RowMeasures { levers, scale, columns, rows } = RowMeasures::of(mechanism);
+        let per_lever = levers.into_iter().map(|lever| 1.0 / lever).collect();
+        let all = [&mut self.per_lever, &mut self.scale, &mut self.columns, &mut self.rows];
+        for (octets, own) in all.into_iter().zip([per_lever, scale, columns, rows]) {
+            octets.iter_mut().zip(own).for_each(|(octet, own): (&mut Octet, f64)| octet.0[lane] = own);
+        }
     }
 
     /// True where the constraints of a lane are independent, and doubles are enough for them; what is not a
@@ -53,12 +77,12 @@ impl Regularity {
     /// Looks at the factors at hand.
     #[inline(always)]
     pub fn look<W: EightLanes>(&mut self, series: &Series<InLanes<W>>, diagonal: &[InLanes<W>]) {
-        let [mass, columns, rows] = series.rows.scales();
+        let Self { scale, columns, rows, rank, .. } = self;
         let [jacobian, pivot] = series.rows.factors();
-        let (r, f) = (mass.len(), columns.len());
+        let (r, f) = (scale.len(), columns.len());
         let (mut weakest, mut deepest) = (W::ZERO, W::ZERO);
         for i in 0..r {
-            weakest = pivot[i].0.mul(W::splat(mass[i])).larger(weakest);
+            weakest = pivot[i].0.mul(W::of(&scale[i].0)).larger(weakest);
         }
         for c in 0..f {
             deepest = series.pivot[c].0.mul(diagonal[c].0).larger(deepest);
@@ -67,22 +91,22 @@ impl Regularity {
             for j in i..r {
                 let mut sum = W::ZERO;
                 for c in 0..f {
-                    let product = jacobian[i * f + c].0.mul(W::splat(columns[c]));
+                    let product = jacobian[i * f + c].0.mul(W::of(&columns[c].0));
                     sum = product.mul_add(jacobian[j * f + c].0, sum);
                 }
-                self.rank[i * r + j] = Octet(sum.array());
+                rank[i * r + j] = Octet(sum.array());
             }
         }
         let mut dependent = W::ZERO;
         for k in (0..r).rev() {
-            let reciprocal = W::ONE.div(W::of(&self.rank[k * r + k].0));
-            dependent = reciprocal.mul(W::splat(rows[k])).larger(dependent);
+            let reciprocal = W::ONE.div(W::of(&rank[k * r + k].0));
+            dependent = reciprocal.mul(W::of(&rows[k].0)).larger(dependent);
             for i in 0..k {
-                let part = W::of(&self.rank[i * r + k].0).mul(reciprocal);
+                let part = W::of(&rank[i * r + k].0).mul(reciprocal);
                 for j in 0..=i {
-                    let full = W::of(&self.rank[j * r + k].0);
-                    let left = full.neg_mul_add(part, W::of(&self.rank[j * r + i].0));
-                    self.rank[j * r + i] = Octet(left.array());
+                    let full = W::of(&rank[j * r + k].0);
+                    let left = full.neg_mul_add(part, W::of(&rank[j * r + i].0));
+                    rank[j * r + i] = Octet(left.array());
                 }
             }
         }
@@ -155,7 +179,7 @@ impl<W: EightLanes> Task for Land<'_, '_, W> {
             let violations = series.rows.violations(&series.z[..f]);
             let mut worst = W::ZERO;
             for i in 0..violations.len() {
-                worst = violations[i].0.mul(W::splat(1.0 / regularity.levers[i])).larger(worst);
+                worst = violations[i].0.mul(W::of(&regularity.per_lever[i].0)).larger(worst);
             }
             if !sieve.sift(&worst.array(), ROUNDING) {
                 break;
@@ -180,14 +204,14 @@ impl<W: EightLanes> Task for Land<'_, '_, W> {
         series.rows.linearise(&series.z[..f]);
         let mut sieve = Sieve::new(is_landed);
         for _ in 0..SWEEPS {
-            let mut fastest = W::splat(unit);
+            let mut fastest = W::of(&unit.0);
             for c in 0..f {
                 fastest = rate[c].0.larger(fastest);
             }
             let slips = series.rows.slips(rate);
             let mut worst = W::ZERO;
             for i in 0..slips.len() {
-                worst = slips[i].0.mul(W::splat(1.0 / regularity.levers[i])).larger(worst);
+                worst = slips[i].0.mul(W::of(&regularity.per_lever[i].0)).larger(worst);
             }
             if !sieve.sift(&worst.div(fastest).array(), ROUNDING) {
                 break;

@@ -20,24 +20,9 @@ use crate::dynamics::series::order::rows_times;
 use crate::dynamics::tree;
 
 impl<T: SeriesNumber> RowSeries<T> {
-    /// The longest lever of every row \[m; 1 where it gives an angle\].
-    pub fn levers(&self) -> Vec<f64> {
-        let value = |constant: &T::Constant| crate::arithmetic::Real::value(*constant);
-        let lever = |kind: &Kind<T>| match kind {
-            Kind::Angle { .. } => 1.0,
-            Kind::Place { place, .. } => {
-                let linear = place.linear.iter().map(|(_, g)| g);
-                let all = linear.chain(place.bilinear.iter().map(|(_, _, h)| h));
-                all.map(|g| libm::hypot(value(&g.re), value(&g.im))).fold(0.0, f64::max)
-            }
-        };
-        self.kinds.iter().map(lever).collect()
-    }
-
-    /// What pivots of S are measured against, and D and what pivots of J D Jᵀ are measured against (see
-    /// [`Metric`](crate::dynamics::rank::Metric)).
-    pub fn scales(&self) -> [&[f64]; 3] {
-        [&self.scale, &self.metric.columns, &self.metric.rows]
+    /// Number of rows in force.
+    pub fn count(&self) -> usize {
+        self.kinds.len()
     }
 
     /// J (r × f), and the reciprocal pivots of S.

@@ -118,6 +118,11 @@ impl DrivenTeam {
     }
 }
 
+/// True for mechanisms of this kind.
+pub(super) fn fits(mechanism: &Mechanism) -> bool {
+    Driven::of(mechanism).is_some() && mechanism.contacts.is_empty()
+}
+
 impl Team for DrivenTeam {
     fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         let zero = Octet::splat(0.0);
@@ -137,8 +142,8 @@ impl Team for DrivenTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, _: &Mechanism) -> bool {
-        Driven::of(mechanism).is_some() && mechanism.contacts.is_empty()
+    fn fits(member: &BatchMember, _: &BatchMember) -> bool {
+        fits(member.mechanism)
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {

@@ -66,7 +66,8 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
         }
     }
 
-    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
+    fn fits(member: &BatchMember, like: &BatchMember) -> bool {
+        let (mechanism, like) = (member.mechanism, like.mechanism);
         mechanism.tree.coordinates == N
             && SPRUNG != mechanism.springs.is_empty()
             && mechanism.springs.len() <= SPRINGS

@@ -1,4 +1,4 @@
-//! Bodies with closed loops, in natural coordinates, all lanes of equal mechanisms.
+//! Bodies with closed loops, in natural coordinates, all lanes of mechanisms with one structure.
 //!
 //! The recurrence and the way back of [`looped`](super::super::looped), with the lanes over trajectories; the
 //! matrices of the step's start stand between an order and the next, of which P is the square of a vector
@@ -25,6 +25,8 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{Complex, angle};
 use crate::dynamics::force::action::Kind;
+use crate::dynamics::natural::Reduced;
+use crate::dynamics::series::lanes::{are_alike, are_equal};
 use crate::dynamics::{self, Mechanism, State};
 use std::f64::consts::{PI, TAU};
 
@@ -32,17 +34,29 @@ const ZERO: Octet = Octet([0.0; LANES]);
 /// Powers of z there is room for, body by body.
 const ROOM: usize = MOST + 2;
 
+/// x and y of a vector in every lane.
+type Pair = [Octet; 2];
+const PAIR: Pair = [ZERO; 2];
+
+/// Puts a vector into a lane.
+fn put(pair: &mut Pair, lane: usize, vector: Complex<f64>) {
+    (pair[0].0[lane], pair[1].0[lane]) = (vector.re, vector.im);
+}
+
 /// The mechanism, states and coefficients of the trajectories in the lanes.
 #[derive(Debug)]
 pub(super) struct LoopTeam {
     count: usize,
-    /// The longest step \[s\].
-    longest: f64,
+    /// What the lanes hold to begin with, and which hold other constants.
+    like: Mechanism,
+    has_others: [bool; LANES],
+    /// Where the mechanisms of the trajectories in the lanes are, to tell one from another.
+    present: [Option<usize>; LANES],
     matrices: Matrices,
     /// Gravity and constant forces on every element, the share of the latter, and constant torques \[N·m\].
-    weight: Vec<Complex<f64>>,
-    applied: Vec<Complex<f64>>,
-    torque: Vec<f64>,
+    weight: Vec<Pair>,
+    applied: Vec<Pair>,
+    torque: Vec<Octet>,
     springs: Vec<Spring>,
     /// Leading parts of angles, rates and work (2n + 1), what they leave out, and both where the step began.
     high: Vec<Octet>,
@@ -78,29 +92,18 @@ fn fits(mechanism: &Mechanism) -> bool {
 
 impl Team for LoopTeam {
     fn new(like: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
-        let like = &*like.without_redundant_rows();
         let n = like.bodies.len();
-        let reduced = dynamics::looped::reduced(like);
-        let (mut applied, mut torque) = (vec![Complex::ZERO; n], vec![0.0; n]);
-        for action in &like.actions {
-            match &action.kind {
-                Kind::Force { point, force, .. } => point.spread(*force, |k, force| applied[k] += force),
-                Kind::Torque { torque: value, base } => {
-                    torque[action.body] += value;
-                    if let Some(base) = base {
-                        torque[*base] -= value;
-                    }
-                }
-            }
-        }
+        let reduced = dynamics::looped::reduced(&like.without_redundant_rows());
         let room = |size: usize| vec![ZERO; size];
-        Self {
+        let mut team = Self {
             count: n,
-            longest: libm::exp2(30.0) * like.units.time,
+            like: like.clone(),
+            has_others: [false; LANES],
+            present: [None; LANES],
             matrices: Matrices::new(reduced.as_ref(), n, like.assembly.degrees_of_freedom == 1),
-            weight: like.tree.weight.iter().zip(&applied).map(|(&gravity, &force)| gravity + force).collect(),
-            applied,
-            torque,
+            weight: vec![PAIR; n],
+            applied: vec![PAIR; n],
+            torque: room(n),
             springs: like.springs.iter().map(Spring::new).collect(),
             high: room(2 * n + 1),
             low: room(2 * n + 1),
@@ -114,28 +117,40 @@ impl Team for LoopTeam {
             end: room(5 * n),
             is_going: [false; LANES],
             is_leaving: [false; LANES],
-        }
+        };
+        (0..LANES).for_each(|lane| team.put(lane, like, reduced.as_ref()));
+        team
     }
 
-    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
-        if std::ptr::eq(mechanism, like) {
-            return fits(like) && dynamics::looped::reduced(like).is_some();
+    fn fits(member: &BatchMember, like: &BatchMember) -> bool {
+        let (one, other) = (member.mechanism, like.mechanism);
+        if std::ptr::eq(one, other) {
+            return fits(one) && like.reduced().is_some();
         }
-        // What starts and energies are measured by may differ: it is not in the series.
-        fits(mechanism)
-            && (&mechanism.tree, &mechanism.springs) == (&like.tree, &like.springs)
-            && (&mechanism.actions, &mechanism.constraints) == (&like.actions, &like.constraints)
-            && mechanism.assembly.degrees_of_freedom == like.assembly.degrees_of_freedom
+        let rows = |of: &BatchMember| -> Option<Vec<usize>> {
+            of.reduced().map(|reduced| reduced.rows.iter().map(|row| row.row).collect())
+        };
+        let are_alike = || are_alike(one, other) && rows(member).is_some_and(|own| rows(like) == Some(own));
+        fits(one)
+            && one.assembly.degrees_of_freedom == other.assembly.degrees_of_freedom
+            && (are_equal(one, other) || are_alike())
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, _order: usize) -> f64 {
         self.park(lane);
+        let place = std::ptr::from_ref(member.mechanism).addr();
+        if self.present[lane].replace(place) != Some(place) {
+            let is_other = !are_equal(member.mechanism, &self.like);
+            if std::mem::replace(&mut self.has_others[lane], is_other) || is_other {
+                self.put(lane, member.mechanism, member.reduced());
+            }
+        }
         for (numbers, unknowns) in [(&mut self.high, &member.state.y), (&mut self.low, &member.state.low)] {
             for (number, unknown) in numbers.iter_mut().zip(unknowns) {
                 number.0[lane] = *unknown;
             }
         }
-        self.longest
+        libm::exp2(30.0) * member.mechanism.units.time
     }
 
     /// At rest.
@@ -273,6 +288,32 @@ impl Team for LoopTeam {
 }
 
 impl LoopTeam {
+    /// Puts the constants of a mechanism into a lane.
+    fn put(&mut self, lane: usize, mechanism: &Mechanism, reduced: Option<&Reduced>) {
+        let n = self.count;
+        let (mut applied, mut torque) = (vec![Complex::ZERO; n], vec![0.0; n]);
+        for action in &mechanism.actions {
+            match &action.kind {
+                Kind::Force { point, force, .. } => point.spread(*force, |k, force| applied[k] += force),
+                Kind::Torque { torque: value, base } => {
+                    torque[action.body] += value;
+                    if let Some(base) = base {
+                        torque[*base] -= value;
+                    }
+                }
+            }
+        }
+        for i in 0..n {
+            put(&mut self.weight[i], lane, mechanism.tree.weight[i] + applied[i]);
+            put(&mut self.applied[i], lane, applied[i]);
+            self.torque[i].0[lane] = torque[i];
+        }
+        self.springs.iter_mut().zip(&mechanism.springs).for_each(|(spring, own)| spring.take_in(lane, own));
+        if let Some(reduced) = reduced {
+            self.matrices.take_in(lane, reduced);
+        }
+    }
+
     /// The angle of a body where the step began, less whole turns \[rad\].
     fn start(&self, lane: usize, body: usize) -> f64 {
         let angle = self.before[0][body].0[lane];
@@ -285,12 +326,12 @@ impl LoopTeam {
         let n = self.count;
         for i in 0..n {
             let at = i * ROOM + m;
-            let torque = W::splat(self.torque[i]);
+            let torque = load::<W>(&self.torque[i]);
             let mut fx = W::ZERO.sub(load::<W>(&self.y[at]).mul(torque));
             let mut fy = load::<W>(&self.x[at]).mul(torque);
             if m == 0 {
-                fx = fx.add(W::splat(self.weight[i].re));
-                fy = fy.add(W::splat(self.weight[i].im));
+                fx = fx.add(load(&self.weight[i][0]));
+                fy = fy.add(load(&self.weight[i][1]));
             }
             (self.right[i], self.right[n + i]) = (store(fx), store(fy));
         }
@@ -360,9 +401,9 @@ impl LoopTeam {
             (self.high[n + i], self.low[n + i]) = (store(rate), ZERO);
             let at = i * ROOM;
             let moved = [x.sub(load(&self.x[at])), y.sub(load(&self.y[at]))];
-            let along = moved[0].mul_add(W::splat(self.applied[i].re), work);
-            let across = moved[1].mul_add(W::splat(self.applied[i].im), along);
-            work = turn.mul_add(W::splat(self.torque[i]), across);
+            let along = moved[0].mul_add(load(&self.applied[i][0]), work);
+            let across = moved[1].mul_add(load(&self.applied[i][1]), along);
+            work = turn.mul_add(load(&self.torque[i]), across);
         }
         (self.high[2 * n], self.low[2 * n]) = added([&self.high[2 * n], &self.low[2 * n]], work, W::ZERO);
         store(longest)

@@ -134,6 +134,12 @@ impl SwingingTeam {
     }
 }
 
+/// True for mechanisms of this kind.
+pub(super) fn fits(mechanism: &Mechanism) -> bool {
+    let fits = |(_, law): (usize, &Law)| law.profile.is_none() && !law.is_steady();
+    Driven::pattern(mechanism).is_some_and(fits) && mechanism.contacts.is_empty()
+}
+
 impl Team for SwingingTeam {
     fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
         Self {
@@ -153,9 +159,8 @@ impl Team for SwingingTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, _: &Mechanism) -> bool {
-        let fits = |(_, law): (usize, &Law)| law.profile.is_none() && !law.is_steady();
-        Driven::pattern(mechanism).is_some_and(fits) && mechanism.contacts.is_empty()
+    fn fits(member: &BatchMember, _: &BatchMember) -> bool {
+        fits(member.mechanism)
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {

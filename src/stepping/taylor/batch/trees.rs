@@ -14,7 +14,7 @@ use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::law::Law;
-use crate::dynamics::series::lanes::{Landing, SeriesInLanes, are_alike, in_lanes};
+use crate::dynamics::series::lanes::{Landing, SeriesInLanes, are_alike, are_equal, in_lanes};
 use crate::dynamics::{Mechanism, State, Time};
 use std::f64::consts::{PI, TAU};
 
@@ -35,6 +35,8 @@ pub(super) struct TreeTeam {
     per_length: Octet,
     /// The energy scale times the unit of time \[J s\].
     energy: Octet,
+    /// One over the unit of time: what rates count as at least \[rad/s\].
+    slowest: Octet,
     /// Leading parts of angles, rates and work (2f + 1), and what they leave out.
     high: Vec<Octet>,
     low: Vec<Octet>,
@@ -69,8 +71,8 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && (is_tree(mechanism) || is_looped(mechanism))
 }
 
-/// True where there are no rows to be kept: there lanes may have numbers of their own.
-pub(super) fn is_tree(mechanism: &Mechanism) -> bool {
+/// True where there are no rows to be kept.
+fn is_tree(mechanism: &Mechanism) -> bool {
     let has_only_angles = mechanism.coordinates() == mechanism.bodies.len();
     !super::free::fits(mechanism)
         && mechanism.partition.count() > 0
@@ -79,7 +81,7 @@ pub(super) fn is_tree(mechanism: &Mechanism) -> bool {
 }
 
 fn is_looped(mechanism: &Mechanism) -> bool {
-    mechanism.has_closed_loops()
+    mechanism.has_multipliers()
         && mechanism.coordinates() == mechanism.bodies.len()
         && !mechanism.has_released()
         && !mechanism.has_aims()
@@ -146,20 +148,13 @@ impl TreeTeam {
             self.is_going[lane] &= self.taken.0[lane] > 0.0;
         }
         self.keep(&self.is_going.map(|is_going| !is_going));
-        let landing = Landing {
-            high: &mut self.high,
-            low: &mut self.low,
-            is_going: self.is_going,
-            unit: 1.0 / self.mechanism.units.time,
-        };
+        let landing =
+            Landing { high: &mut self.high, low: &mut self.low, is_going: self.is_going, unit: self.slowest };
         let is_landed = self.series.land(&self.mechanism, times, landing);
-        if is_landed != self.is_going {
-            let is_lost = std::array::from_fn(|lane| self.is_going[lane] && !is_landed[lane]);
-            for lane in (0..LANES).filter(|&lane| is_lost[lane]) {
-                self.is_leaving[lane] = true;
-            }
-            self.keep(&is_lost);
+        for lane in 0..LANES {
+            self.is_leaving[lane] |= self.is_going[lane] && !is_landed[lane];
         }
+        self.keep(&is_landed.map(|is_landed| !is_landed));
     }
 
     /// Puts some lanes back to where the step began.
@@ -185,6 +180,7 @@ impl Team for TreeTeam {
             angles: if is_kept { f } else { like.partition.turning() },
             per_length: Octet::splat(1.0),
             energy: Octet::splat(1.0),
+            slowest: Octet::splat(1.0),
             high: vec![ZERO; 2 * f + 1],
             low: vec![ZERO; 2 * f + 1],
             before: vec![ZERO; f],
@@ -199,26 +195,18 @@ impl Team for TreeTeam {
         }
     }
 
-    fn fits(mechanism: &Mechanism, like: &Mechanism) -> bool {
-        // What starts and energies are measured by may differ: it is not in the series.
-        let is_equal = || {
-            (&mechanism.tree, &mechanism.partition, &mechanism.springs)
-                == (&like.tree, &like.partition, &like.springs)
-                && (&mechanism.constraints, &mechanism.forces) == (&like.constraints, &like.forces)
-                && mechanism.contacts == like.contacts
-                && (&mechanism.torsions, &mechanism.actions) == (&like.torsions, &like.actions)
-        };
-        let is_alike = || is_tree(like) && is_tree(mechanism) && are_alike(mechanism, like);
-        fits(mechanism) && (std::ptr::eq(mechanism, like) || fits(like) && (is_equal() || is_alike()))
+    fn fits(member: &BatchMember, like: &BatchMember) -> bool {
+        let (mechanism, like) = (member.mechanism, like.mechanism);
+        let are_alike = || are_equal(mechanism, like) || are_alike(mechanism, like);
+        let is_same = std::ptr::eq(mechanism, like);
+        fits(mechanism) && (is_same || fits(like) && is_tree(mechanism) == is_tree(like) && are_alike())
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         self.park(lane);
         let place = std::ptr::from_ref(member.mechanism).addr();
         if self.present[lane].replace(place) != Some(place) {
-            if self.kept.is_none() {
-                self.series.take_in(lane, member.mechanism);
-            }
+            self.series.take_in(lane, &member.mechanism.without_redundant_rows());
             if let Some(judge) = &mut self.judge {
                 judge.take_in(lane, member.mechanism);
             }
@@ -231,6 +219,7 @@ impl Team for TreeTeam {
         }
         self.per_length.0[lane] = 1.0 / member.mechanism.units.length;
         self.energy.0[lane] = member.mechanism.energy_scale * member.mechanism.units.time;
+        self.slowest.0[lane] = 1.0 / member.mechanism.units.time;
         if self.judge.is_some() {
             return LONGEST * member.mechanism.units.time;
         }

@@ -1,25 +1,24 @@
 //! The matrices of a posture in every lane, and the way back onto all rows: see
 //! [`keeper`](crate::dynamics::natural::keeper).
 
-use super::ZERO;
-use crate::arithmetic::Complex;
+use super::{PAIR, Pair, ZERO, put};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::keeper::CLOSE;
-use crate::dynamics::natural::{Block, Reduced};
+use crate::dynamics::natural::{Linear, Reduced};
 use crate::stepping::taylor::batch::{load, root, store};
 
 /// Sweeps onto the unit lengths after the first one, of lanes that are far off.
 const SWEEPS: usize = 6;
 
-/// Constants of the mechanism, and matrices at unit vectors.
+/// Constants of every lane's mechanism, and matrices at unit vectors.
 #[derive(Debug)]
 pub(super) struct Matrices {
     count: usize,
-    /// W (n × n), and what pivots of S are measured against.
-    blocks: Vec<Block>,
-    scale: Vec<f64>,
+    /// W (n × n), block by block xx, xy, yx, yy, and what pivots of S are measured against.
+    blocks: Vec<[Octet; 4]>,
+    scale: Vec<Octet>,
     /// The linear rows: elements with their gradients, constant, and column of R.
     rows: Vec<Row>,
     /// V, x and y (each n × n), and S⁻¹.
@@ -37,9 +36,9 @@ pub(super) struct Matrices {
 
 #[derive(Debug)]
 struct Row {
-    terms: Vec<(usize, Complex<f64>)>,
-    constant: f64,
-    back: Vec<Complex<f64>>,
+    terms: Vec<(usize, Pair)>,
+    constant: Octet,
+    back: Vec<Pair>,
 }
 
 /// Share of a pivot above which a step may end: the next one leaves, but the way back is still well told.
@@ -52,21 +51,20 @@ pub(super) fn is_regular(weakest: &Octet, lane: usize) -> bool {
 }
 
 impl Matrices {
-    /// For so many bodies with these constants, which only mechanisms have that fit; `is_line`: of one degree
-    /// of freedom.
+    /// Room for so many bodies with constants like these, which only mechanisms have that fit; `is_line`: of
+    /// one degree of freedom.
     pub(super) fn new(reduced: Option<&Reduced>, n: usize, is_line: bool) -> Self {
-        let row = |reduced: &Reduced, r: usize| Row {
-            terms: reduced.rows[r].place.linear.clone(),
-            constant: reduced.rows[r].place.constant,
-            back: reduced.back[r * n..(r + 1) * n].to_vec(),
+        let row = |row: &Linear| Row {
+            terms: row.place.linear.iter().map(|&(k, _)| (k, PAIR)).collect(),
+            constant: ZERO,
+            back: vec![PAIR; n],
         };
-        let rows: Vec<Row> =
-            reduced.map_or_else(Vec::new, |it| (0..it.rows.len()).map(|r| row(it, r)).collect());
+        let rows: Vec<Row> = reduced.map_or_else(Vec::new, |it| it.rows.iter().map(row).collect());
         let room = |size: usize| vec![ZERO; size];
         Self {
             count: n,
-            blocks: reduced.map_or_else(|| vec![[0.0; 4]; n * n], |it| it.inverse.clone()),
-            scale: reduced.map_or_else(|| vec![1.0; n], |it| it.free.clone()),
+            blocks: vec![[ZERO; 4]; n * n],
+            scale: room(n),
             far: room(rows.len().max(n)),
             rows,
             v: [room(n * n), room(n * n)],
@@ -78,6 +76,22 @@ impl Matrices {
         }
     }
 
+    /// Puts the constants of a mechanism into a lane.
+    pub(super) fn take_in(&mut self, lane: usize, reduced: &Reduced) {
+        let n = self.count;
+        for (block, own) in self.blocks.iter_mut().zip(&reduced.inverse) {
+            block.iter_mut().zip(own).for_each(|(entry, &own)| entry.0[lane] = own);
+        }
+        self.scale.iter_mut().zip(&reduced.free).for_each(|(scale, &own)| scale.0[lane] = own);
+        for (r, (row, own)) in self.rows.iter_mut().zip(&reduced.rows).enumerate() {
+            row.constant.0[lane] = own.place.constant;
+            let gradients = own.place.linear.iter().map(|&(_, g)| g);
+            row.terms.iter_mut().zip(gradients).for_each(|((_, g), own)| put(g, lane, own));
+            let back = &reduced.back[r * n..(r + 1) * n];
+            row.back.iter_mut().zip(back).for_each(|(back, &own)| put(back, lane, own));
+        }
+    }
+
     /// V and S⁻¹ at unit vectors; the largest reciprocal share of a pivot.
     #[inline(always)]
     pub(super) fn face<W: EightLanes>(&mut self, x: &[Octet], y: &[Octet]) -> Octet {
@@ -86,10 +100,10 @@ impl Matrices {
         for i in 0..n {
             let (own_x, own_y) = (load::<W>(&x[i]), load::<W>(&y[i]));
             for j in 0..n {
-                let [xx, xy, yx, yy] = self.blocks[i * n + j];
+                let [xx, xy, yx, yy] = &self.blocks[i * n + j];
                 let (zx, zy) = (load::<W>(&x[j]), load::<W>(&y[j]));
-                let across = zx.mul_add(W::splat(xx), zy.mul(W::splat(xy)));
-                let along = zx.mul_add(W::splat(yx), zy.mul(W::splat(yy)));
+                let across = zx.mul_add(load(xx), zy.mul(load(xy)));
+                let along = zx.mul_add(load(yx), zy.mul(load(yy)));
                 (vx[i * n + j], vy[i * n + j]) = (store(across), store(along));
                 self.schur[i * n + j] = store(own_x.mul_add(across, own_y.mul(along)));
             }
@@ -103,7 +117,7 @@ impl Matrices {
         let (n, schur, mut weakest) = (self.count, &mut self.schur, W::ZERO);
         for p in 0..n {
             let factor = W::ONE.div(load::<W>(&schur[p * n + p]));
-            weakest = factor.mul(W::splat(self.scale[p])).larger(weakest);
+            weakest = factor.mul(load(&self.scale[p])).larger(weakest);
             schur[p * n + p] = store(W::ONE);
             for j in 0..n {
                 schur[p * n + j] = store(load::<W>(&schur[p * n + j]).mul(factor));
@@ -151,9 +165,9 @@ impl Matrices {
         let (n, [vx, vy], [ux, uy], spread) = (self.count, &self.v, &self.u, &mut self.spread);
         for i in 0..n {
             for j in i..n {
-                let [xx, xy, yx, yy] = self.blocks[i * n + j];
-                let (mut pxx, mut pxy) = (W::splat(xx), W::splat(xy));
-                let (mut pyx, mut pyy) = (W::splat(yx), W::splat(yy));
+                let [xx, xy, yx, yy] = &self.blocks[i * n + j];
+                let (mut pxx, mut pxy) = (load::<W>(xx), load::<W>(xy));
+                let (mut pyx, mut pyy) = (load::<W>(yx), load::<W>(yy));
                 for s in 0..n {
                     let (ux, uy) = (load::<W>(&ux[i * n + s]), load::<W>(&uy[i * n + s]));
                     let (x, y) = (load::<W>(&vx[j * n + s]), load::<W>(&vy[j * n + s]));
@@ -176,8 +190,8 @@ impl Matrices {
     fn find_line<W: EightLanes>(&mut self) {
         let (n, [vx, vy], [ux, uy]) = (self.count, &self.v, &self.u);
         for i in 0..n {
-            let [xx, _, _, yy] = self.blocks[i * n + i];
-            let (mut x, mut y) = (W::splat(xx), W::splat(yy));
+            let [xx, _, _, yy] = &self.blocks[i * n + i];
+            let (mut x, mut y) = (load::<W>(xx), load::<W>(yy));
             for s in 0..n {
                 x = load::<W>(&ux[i * n + s]).neg_mul_add(load(&vx[i * n + s]), x);
                 y = load::<W>(&uy[i * n + s]).neg_mul_add(load(&vy[i * n + s]), y);
@@ -204,8 +218,8 @@ impl Matrices {
             let (mut x, mut y) = (ZERO, ZERO);
             for lane in 0..LANES {
                 let (axis, k) = (largest[lane] / n, largest[lane] % n);
-                let block = self.blocks[i * n + k];
-                (x.0[lane], y.0[lane]) = (block[axis], block[2 + axis]);
+                let block = &self.blocks[i * n + k];
+                (x.0[lane], y.0[lane]) = (block[axis].0[lane], block[2 + axis].0[lane]);
             }
             let (mut x, mut y) = (load::<W>(&x), load::<W>(&y));
             for s in 0..n {
@@ -357,19 +371,19 @@ impl Matrices {
     fn onto_rows<W: EightLanes>(&mut self, z: &mut [Octet], with_constants: bool) {
         let n = self.count;
         for r in 0..self.rows.len() {
-            let mut far = W::splat(if with_constants { self.rows[r].constant } else { 0.0 });
-            for &(k, g) in &self.rows[r].terms {
-                far = load::<W>(&z[k]).mul_add(W::splat(g.re), far);
-                far = load::<W>(&z[n + k]).mul_add(W::splat(g.im), far);
+            let mut far = if with_constants { load::<W>(&self.rows[r].constant) } else { W::ZERO };
+            for (k, [x, y]) in &self.rows[r].terms {
+                far = load::<W>(&z[*k]).mul_add(load(x), far);
+                far = load::<W>(&z[n + *k]).mul_add(load(y), far);
             }
             self.far[r] = store(far);
         }
         for i in 0..n {
             let (mut x, mut y) = (load::<W>(&z[i]), load::<W>(&z[n + i]));
             for r in 0..self.rows.len() {
-                let (far, back) = (load::<W>(&self.far[r]), self.rows[r].back[i]);
-                x = far.neg_mul_add(W::splat(back.re), x);
-                y = far.neg_mul_add(W::splat(back.im), y);
+                let (far, [back_x, back_y]) = (load::<W>(&self.far[r]), &self.rows[r].back[i]);
+                x = far.neg_mul_add(load(back_x), x);
+                y = far.neg_mul_add(load(back_y), y);
             }
             (z[i], z[n + i]) = (store(x), store(y));
         }

@@ -4,8 +4,7 @@
 //! q = |D|²,  s = q^(-1/2):  m q_0 s_m = Σ_{j=1..m} (j/2 - m) q_j s_{m-j},  F_m = k (L0 Σ s_j D_{m-j} - D_m)
 //! ```
 
-use super::{MOST, ROOM, ZERO};
-use crate::arithmetic::Complex;
+use super::{MOST, PAIR, Pair, ROOM, ZERO, put};
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::force;
@@ -14,10 +13,11 @@ use crate::stepping::taylor::batch::{load, root, store};
 /// A spring and its series: D, q with its powers' numbers, s.
 #[derive(Clone, Debug)]
 pub(super) struct Spring {
-    root: Complex<f64>,
-    terms: Vec<(usize, Complex<f64>)>,
-    stiffness: f64,
-    free_length: f64,
+    root: Pair,
+    terms: Vec<(usize, Pair)>,
+    stiffness: Octet,
+    free_length: Octet,
+    has_free_length: bool,
     x: Vec<Octet>,
     y: Vec<Octet>,
     square: Vec<Octet>,
@@ -26,13 +26,15 @@ pub(super) struct Spring {
 }
 
 impl Spring {
+    /// Room for a spring like this one.
     pub(super) fn new(spring: &force::Spring) -> Self {
         let room = || vec![ZERO; MOST + 1];
         Self {
-            root: spring.span.root,
-            terms: spring.span.terms.clone(),
-            stiffness: spring.stiffness,
-            free_length: spring.free_length,
+            root: PAIR,
+            terms: spring.span.terms.iter().map(|&(k, _)| (k, PAIR)).collect(),
+            stiffness: ZERO,
+            free_length: ZERO,
+            has_free_length: spring.free_length != 0.0,
             x: room(),
             y: room(),
             square: room(),
@@ -41,29 +43,39 @@ impl Spring {
         }
     }
 
+    /// Puts the constants of a spring into a lane.
+    pub(super) fn take_in(&mut self, lane: usize, spring: &force::Spring) {
+        put(&mut self.root, lane, spring.span.root);
+        let own = spring.span.terms.iter().map(|&(_, gamma)| gamma);
+        self.terms.iter_mut().zip(own).for_each(|((_, gamma), own)| put(gamma, lane, own));
+        (self.stiffness.0[lane], self.free_length.0[lane]) = (spring.stiffness, spring.free_length);
+    }
+
     /// Adds power m of its force to f, x and then y.
     #[inline(always)]
     pub(super) fn pull<W: EightLanes>(&mut self, m: usize, [zx, zy]: [&[Octet]; 2], f: &mut [Octet]) {
         let n = f.len() / 3;
         let (mut dx, mut dy) = (W::ZERO, W::ZERO);
         if m == 0 {
-            (dx, dy) = (W::splat(self.root.re), W::splat(self.root.im));
+            (dx, dy) = (load(&self.root[0]), load(&self.root[1]));
         }
-        for &(k, gamma) in &self.terms {
+        for (k, [re, im]) in &self.terms {
+            let (re, im) = (load::<W>(re), load::<W>(im));
             let (x, y) = (load::<W>(&zx[k * ROOM + m]), load::<W>(&zy[k * ROOM + m]));
-            dx = y.neg_mul_add(W::splat(gamma.im), x.mul_add(W::splat(gamma.re), dx));
-            dy = x.mul_add(W::splat(gamma.im), y.mul_add(W::splat(gamma.re), dy));
+            dx = y.neg_mul_add(im, x.mul_add(re, dx));
+            dy = x.mul_add(im, y.mul_add(re, dy));
         }
         let (mut px, mut py) = (W::ZERO, W::ZERO);
-        if self.free_length != 0.0 {
+        if self.has_free_length {
             [px, py] = self.stretched::<W>(m, dx, dy);
         }
-        let stiffness = W::splat(self.stiffness);
+        let stiffness = load::<W>(&self.stiffness);
         let (px, py) = (px.sub(dx).mul(stiffness), py.sub(dy).mul(stiffness));
-        for &(k, gamma) in &self.terms {
+        for (k, [re, im]) in &self.terms {
+            let (k, re, im) = (*k, load::<W>(re), load::<W>(im));
             let (fx, fy) = (load::<W>(&f[k]), load::<W>(&f[n + k]));
-            let fx = py.mul_add(W::splat(gamma.im), px.mul_add(W::splat(gamma.re), fx));
-            let fy = px.neg_mul_add(W::splat(gamma.im), py.mul_add(W::splat(gamma.re), fy));
+            let fx = py.mul_add(im, px.mul_add(re, fx));
+            let fy = px.neg_mul_add(im, py.mul_add(re, fy));
             (f[k], f[n + k]) = (store(fx), store(fy));
         }
     }
@@ -84,7 +96,7 @@ impl Spring {
             sum.div(load::<W>(&self.square[0]).mul(W::splat(m as f64)))
         };
         self.inverse[m] = store(inverse);
-        let length = W::splat(self.free_length);
+        let length = load::<W>(&self.free_length);
         [
             product::<W>(&self.x, &self.inverse, 0, m).mul(length),
             product::<W>(&self.y, &self.inverse, 0, m).mul(length),
