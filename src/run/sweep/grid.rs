@@ -1,6 +1,6 @@
 //! The points of a sweep: a grid of named values, each from one end to the other in equal steps, or a list.
 
-use crate::scene::{Variable, number};
+use crate::scene::number;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -89,20 +89,6 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// So many points that follow one another differ by where they start alone; all of them where nothing
-    /// else is varied.
-    pub(super) fn starts_in_a_row(&self, variables: &[Variable]) -> u64 {
-        let is_start = |variable: &Variable| variable.path.starts_with("start.");
-        if variables.iter().all(is_start) {
-            return u64::MAX;
-        }
-        if self.listed.is_some() {
-            return 1;
-        }
-        let starts = variables.iter().zip(&self.axes).rev().take_while(|(variable, _)| is_start(variable));
-        starts.fold(1, |count, (_, axis)| count.saturating_mul(axis.count))
-    }
-
     /// The grid of these axes; `None` where it has more points than 2⁶⁴ - 1.  It takes no memory for its
     /// points.
     pub fn new(axes: Vec<Vary>) -> Option<Self> {

@@ -84,8 +84,9 @@ pub struct Sweep {
     stop: Option<Arc<AtomicBool>>,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
-    /// True where points come in rows with equal mechanisms: in lanes these are beside each other.
-    is_alike: bool,
+    /// True where points of one structure are integrated beside each other: fewer with numbers of their own are
+    /// faster one by one.
+    is_many: bool,
 }
 
 /// Why a sweep cannot begin, or did not come to its end.
@@ -182,7 +183,8 @@ impl Sweep {
         // What one point gets unasked, all get.
         request.method = Some(plan.method);
         let shares = variables.iter().all(|variable| variable.start.is_some());
-        let is_alike = grid.starts_in_a_row(&variables) >= LANES as u64;
+        let is_start = |variable: &Variable| variable.path.starts_with("start.");
+        let is_many = variables.iter().all(is_start) || grid.count() >= LANES as u64;
         let template = template.clone();
         let limits = Limits::default();
         Ok(Self {
@@ -202,7 +204,7 @@ impl Sweep {
             within: None,
             stop: None,
             shares,
-            is_alike,
+            is_many,
         })
     }
 
@@ -324,12 +326,7 @@ impl Sweep {
 
     /// True where a mechanism of the points can be in lanes.
     fn has_lanes_for(&self, mechanism: &Mechanism) -> bool {
-        let takes_many = || match self.is_alike {
-            true => Batch::takes_alike(mechanism),
-            // Fewer are faster one by one.
-            false => self.grid.count() >= LANES as u64 && Batch::takes_own_numbers(mechanism),
-        };
-        Batch::takes(mechanism) || takes_many()
+        Batch::takes(mechanism) || self.is_many && Batch::takes_alike(mechanism)
     }
 
     /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.
