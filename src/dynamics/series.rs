@@ -193,6 +193,16 @@ impl<T: SeriesNumber> Series<T> {
         }
     }
 
+    /// Takes the constants of other terms of the same structure.
+    pub fn renew(&mut self, terms: &Terms<T::Constant>) {
+        if self.is_tied {
+            self.partition.clone_from(terms.partition);
+        }
+        self.factors.couple(terms.tree);
+        self.forces = terms.forces.iter().map(|force| UserSeries::new(force, self.order)).collect();
+        self.rows.renew(terms, &self.partition);
+    }
+
     /// Keeps coefficients of long numbers to so many limbs each, power by power of the rates.
     pub fn keep(&mut self, limbs: Vec<usize>) {
         self.limbs = limbs;

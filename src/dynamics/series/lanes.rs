@@ -9,7 +9,7 @@ mod landing;
 mod number;
 
 use self::constants::{LaneConstants, TermSet};
-pub use self::constants::{are_alike, are_equal};
+pub use self::constants::{OwnNumbers, are_equal};
 use self::landing::{Land, Regularity};
 use self::number::InLanes;
 use super::Series;
@@ -37,8 +37,8 @@ pub struct Landing<'a> {
 
 /// Powers of eight motions.
 pub trait SeriesInLanes: Debug {
-    /// Puts the constants of a mechanism that is [alike](are_alike) into a lane.
-    fn take_in(&mut self, lane: usize, mechanism: &Mechanism);
+    /// Puts the numbers of a mechanism that is [alike](OwnNumbers::are_alike) into a lane.
+    fn take_in(&mut self, lane: usize, own: &OwnNumbers);
 
     /// Expands the motions of a mechanism from their times, angles (leading parts and rests) and rates.
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]);
@@ -72,12 +72,20 @@ pub trait SeriesInLanes: Debug {
 
 /// Room for the series of eight motions of a mechanism of bodies alone, in all angles where there are rows
 /// with multipliers, else in those that motors leave.
-pub fn in_lanes(mechanism: &Mechanism, order: usize, vectors: Vectors) -> Box<dyn SeriesInLanes> {
-    vectors.run(Room { mechanism, order })
+///
+/// All lanes have its numbers `own` to begin with.
+pub fn in_lanes(
+    mechanism: &Mechanism,
+    own: &OwnNumbers,
+    order: usize,
+    vectors: Vectors,
+) -> Box<dyn SeriesInLanes> {
+    vectors.run(Room { mechanism, own, order })
 }
 
 struct Room<'a> {
     mechanism: &'a Mechanism,
+    own: &'a OwnNumbers,
     order: usize,
 }
 
@@ -86,15 +94,19 @@ impl WideCode for Room<'_> {
 
     #[inline(always)]
     fn run<W: EightLanes>(self) -> Box<dyn SeriesInLanes> {
-        let constants = LaneConstants::of(self.mechanism);
+        let constants = LaneConstants::of(self.own);
         let terms = constants.terms::<W>(self.mechanism);
-        let series = series(&terms, self.mechanism, self.order);
+        let coordinates = match self.mechanism.has_multipliers() {
+            true => Coordinates::All,
+            false => Coordinates::Independent,
+        };
+        let series = Series::of_terms(&terms.terms(self.mechanism), coordinates, self.order);
         let f = series.coordinates();
         let is_asked = series.is_tied || !self.mechanism.contacts.is_empty();
         let room = || vec![InLanes::ZERO; f];
         let mut regularity = Regularity::new(series.rows.count(), f);
-        if !series.rows.is_empty() {
-            (0..LANES).for_each(|lane| regularity.take_in(lane, self.mechanism));
+        if let Some(measures) = &self.own.measures {
+            (0..LANES).for_each(|lane| regularity.take_in(lane, measures));
         }
         Box::new(Whole {
             begin: [room(), room(), room()],
@@ -105,29 +117,19 @@ impl WideCode for Room<'_> {
             units: vec![[Octet::default(); 2]; series.elements],
             regularity,
             constants,
+            are_others: false,
             terms,
             series,
         })
     }
 }
 
-/// Room for series of these terms.
-fn series<W: EightLanes>(
-    terms: &TermSet<InLanes<W>>,
-    mechanism: &Mechanism,
-    order: usize,
-) -> Series<InLanes<W>> {
-    let coordinates = match mechanism.has_multipliers() {
-        true => Coordinates::All,
-        false => Coordinates::Independent,
-    };
-    Series::of_terms(&terms.terms(mechanism), coordinates, order)
-}
-
 /// Series, where they begin, and what is asked of them.
 #[derive(Debug)]
 struct Whole<W: EightLanes> {
     constants: LaneConstants,
+    /// True where the terms and the series still have others.
+    are_others: bool,
     terms: TermSet<InLanes<W>>,
     series: Series<InLanes<W>>,
     begin: [Vec<InLanes<W>>; 3],
@@ -183,16 +185,17 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
 
 impl<W: EightLanes> SeriesInLanes for Whole<W> {
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]) {
+        if std::mem::take(&mut self.are_others) {
+            self.terms = self.constants.terms(mechanism);
+            self.series.renew(&self.terms.terms(mechanism));
+        }
         W::perform(Expand { whole: self, mechanism, times, begin });
     }
 
-    fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
-        if self.constants.put(lane, mechanism) {
-            self.terms = self.constants.terms(mechanism);
-            self.series = series(&self.terms, mechanism, self.series.order());
-        }
-        if !self.series.rows.is_empty() {
-            self.regularity.take_in(lane, mechanism);
+    fn take_in(&mut self, lane: usize, own: &OwnNumbers) {
+        self.are_others |= self.constants.put(lane, own);
+        if let Some(measures) = &own.measures {
+            self.regularity.take_in(lane, measures);
         }
     }
 

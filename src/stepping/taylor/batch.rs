@@ -33,9 +33,10 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::looped::reduced;
 use crate::dynamics::natural::Reduced;
+use crate::dynamics::series::lanes::{OwnNumbers, are_equal};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
-use std::cell::OnceCell;
+use std::sync::{Arc, OnceLock};
 
 /// Largest order there is room for.
 const MOST: usize = 24;
@@ -61,21 +62,33 @@ pub struct BatchMember<'a> {
     /// where that step begins, to be taken on by [`Taylor`](super::Taylor) with projection, or through the
     /// impact.
     pub has_left: bool,
-    /// The mechanism in natural coordinates, once it has been asked for.
-    reduced: OnceCell<Option<Box<Reduced>>>,
+    /// Its mechanism in natural coordinates and its numbers, once they have been asked for.
+    reduced: OnceLock<Option<Arc<Reduced>>>,
+    numbers: OnceLock<Arc<OwnNumbers>>,
 }
 
 impl<'a> BatchMember<'a> {
     /// A trajectory about to start.
     pub fn new(mechanism: &'a Mechanism, state: State) -> Self {
-        let (statistics, reduced) = (Statistics::default(), OnceCell::new());
-        Self { mechanism, state, statistics, stopped: None, has_left: false, reduced }
+        let statistics = Statistics::default();
+        let (reduced, numbers) = (OnceLock::new(), OnceLock::new());
+        Self { mechanism, state, statistics, stopped: None, has_left: false, reduced, numbers }
     }
 
     /// The matrices of its mechanism in natural coordinates, without redundant rows, where there are any.
     fn reduced(&self) -> Option<&Reduced> {
-        let find = || reduced(&self.mechanism.without_redundant_rows()).map(Box::new);
+        let find = || reduced(&self.mechanism.without_redundant_rows()).map(Arc::new);
         self.reduced.get_or_init(find).as_deref()
+    }
+
+    /// The numbers of its mechanism.
+    fn numbers(&self) -> &OwnNumbers {
+        self.numbers.get_or_init(|| Arc::new(OwnNumbers::of(self.mechanism)))
+    }
+
+    /// True where the other's mechanism differs from its own in numbers alone, if at all.
+    fn is_alike(&self, other: &Self) -> bool {
+        are_equal(self.mechanism, other.mechanism) || self.numbers().are_alike(other.numbers())
     }
 }
 
@@ -183,7 +196,8 @@ impl Batch {
                         };
                         let fits: Vec<bool> = members.iter().map(fits).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
-                        self.integrate_those::<$team>(like, &fits, members, until, (&mut *watch, &mut *alone));
+                        let watched = (&mut *watch, &mut *alone);
+                        self.integrate_those::<$team>(next, &fits, members, until, watched);
                         continue;
                     }
                 )*};
@@ -198,17 +212,17 @@ impl Batch {
         }
     }
 
-    /// Integrates those that fit beside a mechanism.
+    /// Integrates those that fit beside one of them.
     fn integrate_those<T: Team>(
         &self,
-        like: &Mechanism,
+        like: usize,
         fits: &[bool],
         members: &mut [BatchMember],
         until: Time,
         (watch, alone): (&mut Watch, &mut Alone),
     ) {
         let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
-        let lanes = LaneSlots::new(T::new(like, self.order, vectors), self.order, until);
+        let lanes = LaneSlots::new(T::new(&members[like], self.order, vectors), self.order, until);
         vectors.run(Integration::<T> { lanes, fits, batch: self, members, until, watch, alone });
     }
 }
@@ -221,8 +235,8 @@ fn goes_on(mechanism: &Mechanism) -> bool {
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
 trait Team {
-    /// Empty lanes for mechanisms that fit beside this one, for series up to an order.
-    fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self;
+    /// Empty lanes for trajectories that fit beside this one, for series up to an order.
+    fn new(like: &BatchMember, order: usize, vectors: Vectors) -> Self;
 
     /// True for a trajectory of a mechanism of this kind that can be beside another one of this kind.
     fn fits(member: &BatchMember, like: &BatchMember) -> bool;

@@ -4,6 +4,7 @@
 //! What is a constant of the equations is listed in one order; a mechanism is its structure, and that list.
 
 use super::super::Terms;
+use super::super::rows::RowMeasures;
 use super::number::InLanes;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
@@ -66,14 +67,44 @@ pub fn are_equal(one: &Mechanism, other: &Mechanism) -> bool {
         && one.assembly.redundant == other.assembly.redundant
 }
 
-/// True for mechanisms that differ in their constants alone, of which the same are zero, as the same rows
-/// follow from others.
-pub fn are_alike(one: &Mechanism, other: &Mechanism) -> bool {
-    let of = |constant: f64| if constant == 0.0 { 0.0 } else { 1.0 };
-    let wall = |wall: &Contact| (equation(&wall.row, &mut { of }), wall.on, wall.is_off);
-    let walls = |mechanism: &Mechanism| mechanism.contacts.iter().map(wall).collect::<Vec<_>>();
-    let skeleton = |mechanism: &Mechanism| (TermSet::map(mechanism, of), walls(mechanism));
-    one.assembly.redundant == other.assembly.redundant && skeleton(one) == skeleton(other)
+/// A mechanism without its redundant rows as lanes take it: its constants, and what they are constants of.
+#[derive(Debug)]
+pub struct OwnNumbers {
+    /// All constants in their order, and what rows are measured with where there are multipliers.
+    constants: Vec<f64>,
+    pub(super) measures: Option<RowMeasures>,
+    /// Terms and walls with ones for all constants that are not zero, and the redundant rows.
+    terms: TermSet<f64>,
+    walls: Vec<(ConstraintEquation, Option<usize>, bool)>,
+    redundant: Vec<String>,
+}
+
+impl OwnNumbers {
+    /// Those of a mechanism.
+    pub fn of(mechanism: &Mechanism) -> Self {
+        let redundant = mechanism.assembly.redundant.clone();
+        let mechanism = &*mechanism.without_redundant_rows();
+        let mut constants = Vec::new();
+        let mut of = |constant: f64| if constant == 0.0 { 0.0 } else { 1.0 };
+        let terms = TermSet::map(mechanism, |constant| {
+            constants.push(constant);
+            of(constant)
+        });
+        let wall = |wall: &Contact| (equation(&wall.row, &mut of), wall.on, wall.is_off);
+        Self {
+            constants,
+            measures: mechanism.has_multipliers().then(|| RowMeasures::of(mechanism)),
+            terms,
+            walls: mechanism.contacts.iter().map(wall).collect(),
+            redundant,
+        }
+    }
+
+    /// True for mechanisms that differ in their constants alone, of which the same are zero, as the same rows
+    /// follow from others.
+    pub fn are_alike(&self, other: &Self) -> bool {
+        (&self.terms, &self.walls, &self.redundant) == (&other.terms, &other.walls, &other.redundant)
+    }
 }
 
 /// The constants of eight mechanisms of one structure.
@@ -82,14 +113,14 @@ pub struct LaneConstants(Vec<Octet>);
 
 impl LaneConstants {
     /// Those of one mechanism in all lanes.
-    pub fn of(mechanism: &Mechanism) -> Self {
-        Self(listed(mechanism).into_iter().map(Octet::splat).collect())
+    pub fn of(own: &OwnNumbers) -> Self {
+        Self(own.constants.iter().copied().map(Octet::splat).collect())
     }
 
     /// Puts those of a mechanism into a lane; tells whether they are others.
-    pub fn put(&mut self, lane: usize, mechanism: &Mechanism) -> bool {
+    pub fn put(&mut self, lane: usize, own: &OwnNumbers) -> bool {
         let mut are_others = false;
-        for (octet, constant) in self.0.iter_mut().zip(listed(mechanism)) {
+        for (octet, &constant) in self.0.iter_mut().zip(&own.constants) {
             are_others |= octet.0[lane] != constant;
             octet.0[lane] = constant;
         }
@@ -103,16 +134,6 @@ impl LaneConstants {
             InLanes(constants.next().map_or_else(|| W::splat(constant), |octet| W::of(&octet.0)))
         })
     }
-}
-
-/// All constants in their order.
-fn listed(mechanism: &Mechanism) -> Vec<f64> {
-    let mut constants = Vec::new();
-    TermSet::map(mechanism, |constant| {
-        constants.push(constant);
-        constant
-    });
-    constants
 }
 
 /// The law of every lane.
@@ -254,6 +275,8 @@ mod tests {
     #[test]
     fn numbers_make_no_difference_to_the_structure_but_zeros_do() {
         let one = mechanism(&[]);
+        let are_alike =
+            |one: &Mechanism, other: &Mechanism| OwnNumbers::of(one).are_alike(&OwnNumbers::of(other));
         let others =
             ["bars.b.density=800", "motors.m.law.rate=3", "torsion_springs.t.stiffness=1", "parameters.k=2"];
         assert!(others.iter().all(|set| are_alike(&one, &mechanism(&[set]))));
@@ -277,8 +300,9 @@ mod tests {
     fn every_lane_has_its_own_numbers() {
         let (one, other) =
             (mechanism(&[]), mechanism(&["torsion_springs.t.stiffness=1", "motors.m.law.rate=3"]));
-        let mut constants = LaneConstants::of(&one);
-        assert!(!constants.put(2, &one) && constants.put(2, &other) && !constants.put(2, &other));
+        let [first, second] = [&one, &other].map(OwnNumbers::of);
+        let mut constants = LaneConstants::of(&first);
+        assert!(!constants.put(2, &first) && constants.put(2, &second) && !constants.put(2, &second));
         let (stiffness, laws) = Vectors::Portable.run(Rates(constants, one.clone()));
         for lane in 0..LANES {
             let own = if lane == 2 { &other } else { &one };

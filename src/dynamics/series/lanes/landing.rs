@@ -11,7 +11,6 @@ use super::{Landing, Times};
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Task};
-use crate::dynamics::Mechanism;
 use crate::dynamics::schur::NEAR;
 
 /// Rounds of one level, at most.
@@ -57,12 +56,12 @@ impl Regularity {
     }
 
     /// Puts what the constraints of a mechanism are measured with into a lane.
-    pub fn take_in(&mut self, lane: usize, mechanism: &Mechanism) {
-        let RowMeasures { levers, scale, columns, rows } = RowMeasures::of(mechanism);
-        let per_lever = levers.into_iter().map(|lever| 1.0 / lever).collect();
-        let all = [&mut self.per_lever, &mut self.scale, &mut self.columns, &mut self.rows];
-        for (octets, own) in all.into_iter().zip([per_lever, scale, columns, rows]) {
-            octets.iter_mut().zip(own).for_each(|(octet, own): (&mut Octet, f64)| octet.0[lane] = own);
+    pub fn take_in(&mut self, lane: usize, own: &RowMeasures) {
+        let per_lever = self.per_lever.iter_mut().zip(&own.levers);
+        per_lever.for_each(|(octet, lever)| octet.0[lane] = 1.0 / lever);
+        let all = [&mut self.scale, &mut self.columns, &mut self.rows];
+        for (octets, own) in all.into_iter().zip([&own.scale, &own.columns, &own.rows]) {
+            octets.iter_mut().zip(own).for_each(|(octet, &own)| octet.0[lane] = own);
         }
     }
 

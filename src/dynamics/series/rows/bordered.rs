@@ -15,11 +15,30 @@
 
 use super::{Kind, RowSeries, bent};
 use crate::arithmetic::Complex;
-use crate::dynamics::series::SeriesNumber;
+use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::series::order::rows_times;
+use crate::dynamics::series::{SeriesNumber, Terms};
 use crate::dynamics::tree;
 
 impl<T: SeriesNumber> RowSeries<T> {
+    /// Takes the constants of other rows of the same kinds.
+    pub fn renew(&mut self, terms: &Terms<T::Constant>, partition: &CoordinatePartition<T::Constant>) {
+        let is_in_force = |row: &&ConstraintEquation<T::Constant>| {
+            !(matches!(row.measure, Measure::Angle { .. }) && partition.driven())
+        };
+        for (kind, row) in self.kinds.iter_mut().zip(terms.constraints.iter().filter(is_in_force)) {
+            match (kind, &row.measure) {
+                (Kind::Place { place, law, .. }, Measure::Place(other)) => {
+                    place.clone_from(other);
+                    law.clone_from(&row.law);
+                }
+                (Kind::Angle { law, .. }, _) => *law = row.law.clone().unwrap_or_default(),
+                _ => {}
+            }
+        }
+    }
+
     /// Number of rows in force.
     pub fn count(&self) -> usize {
         self.kinds.len()

@@ -124,7 +124,7 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 }
 
 impl Team for DrivenTeam {
-    fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
+    fn new(_: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         let zero = Octet::splat(0.0);
         Self {
             laws: Laws::new(),

@@ -50,7 +50,7 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 }
 
 impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
-    fn new(like: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
+    fn new(like: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         let zero = [Octet::splat(0.0); N];
         let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
         Self {
@@ -62,7 +62,7 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
             low: [zero; 2],
             before: zero,
             powers: [power; MOST + 1],
-            springs: Springs::new(like.springs.len()),
+            springs: Springs::new(like.mechanism.springs.len()),
         }
     }
 

@@ -26,7 +26,7 @@ use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{Complex, angle};
 use crate::dynamics::force::action::Kind;
 use crate::dynamics::natural::Reduced;
-use crate::dynamics::series::lanes::{are_alike, are_equal};
+use crate::dynamics::series::lanes::are_equal;
 use crate::dynamics::{self, Mechanism, State};
 use std::f64::consts::{PI, TAU};
 
@@ -91,16 +91,16 @@ fn fits(mechanism: &Mechanism) -> bool {
 }
 
 impl Team for LoopTeam {
-    fn new(like: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
+    fn new(first: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
+        let (like, reduced) = (first.mechanism, first.reduced());
         let n = like.bodies.len();
-        let reduced = dynamics::looped::reduced(&like.without_redundant_rows());
         let room = |size: usize| vec![ZERO; size];
         let mut team = Self {
             count: n,
             like: like.clone(),
             has_others: [false; LANES],
             present: [None; LANES],
-            matrices: Matrices::new(reduced.as_ref(), n, like.assembly.degrees_of_freedom == 1),
+            matrices: Matrices::new(reduced, n, like.assembly.degrees_of_freedom == 1),
             weight: vec![PAIR; n],
             applied: vec![PAIR; n],
             torque: room(n),
@@ -118,7 +118,7 @@ impl Team for LoopTeam {
             is_going: [false; LANES],
             is_leaving: [false; LANES],
         };
-        (0..LANES).for_each(|lane| team.put(lane, like, reduced.as_ref()));
+        (0..LANES).for_each(|lane| team.put(lane, like, reduced));
         team
     }
 
@@ -130,10 +130,11 @@ impl Team for LoopTeam {
         let rows = |of: &BatchMember| -> Option<Vec<usize>> {
             of.reduced().map(|reduced| reduced.rows.iter().map(|row| row.row).collect())
         };
-        let are_alike = || are_alike(one, other) && rows(member).is_some_and(|own| rows(like) == Some(own));
-        fits(one)
-            && one.assembly.degrees_of_freedom == other.assembly.degrees_of_freedom
-            && (are_equal(one, other) || are_alike())
+        let is_alike = || {
+            are_equal(one, other)
+                || member.is_alike(like) && rows(member).is_some_and(|own| rows(like) == Some(own))
+        };
+        fits(one) && one.assembly.degrees_of_freedom == other.assembly.degrees_of_freedom && is_alike()
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, _order: usize) -> f64 {

@@ -141,7 +141,7 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
 }
 
 impl Team for SwingingTeam {
-    fn new(_: &Mechanism, _order: usize, _vectors: Vectors) -> Self {
+    fn new(_: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         Self {
             laws: Laws::new(),
             driven: [0; LANES],

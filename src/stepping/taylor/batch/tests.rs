@@ -40,7 +40,7 @@ fn ends(vectors: Vectors) -> Vec<State> {
         true => Going::Enough,
         false => Going::On,
     };
-    let team = FreeTeam::<2, false>::new(&mechanism, batch.order, vectors);
+    let team = FreeTeam::<2, false>::new(&members[0], batch.order, vectors);
     let lanes = LaneSlots::new(team, batch.order, until);
     let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
     let alone: &mut Alone = &mut |_, _, _| Going::Enough;

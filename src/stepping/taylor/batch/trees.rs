@@ -14,7 +14,7 @@ use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::law::Law;
-use crate::dynamics::series::lanes::{Landing, SeriesInLanes, are_alike, are_equal, in_lanes};
+use crate::dynamics::series::lanes::{Landing, SeriesInLanes, in_lanes};
 use crate::dynamics::{Mechanism, State, Time};
 use std::f64::consts::{PI, TAU};
 
@@ -168,12 +168,12 @@ impl TreeTeam {
 }
 
 impl Team for TreeTeam {
-    fn new(like: &Mechanism, order: usize, vectors: Vectors) -> Self {
-        let like = &*like.without_redundant_rows();
+    fn new(first: &BatchMember, order: usize, vectors: Vectors) -> Self {
+        let like = &*first.mechanism.without_redundant_rows();
         let is_kept = like.has_multipliers();
         let f = if is_kept { like.coordinates() } else { like.partition.count() };
         Self {
-            series: in_lanes(like, order, vectors),
+            series: in_lanes(like, first.numbers(), order, vectors),
             mechanism: like.clone(),
             order,
             coordinates: f,
@@ -196,17 +196,16 @@ impl Team for TreeTeam {
     }
 
     fn fits(member: &BatchMember, like: &BatchMember) -> bool {
-        let (mechanism, like) = (member.mechanism, like.mechanism);
-        let are_alike = || are_equal(mechanism, like) || are_alike(mechanism, like);
-        let is_same = std::ptr::eq(mechanism, like);
-        fits(mechanism) && (is_same || fits(like) && is_tree(mechanism) == is_tree(like) && are_alike())
+        let (own, other) = (member.mechanism, like.mechanism);
+        let is_same = std::ptr::eq(own, other);
+        fits(own) && (is_same || fits(other) && is_tree(own) == is_tree(other) && member.is_alike(like))
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         self.park(lane);
         let place = std::ptr::from_ref(member.mechanism).addr();
         if self.present[lane].replace(place) != Some(place) {
-            self.series.take_in(lane, &member.mechanism.without_redundant_rows());
+            self.series.take_in(lane, member.numbers());
             if let Some(judge) = &mut self.judge {
                 judge.take_in(lane, member.mechanism);
             }
