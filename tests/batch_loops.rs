@@ -25,8 +25,11 @@ const SCENES: [(&str, &str, f64, f64, f64); 6] = [
     ("quick_return", "start.link.phi", 3.21, 0.0, 0.7),
 ];
 
-/// Scenes, what is varied of their numbers, from where on and by how much, and up to when \[s\].
-const NUMBERS: [(&str, [(&str, f64, f64); 3], f64); 6] = [
+/// Three numbers of a scene, from where on and by how much they are varied.
+type Varied = [(&'static str, f64, f64); 3];
+
+/// Scenes, what is varied of their numbers, and up to when \[s\].
+const NUMBERS: [(&str, Varied, f64); 6] = [
     (
         "andrews",
         [
@@ -84,7 +87,7 @@ const NUMBERS: [(&str, [(&str, f64, f64); 3], f64); 6] = [
 ];
 
 /// Eleven of them, all with numbers of their own.
-fn variants((scene, varied, _): &(&str, [(&str, f64, f64); 3], f64)) -> Vec<(Arc<Mechanism>, State)> {
+fn variants((scene, varied, _): &(&str, Varied, f64)) -> Vec<(Arc<Mechanism>, State)> {
     let at = |i: usize| {
         let sets = varied.map(|(path, from, by)| format!("{path}={}", from + by * i as f64));
         started(&shipped(scene, &sets.each_ref().map(String::as_str)))

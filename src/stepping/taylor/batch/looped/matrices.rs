@@ -16,8 +16,7 @@ const SWEEPS: usize = 6;
 #[derive(Debug)]
 pub(super) struct Matrices {
     count: usize,
-    /// W (n × n), block by block xx, xy, yx, yy, of which those above the diagonal are read; and what pivots
-    /// of S are measured against.
+    /// W (n × n), block by block xx, xy, yx, yy, and what pivots of S are measured against.
     blocks: Vec<[Octet; 4]>,
     scale: Vec<Octet>,
     /// The linear rows: elements with their gradients, constant, and column of R.
@@ -101,7 +100,7 @@ impl Matrices {
         for i in 0..n {
             let (own_x, own_y) = (load::<W>(&x[i]), load::<W>(&y[i]));
             for j in 0..n {
-                let [xx, xy, yx, yy] = block(&self.blocks, n, i, j);
+                let [xx, xy, yx, yy] = &self.blocks[i * n + j];
                 let (zx, zy) = (load::<W>(&x[j]), load::<W>(&y[j]));
                 let across = zx.mul_add(load(xx), zy.mul(load(xy)));
                 let along = zx.mul_add(load(yx), zy.mul(load(yy)));
@@ -219,7 +218,7 @@ impl Matrices {
             let (mut x, mut y) = (ZERO, ZERO);
             for lane in 0..LANES {
                 let (axis, k) = (largest[lane] / n, largest[lane] % n);
-                let block = block(&self.blocks, n, i, k);
+                let block = &self.blocks[i * n + k];
                 (x.0[lane], y.0[lane]) = (block[axis].0[lane], block[2 + axis].0[lane]);
             }
             let (mut x, mut y) = (load::<W>(&x), load::<W>(&y));
@@ -411,13 +410,6 @@ impl Matrices {
             (z[i], z[n + i]) = (store(x), store(y));
         }
     }
-}
-
-/// A block of W, which is symmetric: half of it stays nearer to the processor.
-#[inline(always)]
-fn block(blocks: &[[Octet; 4]], n: usize, i: usize, j: usize) -> [&Octet; 4] {
-    let [xx, xy, yx, yy] = &blocks[i.min(j) * n + i.max(j)];
-    if i <= j { [xx, xy, yx, yy] } else { [xx, yx, xy, yy] }
 }
 
 /// One in some lanes, zero in the others.
