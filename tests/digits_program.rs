@@ -49,7 +49,7 @@ fn what_makes_no_sense_is_refused_and_leaves_no_files() {
         ("free.json --trusted-until 0", 2, "is no time"),
         ("free.json --trusted-until 1 --within 0", 2, "above 0"),
         ("free.json --within 1e-3", 2, "--trusted-until"),
-        ("pid.json --digits 30", 3, "corners or tables"),
+        ("pid.json --digits 30", 3, "has tables"),
     ] {
         program.run(&format!("run {arguments}")).exits(code).says(&[word]);
     }

@@ -166,14 +166,13 @@ impl Formula {
 
     /// An error at a name of this formula that nothing has.
     pub fn unknown(&self, name: &str, known: &[&str]) -> FormulaError {
+        self.refused(name, format!("unknown name {name}"), meant(name, known))
+    }
+
+    /// An error at a name of this formula.
+    pub(crate) fn refused(&self, name: &str, problem: String, hint: String) -> FormulaError {
         let start = self.names.iter().find(|one| one.0 == name).map_or(0, |one| one.1);
-        FormulaError::new(
-            &self.text,
-            start,
-            start + name.len(),
-            format!("unknown name {name}"),
-            meant(name, known),
-        )
+        FormulaError::new(&self.text, start, start + name.len(), problem, hint)
     }
 
     /// Its value in doubles, every branch as the conditions say there; `values` are those of

@@ -309,10 +309,9 @@ impl Resolver<'_> {
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         fits(&formula, dimension, quantity).map_err(refused)?;
         if let (Some(name), false) = (self.is_set(&formula), is_motor) {
-            let start = formula.text().find(name).unwrap_or_default();
             let problem = format!("speaks of {name}, which an event sets");
             let hint = "write the force or the torque itself as a formula".to_owned();
-            return Err(refused(FormulaError::new(formula.text(), start, start + name.len(), problem, hint)));
+            return Err(refused(formula.refused(name, problem, hint)));
         }
         match formula.law(&values) {
             _ if self.is_set(&formula).is_some() => Ok(None),
