@@ -26,7 +26,7 @@ fn prepared(scene: &str, vary: &[&str], request: &Request) -> Sweep {
     Sweep::new(&template(scene), vary, request).expect("a sweep")
 }
 
-fn points(plan: &Sweep, threads: usize) -> Vec<Point> {
+pub fn points(plan: &Sweep, threads: usize) -> Vec<Point> {
     let mut points = Vec::new();
     sweep(plan, threads, &mut |point: &Point| {
         points.push(point.clone());

@@ -1,8 +1,9 @@
 //! Sweeps over numbers of mechanisms with closed loops, sliders and motors beside them: against single runs and
 //! trigonometry, and with the same bits whoever is beside whom.
 
+use crate::sweep::points;
 use driftless::run::trust::Level;
-use driftless::run::{Point, Request, Shard, Status, Sweep, Vary, simulate, sweep};
+use driftless::run::{Request, Shard, Status, Sweep, Vary, simulate};
 use driftless::scene::Template;
 use driftless::stepping::taylor::batch::Batch;
 
@@ -25,16 +26,6 @@ fn planned(template: &Template, vary: &[&str], request: &Request) -> Sweep {
     let plan = Sweep::new(template, vary, request).expect("a sweep");
     assert!(Batch::takes_own_numbers(plan.mechanism()));
     plan
-}
-
-fn points(plan: &Sweep, threads: usize) -> Vec<Point> {
-    let mut points = Vec::new();
-    sweep(plan, threads, &mut |point: &Point| {
-        points.push(point.clone());
-        Ok(())
-    })
-    .expect("all points");
-    points
 }
 
 /// A crank turned by a motor, its rod's end on a rail with an offset, a damped spring between end and ground.

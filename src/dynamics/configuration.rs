@@ -2,7 +2,7 @@
 
 use super::constraint::Site;
 use super::{CompileError, Mechanism};
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
 
 /// Time, angles, rates and points of a mechanism at one moment, over any scalar: plain numbers where an event
 /// function is evaluated, symbols where a [`Force`](super::force::Force) is recorded.
@@ -91,7 +91,7 @@ pub struct Values<'a, S> {
     pub omega: &'a [S],
 }
 
-impl<S: Scalar> Source<S> for Values<'_, S> {
+impl<S: Scalar + Over<C>, C: Real> Source<S, C> for Values<'_, S> {
     fn time(&self) -> S {
         self.time
     }
@@ -108,16 +108,16 @@ impl<S: Scalar> Source<S> for Values<'_, S> {
         self.z[body]
     }
 
-    fn position(&self, site: &Site) -> Complex<S> {
+    fn position(&self, site: &Site<C>) -> Complex<S> {
         site.point.position(self.z)
     }
 
-    fn velocity(&self, site: &Site) -> Complex<S> {
+    fn velocity(&self, site: &Site<C>) -> Complex<S> {
         site.point.velocity(self.z, self.omega)
     }
 
-    fn constant(&self, value: f64) -> S {
-        S::of(value)
+    fn constant(&self, value: C) -> S {
+        S::constant(value)
     }
 }
 

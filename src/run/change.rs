@@ -3,7 +3,7 @@
 
 use super::build::build;
 use super::contact::{ContactDriver, Jump, Switch, in_modes};
-use super::event::{Action, Change, SwitchFunction};
+use super::event::{Action, Change, EventDetector, SwitchFunction};
 use super::latch;
 use super::monitor::Monitor;
 use super::running::Outcome;
@@ -107,13 +107,14 @@ impl ContactDriver {
             let next = parameters.unwrap_or_else(|| known.clone());
             keeps_parameters = next == *known;
             if moved || next != *known {
-                let motions = [&before, &after];
-                let stays = self.events.as_ref().map(|events| events.conditions_at_zero(motions, &next));
+                let at_zero = |events: &EventDetector| events.conditions_at_zero([&before, &after], &next);
+                let stays = self.events.as_ref().map(at_zero).unwrap_or_default();
                 let there = self.whole.seen(&after, |at| formulas.modes(at, &next));
                 // Where a condition is zero, rounding does not choose its branch.
                 for (number, (mode, there)) in modes.iter_mut().zip(there).enumerate() {
-                    let stays = stays.as_ref().and_then(|stays| stays.get(number).copied());
-                    *mode = if stays == Some(true) { *mode } else { there };
+                    if stays.get(number) != Some(&true) {
+                        *mode = there;
+                    }
                 }
             } else if let Some(mode) = flips.and_then(|number| modes.get_mut(number)) {
                 *mode = !*mode;

@@ -169,11 +169,9 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// Parts that are not carried in many digits.
     fn refuse_parts(&self, scene: &Scene) -> Result<(), SceneError> {
-        let changes =
-            |event: &SceneEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
         let is_watched = self.watched == Watched::Here;
         let parts = [
-            ("events", scene.events.iter().any(changes), "events change what acts"),
+            ("events", scene.events.iter().any(SceneEvent::changes), "events change what acts"),
             ("inactive", !scene.inactive.is_empty(), "events change what acts"),
         ];
         for (key, is_there, why) in parts {

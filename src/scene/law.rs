@@ -175,6 +175,13 @@ pub struct SceneEvent {
     pub set: Vec<(String, String)>,
 }
 
+impl SceneEvent {
+    /// True where it switches parts or sets parameters.
+    pub fn changes(&self) -> bool {
+        !(self.on.is_empty() && self.off.is_empty() && self.set.is_empty())
+    }
+}
+
 /// What a name in a formula stands for; `P` is what points are given by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Meaning<P = Place> {

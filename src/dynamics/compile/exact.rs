@@ -5,9 +5,7 @@ use super::parts;
 use super::{Body, CompileError, Mechanism, dense_constants};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 #[cfg(feature = "digits")]
-use crate::dynamics::configuration::{Configuration, Source};
-#[cfg(feature = "digits")]
-use crate::dynamics::constraint::Site;
+use crate::dynamics::configuration::{Configuration, Values};
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
 #[cfg(feature = "digits")]
 use crate::dynamics::force::formula::FormulaEvent;
@@ -139,7 +137,7 @@ impl<C: Decimal> ExactMechanism<C> {
             name: event.name.clone(),
             direction: event.direction,
             stop: event.stop,
-            changes: !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty()),
+            changes: event.changes(),
         };
         let all = ForceElements {
             springs: parts::springs(scene, &forest),
@@ -361,53 +359,13 @@ impl<C: Decimal + Over<C>> ExactMechanism<C> {
         let mut next = self.acting.clone();
         let Some(laws) = &self.laws else { return next };
         let z = self.elements(phi);
-        let at = Values { t, phi, z: &z, omega };
+        let at = Values { time: t, phi, z: &z, omega };
         let Acting { parameters, modes, .. } = &self.acting;
         next.parameters = laws.set_exactly_by(event, &Configuration::new(&at), parameters, modes);
         let FormulaEvent { on, off, .. } = &laws.events[event];
         next.off.retain(|part| !on.contains(part));
         next.off.extend(off.iter().filter(|part| !self.acting.off.contains(part)).cloned());
         next
-    }
-}
-
-/// A configuration given by numbers.
-#[cfg(feature = "digits")]
-struct Values<'a, C> {
-    t: C,
-    phi: &'a [C],
-    z: &'a [Complex<C>],
-    omega: &'a [C],
-}
-
-#[cfg(feature = "digits")]
-impl<C: Decimal + Over<C>> Source<C, C> for Values<'_, C> {
-    fn time(&self) -> C {
-        self.t
-    }
-
-    fn angle(&self, body: usize) -> C {
-        self.phi[body]
-    }
-
-    fn rate(&self, body: usize) -> C {
-        self.omega[body]
-    }
-
-    fn direction(&self, body: usize) -> Complex<C> {
-        self.z[body]
-    }
-
-    fn position(&self, site: &Site<C>) -> Complex<C> {
-        site.point.position(self.z)
-    }
-
-    fn velocity(&self, site: &Site<C>) -> Complex<C> {
-        site.point.velocity(self.z, self.omega)
-    }
-
-    fn constant(&self, value: C) -> C {
-        value
     }
 }
 

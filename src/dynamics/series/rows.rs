@@ -129,7 +129,7 @@ impl<T: SeriesNumber> RowSeries<T> {
                     .map(|aim| Box::new(AimSeries::new(aim, mechanism.bodies.len(), order))),
             }),
         };
-        let in_force = in_force(mechanism, partition);
+        let in_force = in_force(&mechanism.constraints, partition);
         let works = in_force.iter().map(|row| row.is_motor()).collect();
         // Where each lane has its own, whoever looks at the pivots has them.
         let (scale, metric) =

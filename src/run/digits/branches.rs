@@ -6,8 +6,7 @@
 //! its value a little later.  That there is a zero inside a step is told in doubles
 //! ([`search`](crate::stepping::search)), as it is for events.
 
-use super::events::sign;
-use super::functions::Functions;
+use super::functions::{Functions, LEAVES, SAME, magnitude, sign};
 use super::motion::Motion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
@@ -17,12 +16,6 @@ use crate::stepping::{Cause, StepError};
 
 /// Part of the bits carried that a condition has to be zero in.
 const SURE: f64 = 0.75;
-/// Share of a step after which a condition that was zero has left it.
-const LEAVES: f64 = 1e-3;
-/// Share of a step within which zeros are not told apart in doubles.
-const SAME: f64 = 1e-9;
-/// Times within a step at which its largest value is looked for.
-const LOOKS: usize = 8;
 /// Changes at one moment beyond as many as there are conditions.
 const CHANGES: usize = 8;
 
@@ -45,12 +38,11 @@ struct Condition {
 impl Condition {
     fn new<const W: usize>(powers: &[Digits<W>], step: f64, bits: usize) -> Self {
         let shares = in_shares(powers, 1.0, step);
-        let at = |share: f64| Powers { powers: &shares, end: 1.0 }.at(share)[0];
-        let most = (0..=LOOKS).map(|k| at(k as f64 / LOOKS as f64).abs()).fold(0.0, f64::max);
         let first = powers.first().map_or(f64::NEG_INFINITY, Digits::log2);
-        let is_at_zero = first <= libm::log2(most) - SURE * bits as f64;
+        let is_at_zero = first <= libm::log2(magnitude(&shares)) - SURE * bits as f64;
         let begin = || powers.first().map_or(0, |first| sign(first.value()));
-        let side = if is_at_zero { sign(at(LEAVES)) } else { begin() };
+        let left = || sign(Powers { powers: &shares, end: 1.0 }.at(LEAVES)[0]);
+        let side = if is_at_zero { left() } else { begin() };
         Self { side, is_at_zero, shares }
     }
 

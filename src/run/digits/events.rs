@@ -6,7 +6,7 @@
 //! for walls: two zeros within 1e-9 of a step are one, or none.  Steps are so short that the series of the
 //! formulas converge in them, too.
 
-use super::functions::Functions;
+use super::functions::{Functions, LEAVES, SAME, magnitude, sign};
 use super::motion::Motion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
@@ -15,14 +15,8 @@ use crate::dynamics::compile::exact::ExactMechanism;
 use crate::scene::Direction;
 use crate::stepping::search::{Curve, Powers, root};
 
-/// Share of a step within which the event that began it does not happen again, and two zeros are one.
-const SAME: f64 = 1e-9;
 /// Share of the largest value within a step up to which a formula is at its zero.
 const NO_VALUE: f64 = 1e-12;
-/// Share of a step after which a formula that was at its zero has left it.
-const LEAVES: f64 = 1e-3;
-/// Times within a step at which its largest value is looked for.
-const LOOKS: usize = 8;
 /// Events kept.
 const KEPT: usize = 100_000;
 
@@ -169,17 +163,12 @@ impl<const W: usize> Watch<W> {
     }
 }
 
-/// The side of zero a number is on.
-pub(super) fn sign(value: f64) -> i8 {
-    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
-}
-
 /// Passages of a formula through zero, in shares of a step and whether it rises, and its side at the end;
 /// `began` says that one of them ended the step before.
 fn passages(shares: &[f64], before: i8, began: bool) -> (Vec<(f64, bool)>, i8) {
     let curve = Powers { powers: shares, end: 1.0 };
     let at = |share: f64| curve.at(share)[0];
-    let most = (0..=LOOKS).map(|k| at(k as f64 / LOOKS as f64).abs()).fold(0.0, f64::max);
+    let most = magnitude(shares);
     let mut all = Vec::new();
     if most == 0.0 || !most.is_finite() {
         return (all, before);

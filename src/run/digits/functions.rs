@@ -4,7 +4,14 @@ use super::motion::{JUDGES, Motion};
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::force::UserForce;
 use crate::dynamics::series::FormulaSeries;
+use crate::stepping::search::{Curve, Powers};
 
+/// Share of a step within which zeros are not told apart in doubles, and what began it does not happen again.
+pub(super) const SAME: f64 = 1e-9;
+/// Share of a step after which a function that was at its zero has left it.
+pub(super) const LEAVES: f64 = 1e-3;
+/// Times within a step at which its largest value is looked for.
+const LOOKS: usize = 8;
 /// Rounds in which a step is shortened, at most.
 const ROUNDS: usize = 20;
 
@@ -64,4 +71,15 @@ impl<const W: usize> Functions<W> {
         };
         self.powers.iter().fold(wanted, shortened)
     }
+}
+
+/// The side of zero a number is on.
+pub(super) fn sign(value: f64) -> i8 {
+    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
+}
+
+/// About the largest magnitude of a function whose powers are in shares of a step.
+pub(super) fn magnitude(shares: &[f64]) -> f64 {
+    let curve = Powers { powers: shares, end: 1.0 };
+    (0..=LOOKS).map(|k| curve.at(k as f64 / LOOKS as f64)[0].abs()).fold(0.0, f64::max)
 }

@@ -11,10 +11,9 @@
 //! digits.  Walls whose point does not approach have no restitution.
 
 use super::motion::Motion;
-use super::wall::{Jump, distance, travel_rate};
+use super::wall::{Jump, distance, gap_rate, travel_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::dynamics::constraint::Measure;
 use crate::dynamics::kernel::dot;
 use crate::stepping::{Cause, StepError};
 
@@ -46,9 +45,6 @@ impl<const W: usize> Meeting<W> {
             return None;
         }
         let rounding = -SURE * motion.precision.bits as f64;
-        let posture = motion.state_posture();
-        let z = motion.mechanism.elements(&posture.phi);
-        let t = motion.state().t;
         let touches = |&other: &usize| {
             let row = &motion.mechanism.walls[other].0;
             let gap = distance(motion, row).abs();
@@ -56,21 +52,10 @@ impl<const W: usize> Meeting<W> {
             other == wall || !motion.is_off(row) && gap.log2() - libm::log2(length) < rounding
         };
         let walls: Vec<usize> = (0..motion.mechanism.walls.len()).filter(touches).collect();
-        let gradient = |&wall: &usize| {
-            let mut gradient = vec![Digits::ZERO; posture.phi.len()];
-            if let Measure::Place(place) = &motion.mechanism.walls[wall].0.measure {
-                place.slopes(&z, |k, slope| gradient[k] += slope);
-            }
-            gradient
-        };
-        let gradients: Vec<_> = walls.iter().map(gradient).collect();
-        let rates: Vec<_> =
-            walls.iter().map(|&wall| travel_rate(&motion.mechanism.walls[wall].0, t)).collect();
-        let velocity: Vec<_> = gradients
-            .iter()
-            .zip(&rates)
-            .map(|(gradient, &rate)| dot(gradient, &posture.omega) - rate)
-            .collect();
+        let (gradients, velocity): (Vec<_>, Vec<_>) =
+            walls.iter().map(|&wall| gap_rate(motion, wall)).unzip();
+        let t = motion.state().t;
+        let rates = walls.iter().map(|&wall| travel_rate(&motion.mechanism.walls[wall].0, t)).collect();
         let still = largest(&velocity) + rounding;
         let approached = velocity.iter().filter(|v| **v < Digits::ZERO && v.log2() > still).count();
         (approached > 1).then_some(Self { walls, gradients, rates, velocity, rounding })

@@ -162,7 +162,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
 }
 
 /// Gradient of the gap of a wall by all coordinates, and its rate \[m/s\].
-fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> (Vec<Digits<W>>, Digits<W>) {
+pub(super) fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> (Vec<Digits<W>>, Digits<W>) {
     let posture = motion.state_posture();
     let z = motion.mechanism.elements(&posture.phi);
     let row = &motion.mechanism.walls[wall].0;

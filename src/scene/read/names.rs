@@ -164,15 +164,10 @@ impl<'a> Bars<'a> {
 
 /// The parameters that events set.
 pub(super) fn set_by_events(tree: &Node) -> Vec<String> {
-    let member = |node: &Node, key: &str| match &node.value {
-        Value::Object(members) => members.iter().find(|one| one.key == key).map(|one| one.node.clone()),
+    let Some(Value::List(events)) = tree.at("events").map(|events| &events.value) else { return Vec::new() };
+    let set = events.iter().filter_map(|event| match &event.at("set")?.value {
+        Value::Object(members) => Some(members),
         _ => None,
-    };
-    let Some(Value::List(events)) = member(tree, "events").map(|node| node.value) else { return Vec::new() };
-    let set = events.iter().filter_map(|event| member(event, "set"));
-    set.flat_map(|set| match set.value {
-        Value::Object(members) => members.into_iter().map(|one| one.key).collect(),
-        _ => Vec::new(),
-    })
-    .collect()
+    });
+    set.flatten().map(|member| member.key.clone()).collect()
 }

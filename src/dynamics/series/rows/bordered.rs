@@ -13,9 +13,9 @@
 
 // Iterators and closures are left out of these loops: they are not compiled into code for the vectors.
 
-use super::{Kind, RowSeries, bent};
+use super::{Kind, RowSeries, bent, in_force};
 use crate::arithmetic::Complex;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::Measure;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::series::order::rows_times;
 use crate::dynamics::series::{SeriesNumber, Terms};
@@ -24,10 +24,7 @@ use crate::dynamics::tree;
 impl<T: SeriesNumber> RowSeries<T> {
     /// Takes the constants of other rows of the same kinds.
     pub fn renew(&mut self, terms: &Terms<T::Constant>, partition: &CoordinatePartition<T::Constant>) {
-        let is_in_force = |row: &&ConstraintEquation<T::Constant>| {
-            !(matches!(row.measure, Measure::Angle { .. }) && partition.driven())
-        };
-        for (kind, row) in self.kinds.iter_mut().zip(terms.constraints.iter().filter(is_in_force)) {
+        for (kind, row) in self.kinds.iter_mut().zip(in_force(terms.constraints, partition)) {
             match (kind, &row.measure) {
                 (Kind::Place { place, law, .. }, Measure::Place(other)) => {
                     place.clone_from(other);

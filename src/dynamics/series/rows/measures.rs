@@ -24,7 +24,7 @@ impl RowMeasures {
     /// Those of a mechanism.
     pub fn of(mechanism: &Mechanism) -> Self {
         let partition = CoordinatePartition::<f64>::free(mechanism);
-        let in_force = in_force(mechanism, &partition);
+        let in_force = in_force(&mechanism.constraints, &partition);
         let (scale, metric) = measures(mechanism, &partition, &in_force);
         let levers = in_force.iter().map(|row| longest_lever(row)).collect();
         Self { levers, scale, columns: metric.columns, rows: metric.rows }
@@ -39,11 +39,11 @@ fn longest_lever(row: &ConstraintEquation) -> f64 {
 }
 
 /// The rows that a partition does not fulfil already.
-pub(super) fn in_force<'a, C: Real>(
-    mechanism: &'a Mechanism,
+pub(super) fn in_force<'a, R: Real, C: Real>(
+    rows: &'a [ConstraintEquation<R>],
     partition: &CoordinatePartition<C>,
-) -> Vec<&'a ConstraintEquation> {
-    mechanism.constraints.iter().filter(|row| !(row.is_angle() && partition.driven())).collect()
+) -> Vec<&'a ConstraintEquation<R>> {
+    rows.iter().filter(|row| !(row.is_angle() && partition.driven())).collect()
 }
 
 /// What pivots of S of these rows are measured against, and what their rank is measured with.
