@@ -38,7 +38,7 @@ fn a_horizon_is_proved_or_the_exit_code_says_so() {
 
 #[test]
 fn what_makes_no_sense_is_refused_and_leaves_no_files() {
-    let program = Program::with_scenes(&["free", "pid"]);
+    let program = Program::with_scenes(&["free", "friction_pendulum"]);
     for (arguments, code, word) in [
         ("free.json --digits 19", 2, "20 to 2000"),
         ("free.json --digits 2001", 2, "20 to 2000"),
@@ -49,7 +49,7 @@ fn what_makes_no_sense_is_refused_and_leaves_no_files() {
         ("free.json --trusted-until 0", 2, "is no time"),
         ("free.json --trusted-until 1 --within 0", 2, "above 0"),
         ("free.json --within 1e-3", 2, "--trusted-until"),
-        ("pid.json --digits 30", 3, "has tables"),
+        ("friction_pendulum.json --digits 30", 3, "dry friction"),
     ] {
         program.run(&format!("run {arguments}")).exits(code).says(&[word]);
     }

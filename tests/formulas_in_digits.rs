@@ -128,39 +128,3 @@ fn every_smooth_function_is_carried_in_laws_and_motors() {
         near(&number(many.bodies[k][0]), &fixed(&format!("{:.15}", plain.last.phi[k])), 11);
     }
 }
-
-#[test]
-fn tables_are_refused_where_they_stand() {
-    use driftless::run::digits::{Precision, long_run};
-    let table = r#""tables": {"gust": [[0, 0], [1, 2]]}"#;
-    for (parts, place) in [
-        (r#""torques": [{"name": "one", "body": "rotor", "torque": "gust(t)"}]"#, "torques.one.torque"),
-        (
-            r#""signals": {"s": "gust(t)"}, "torques": [{"name": "one", "body": "rotor", "torque": "1*s"}]"#,
-            "signals.s",
-        ),
-    ] {
-        let source = source(&rotor(&format!("{table}, {parts}"), "0", "0"), &[], "1", "1");
-        let error = long_run(&source, Precision::new(30, false)).err().expect("refused").to_string();
-        assert!(error.contains(place) && error.contains("tables"), "{error}");
-    }
-}
-
-/// What is not carried is named with its place.
-#[test]
-fn corners_of_events_and_switched_joints_are_refused_where_they_stand() {
-    use driftless::run::digits::{Precision, long_run};
-    for (parts, place, why) in [
-        (r#""events": [{"name": "turn", "when": "abs(rotor.phi) - 1"}]"#, "events.turn.when", "has corners"),
-        (
-            r#""locks": [{"name": "brake", "body": "rotor"}], "inactive": ["brake"],
-               "events": [{"name": "turn", "when": "rotor.phi - 1", "on": ["brake"]}]"#,
-            "inactive",
-            "brake is released and closed",
-        ),
-    ] {
-        let source = source(&rotor(parts, "0", "1"), &[], "1", "1");
-        let error = long_run(&source, Precision::new(30, false)).err().expect("refused").to_string();
-        assert!(error.contains(place) && error.contains(why), "{error}");
-    }
-}

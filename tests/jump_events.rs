@@ -143,3 +143,49 @@ fn a_function_that_stays_at_zero_makes_no_events() {
         assert_near(outcome.last.phi[0], 1.0, 1e-10, "angle");
     }
 }
+
+/// Angles cos(t) of a rotor on a spring: functions that jump past zero at a corner, of their own or of a signal, are
+/// at zero there, with the torque of the signal or without.
+#[test]
+fn a_function_with_a_corner_passes_zero_in_a_jump() {
+    use std::f64::consts::PI;
+    let text = |torque: &str| {
+        format!(
+            r#"{{"name": "rotor", "gravity": [0, 0],
+        "bars": [{{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "rotor", "point": [0, 0]}}]}}],
+        "torsion_springs": [{{"name": "coil", "body": "rotor", "stiffness": 1, "free_angle": 0}}],
+        "signals": {{"side": "sign(rotor.phi - 0.5)"}},
+        "torques": [{{"name": "none", "body": "rotor", "torque": "{torque}"}}],
+        "events": [{{"name": "own", "when": "3*sign(rotor.phi - 0.5) - 1"}}, {{"name": "signal", "when": "side*(2 + t)"}},
+                   {{"name": "rising", "when": "if(rotor.phi > 0.5, 1, -t)", "direction": "rising"}},
+                   {{"name": "kink", "when": "abs(rotor.phi - 0.5) - 0.5"}}],
+        "start": {{"rotor": {{"phi": 1, "omega": 0}}}}, "until": 9, "every": 4.5}}"#
+        )
+    };
+    let passes = [PI / 3.0, 5.0 * PI / 3.0, 7.0 * PI / 3.0];
+    let kinks = [PI / 2.0, 1.5 * PI, 2.0 * PI, 2.5 * PI];
+    for torque in ["0*side", "1e-30*side"] {
+        let fixed = [MethodId::Gauss(4), MethodId::Gauss(8)].map(|method| Request {
+            method: Some(method),
+            step: Some(0.02),
+            ..Request::default()
+        });
+        for request in methods().into_iter().chain([adaptive(MethodId::Dopri5, 1e-11)]).chain(fixed) {
+            let outcome = run(&scene(&text(torque)), &request);
+            assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+            for (name, expected) in [("own", &passes[..]), ("signal", &passes), ("rising", &passes[1..2])] {
+                let found = times(&outcome, name);
+                assert_eq!(found.len(), expected.len(), "{:?}: {name} at {found:?}", request.method);
+                found.iter().zip(expected).for_each(|(t, expected)| assert_near(*t, *expected, 1e-9, name));
+            }
+            // It begins at zero, and touches it at 2 π.
+            let found = times(&outcome, "kink");
+            let turns = |t: &&f64| (**t - kinks[2]).abs() > 1e-3 && **t > 1e-3;
+            let found: Vec<f64> = found.iter().filter(turns).copied().collect();
+            assert_eq!(found.len(), 3, "{:?}: {found:?}", request.method);
+            let sure = [kinks[0], kinks[1], kinks[3]];
+            found.iter().zip(sure).for_each(|(t, expected)| assert_near(*t, expected, 1e-9, "kink"));
+        }
+    }
+}

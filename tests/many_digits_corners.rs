@@ -117,6 +117,75 @@ fn a_motor_keeps_its_law_through_a_corner() {
     assert!(stop.what.contains("jumps") && stop.cause == Cause::Unsuited, "{stop:?}");
 }
 
+/// Three points of a table, and the slope of its spline at the second one.
+struct Spline {
+    points: [[BigInt; 2]; 3],
+    slope: BigInt,
+}
+
+impl Spline {
+    fn new(points: [[&str; 2]; 3]) -> Self {
+        let points = points.map(|point| point.map(fixed));
+        let (before, after) = (&points[1][0] - &points[0][0], &points[2][0] - &points[1][0]);
+        let chord =
+            |k: usize| over(&(&points[k + 1][1] - &points[k][1]), &(&points[k + 1][0] - &points[k][0]));
+        // 2 (h0 + h1) s = 3 (h1 m0 + h0 m1), level at both ends
+        let sum = times(&after, &chord(0)) + times(&before, &chord(1));
+        let slope = over(&(sum * 3), &((before + after) * 2));
+        Self { points, slope }
+    }
+
+    /// The integral over the pieces between the points.
+    fn integral(&self) -> BigInt {
+        let piece = |k: usize, [from, to]: [&BigInt; 2]| {
+            let h = &self.points[k + 1][0] - &self.points[k][0];
+            let mean = (&self.points[k][1] + &self.points[k + 1][1]) / 2;
+            times(&h, &mean) + times(&times(&h, &h), &(from - to)) / 12
+        };
+        piece(0, [&BigInt::ZERO, &self.slope]) + piece(1, [&self.slope, &BigInt::ZERO])
+    }
+
+    /// In the middle of the second piece: value and slope.
+    fn middle(&self) -> [BigInt; 2] {
+        let [_, [a, u], [b, v]] = &self.points;
+        let h = b - a;
+        [(u + v) / 2 + times(&h, &self.slope) / 8, over(&((v - u) * 3), &h) / 2 - &self.slope / 4]
+    }
+}
+
+/// Splines through points that are no doubles: the work of a torque over an angle, its impulse over time, and the
+/// angle of a motor.
+#[test]
+fn tables_are_splines_through_their_points_as_written() {
+    let points = [["0.1", "0.3"], ["1.3", "2.7"], ["2.2", "-0.4"]];
+    let spline = Spline::new(points);
+    let table = format!(r#""tables": {{"f": [{}]}}"#, points.map(|[x, y]| format!("[{x}, {y}]")).join(", "));
+    let acting = |what: &str| {
+        let torque = r#"[{"name": "law", "body": "rotor", "torque": "1*s"}]"#;
+        format!(r#"{table}, "signals": {{"s": "{what}"}}, "torques": {torque}"#)
+    };
+    // Before the first point 0.3 over 0.1 s, after the last one -0.4 over 0.3 s.
+    let [_, omega] = at(&acting("f(t)"), ["0", "1"], "2.5");
+    near(&omega, &(one() + fixed("0.03") + spline.integral() - fixed("0.12")), PLACES - 1);
+    // From an angle of 0 to one of 2.5.
+    let parts = format!(
+        r#"{}, "events": [{{"name": "there", "when": "rotor.phi - 2.5", "action": "stop"}}]"#,
+        acting("f(rotor.phi)")
+    );
+    let mut run = begun(&source(&rotor(&parts, "0", "1"), &[], "9", "9"));
+    run.row(1, &mut || false).expect("no stop").expect("no pause");
+    let omega = number(run.events()[0].omega[0]);
+    let twice = (fixed("0.03") + spline.integral() - fixed("0.12")) * 2;
+    near(&times(&omega, &omega), &(one() + twice), PLACES - 1);
+    // 1.75 s is in the middle of the second piece.
+    let parts = format!(r#"{table}, "motors": [{{"name": "motor", "body": "rotor", "law": "f(t)"}}]"#);
+    let motor = rotor(&parts, "0", "0").replace(r#""start": {"rotor": {"phi": 0, "omega": 0}}, "#, "");
+    let row = last(&source(&motor, &[], "1.75", "1.75"), DIGITS);
+    let [angle, rate] = spline.middle();
+    near(&number(row.bodies[0][0]), &angle, PLACES);
+    near(&number(row.bodies[0][1]), &rate, PLACES - 1);
+}
+
 /// A ball of 2 kg.
 fn ball(parts: &str) -> String {
     format!(

@@ -65,6 +65,8 @@ mod many_digits_corners;
 #[cfg(feature = "digits")]
 mod many_digits_events;
 #[cfg(feature = "digits")]
+mod many_digits_switched;
+#[cfg(feature = "digits")]
 mod many_digits_walls;
 mod metamorphic;
 mod modes;

@@ -392,6 +392,43 @@ mod command {
         ended(child).exits(6).says(&["no interrupted run"]);
     }
 
+    /// The crate's methods end in the middle of a step where they are asked to; what watches the step before, for
+    /// events and means of outputs, has to see all of it.
+    #[test]
+    fn interruptions_leave_no_trace_in_events_and_outputs() {
+        let program = Program::with_scenes(&["gentle"]);
+        let text = program.read("gentle.json").trim_end().strip_suffix('}').expect("an object").to_owned()
+            + r#", "events": [{"name": "level", "when": "bar1.cos - 0.99"}]}"#;
+        program.write("watched.json", &text);
+        let run = "run watched.json --method dopri5 --rtol 1e-11 --until 150 --every 1 --output lean=bar2.sin \
+                   --no-charts --trust off";
+        let folder = "whole/gentle/dopri5-1e-11";
+        program.run(&format!("{run} --out whole -q")).exits(0);
+        let whole =
+            ["events.csv", "trajectory.csv"].map(|table| results(&program, folder, table, "run.json"));
+        let mut child = started(&program, run);
+        let mut count = 0;
+        loop {
+            std::thread::sleep(Duration::from_millis(40));
+            signal(&child, "-INT");
+            let ran = ended(child);
+            if ran.code == 0 {
+                break;
+            }
+            ran.exits(130);
+            count += 1;
+            child = started(&program, "resume output");
+        }
+        assert!(count > 2, "{count} interruptions");
+        let folder = folder.replace("whole", "output");
+        for (table, whole) in ["events.csv", "trajectory.csv"].iter().zip(&whole) {
+            assert!(
+                results(&program, &folder, table, "run.json") == *whole,
+                "{table}, {count} interruptions"
+            );
+        }
+    }
+
     #[test]
     fn one_that_used_up_its_evaluations_goes_on_where_more_are_allowed() {
         let program = Program::with_scenes(&["free"]);

@@ -11,6 +11,10 @@ use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Real, Scalar};
 use crate::scene::Scene;
 
+/// Share of the energy that gravity on free bodies and applied forces can bring below which what is there at the
+/// start does not count.
+const LEAST_SCALE: f64 = 1e-3;
+
 /// Energies at one moment \[J\].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy<T> {
@@ -257,8 +261,8 @@ impl Mechanism {
     }
 
     /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start
-    /// \[J\].  Where all of these are zero, that of gravity on free bodies and of applied forces along the
-    /// size of the mechanism, and of torques over 1 rad; 1 J where these are zero, too.
+    /// \[J\].  Where all of these are less than a thousandth of it, that of gravity on free bodies and of applied
+    /// forces along the size of the mechanism, and of torques over 1 rad; 1 J where these are zero, too.
     pub fn scale_of_energy(&self, start: &Motion) -> f64 {
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         let kinetic = self.energy(&mut kernel, &start.phi, &start.omega).kinetic.hi;
@@ -267,10 +271,7 @@ impl Mechanism {
         let gravity: f64 =
             self.tree.weight[..self.bodies.len()].iter().map(|weight| weight.norm_squared().sqrt()).sum();
         let vibration = self.vibration.as_ref().map_or(0.0, |vibration| vibration.energy);
-        let scale = gravity + kinetic + springs + torsions + vibration;
-        if scale > 0.0 {
-            return scale;
-        }
+        let known = gravity + kinetic + springs + torsions + vibration;
         let size = self.size_of_parts();
         let falling: f64 =
             self.bodies.iter().map(|body| body.mass * self.gravity.norm_squared().sqrt() * size).sum();
@@ -278,7 +279,12 @@ impl Mechanism {
             Kind::Force { force, .. } => force.norm_squared().sqrt() * size,
             Kind::Torque { torque, .. } => torque.abs(),
         });
-        let scale = falling + applied.sum::<f64>() + self.forces_at_start(start, size);
-        if scale > 0.0 { scale } else { 1.0 }
+        let moving = falling + applied.sum::<f64>() + self.forces_at_start(start, size);
+        // A start almost at rest is one at rest.
+        match (known > LEAST_SCALE * moving, moving > 0.0) {
+            (true, _) => known,
+            (false, true) => moving,
+            (false, false) => 1.0,
+        }
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
 //! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  Formulas of
-//! time and state are kept as texts and read as exactly when the mechanism is compiled.  What a formula takes
-//! from a table has no such digits, and is refused by name.  Numbers may also be given beside the text, with
-//! derivatives that no text holds.
+//! time and state are kept as texts and read as exactly when the mechanism is compiled.  Points of tables are
+//! numbers of the text too; of those in files the shortest digits count that read as the same double.  Numbers
+//! may also be given beside the text, with derivatives that no text holds.
 
 mod laws;
 mod parts;
@@ -15,7 +15,7 @@ use super::locate::{Node, Source, Span, Value, push_index, push_key};
 use super::number::Decimal;
 use super::read::put_together;
 use super::template::Template;
-use super::{Scene, SceneEvent, Wall};
+use super::{PointTable, Scene, SceneEvent, Wall};
 use std::cell::RefCell;
 
 /// The times of a scene.
@@ -61,9 +61,11 @@ impl Template {
             is_read: RefCell::new(vec![false; known.len()]),
             watched,
             parameters: Vec::new(),
+            tables: Vec::new(),
         };
         reader.refuse_parts(&plain)?;
         reader.parameters = reader.known_parameters(&plain)?;
+        reader.tables = reader.tables(&plain);
         let times = Times {
             until: reader.number(&reader.root, "until", plain.until)?,
             every: reader.number(&reader.root, "every", plain.every)?,
@@ -151,6 +153,7 @@ struct Reader<'a, C> {
     is_read: RefCell<Vec<bool>>,
     watched: Watched,
     parameters: Vec<(String, C)>,
+    tables: Vec<PointTable<C>>,
 }
 
 impl<'a, C: Decimal> Reader<'a, C> {
@@ -182,7 +185,6 @@ impl<'a, C: Decimal> Reader<'a, C> {
                 return Err(self.refuse_part(&at, why));
             }
         }
-        self.refuse_switched_joints(scene)?;
         if !scene.frictions.is_empty() {
             let mut items = ["hinges", "sliders", "walls"].iter().flat_map(|list| self.root.items(list));
             let at = items.find_map(|at| at.child("friction")).unwrap_or_else(|| self.root.clone());
@@ -209,25 +211,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             return Err(self
                 .refuse_part(at.unwrap_or(&self.root), "a rigid spring has the mean force of a vibration"));
         }
-        self.refuse_tables()
-    }
-
-    /// Refuses hinges, motors and locks that events switch: what closes takes a jump.
-    fn refuse_switched_joints(&self, scene: &Scene) -> Result<(), SceneError> {
-        let joints = (scene.hinges.iter().map(|joint| &joint.name))
-            .chain(scene.locks.iter().map(|joint| &joint.name))
-            .chain(scene.motors.iter().map(|joint| &joint.name))
-            .chain(scene.drives.iter().map(|joint| &joint.name))
-            .chain(scene.couplings.iter().map(|joint| &joint.name));
-        let joints: Vec<&String> = joints.collect();
-        let of_events = scene.events.iter().map(|event| ("events", event.on.iter().chain(&event.off)));
-        let switched = std::iter::once(("inactive", scene.inactive.iter().chain(&[]))).chain(of_events);
-        for (key, mut parts) in switched {
-            if let (Some(part), Some(at)) = (parts.find(|part| joints.contains(part)), self.root.child(key)) {
-                return Err(self.refuse_part(&at, &format!("{part} is released and closed")));
-            }
-        }
-        Ok(())
+        self.refuse_corners()
     }
 
     fn known_parameters(&self, scene: &Scene) -> Result<Vec<(String, C)>, SceneError> {

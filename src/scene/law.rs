@@ -29,11 +29,11 @@ pub struct NamedPoint<C = f64> {
 
 /// A function given by points, interpolated smoothly.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PointTable {
+pub struct PointTable<C = f64> {
     /// Name, as formulas call it.
     pub name: String,
     /// Points (x, y) with ascending x.
-    pub points: Vec<[f64; 2]>,
+    pub points: Vec<[C; 2]>,
 }
 
 /// A formula with a name, for others to use.
@@ -293,7 +293,10 @@ pub struct Names<C = f64> {
 impl<C: Real> Names<C> {
     /// Those of a scene: time, bars, points, springs and parameters; signals are added one by one.
     pub fn of(scene: &Scene<C>) -> Self {
-        let tables = scene.tables.iter().map(|table| Interpolant::new(&table.name, &table.points));
+        let tables = scene.tables.iter().map(|table| {
+            let points: Vec<_> = table.points.iter().map(|point| point.map(|x| x.value())).collect();
+            Interpolant::new(&table.name, &points)
+        });
         let mut names = Self { tables: tables.collect(), ..Self::default() };
         names.add("t".into(), Meaning::Time);
         for (number, parameter) in scene.parameters.iter().enumerate() {

@@ -108,7 +108,7 @@ pub struct Scene<C = f64> {
     pub points: Vec<NamedPoint<C>>,
     /// Functions given by points.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub tables: Vec<PointTable>,
+    pub tables: Vec<PointTable<C>>,
     /// Formulas with names, each of those before it.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub signals: Vec<Signal>,

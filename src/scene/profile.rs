@@ -4,7 +4,7 @@
 //! A formula with corners, or with tables, is recorded on the branches that hold at one time; a run that
 //! meets a zero of one of its conditions records it anew, as it does with laws of forces.
 
-use super::formula::Formula;
+use super::formula::{Formula, Numbers};
 use super::number::Decimal;
 use crate::arithmetic::tape::{Slot, Symbol, Tape, TapeSeries, number_of};
 use crate::arithmetic::{DoubleDouble, Over, Real, Scalar};
@@ -28,16 +28,21 @@ pub struct Profile<C = f64> {
 }
 
 impl<C: Decimal> Profile<C> {
-    /// The law of a formula on the branches that hold at t = 0; `values` are those of its names, `None` for
-    /// t.
-    pub(crate) fn new(formula: &Formula, values: &[Option<C>]) -> Self {
+    /// The law of a formula on the branches that hold at t = 0; `numbers` are its own where they may be no
+    /// doubles, `values` those of its names, `None` for t.
+    pub(crate) fn new(formula: &Formula, numbers: Option<&Numbers<C>>, values: &[Option<C>]) -> Self {
         let modes = formula.modes(&at(values, 0.0));
-        Self::on_branch(formula, values, &modes)
+        Self::on_branch(formula, numbers, values, &modes)
     }
 
     /// The same on the branches where the conditions whose `modes` are set are positive.
-    pub(crate) fn on_branch(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
-        let law = Self::recorded(formula, values, modes);
+    pub(crate) fn on_branch(
+        formula: &Formula,
+        numbers: Option<&Numbers<C>>,
+        values: &[Option<C>],
+        modes: &[bool],
+    ) -> Self {
+        let law = Self::recorded(formula, numbers, values, modes);
         let looks: Vec<f64> = (0..LOOKS).map(|look| formula.value(&at(values, look as f64 / 8.0))).collect();
         let most = |values: &mut dyn Iterator<Item = f64>| {
             values.map(f64::abs).filter(|value| value.is_finite()).fold(0.0, f64::max)
@@ -95,24 +100,28 @@ impl<C> Profile<C> {
 }
 
 impl<C: Decimal> Profile<C> {
-    /// The law on these branches, without its peaks; `values` are those of its names, `None` for t.
-    fn recorded(formula: &Formula, values: &[Option<C>], modes: &[bool]) -> Self {
+    /// The law on these branches, without its peaks.
+    fn recorded(
+        formula: &Formula,
+        numbers: Option<&Numbers<C>>,
+        values: &[Option<C>],
+        modes: &[bool],
+    ) -> Self {
         let inputs = RefCell::new(Vec::new());
         let constant = |value: C| match C::HAS_CONSTANTS {
             // The tape folds constants in doubles.
             true => Symbol::input(1 + number_of(&inputs, &value) as u32),
             false => Symbol::of(value.value()),
         };
-        let numbers = if C::HAS_CONSTANTS { formula.numbers() } else { Vec::new() };
         let [(tape, results)] = Symbol::record(|| {
             let slope = |of: Symbol| {
                 of.gradient().iter().find(|part| part.0 == 0).map_or(Symbol::ZERO, |part| part.1)
             };
             let t = Symbol::input(0);
             let values: Vec<Symbol> = values.iter().map(|value| value.map_or(t, constant)).collect();
-            let law = match C::HAS_CONSTANTS {
-                true => formula.evaluate_over(&values, modes, |node| constant(numbers[node])),
-                false => formula.evaluate(&values, modes),
+            let law = match numbers {
+                Some(numbers) => formula.evaluate_over(&values, modes, |origin| constant(numbers.at(origin))),
+                None => formula.evaluate(&values, modes),
             };
             let rate = slope(law);
             [vec![law, rate, slope(rate)]]
@@ -149,7 +158,7 @@ mod tests {
     fn derivatives_and_series_are_those_of_the_formula() {
         let formula = Formula::parse("a*tanh(2*t) + exp(-t)*sin(3*t^2)").expect("a formula");
         let values: Vec<Option<f64>> = formula.names().map(|name| (name == "a").then_some(1.5)).collect();
-        let profile = Profile::new(&formula, &values);
+        let profile = Profile::new(&formula, None, &values);
         let (t, h) = (0.7_f64, 1e-4);
         let exact = |t: f64| 1.5 * (2.0 * t).tanh() + (-t).exp() * (3.0 * t * t).sin();
         let [value, rate, acceleration] = profile.at(t);
@@ -167,9 +176,9 @@ mod tests {
     #[test]
     fn corners_are_recorded_on_the_branch_of_the_start() {
         let formula = Formula::parse("if(t < 2, t^3, 8 + 12*(t - 2))").expect("a formula");
-        let profile = Profile::new(&formula, &[None]);
+        let profile = Profile::new(&formula, None, &[None]);
         assert_eq!(profile.at(3.0), [27.0, 27.0, 18.0]);
-        let late = Profile::on_branch(&formula, &[None], &formula.modes(&[3.0]));
+        let late = Profile::on_branch(&formula, None, &[None], &formula.modes(&[3.0]));
         assert_eq!(late.at(3.0), [20.0, 12.0, 0.0]);
     }
 }

@@ -211,12 +211,12 @@ fn part<F: OdeSystem + ?Sized>(
         .min(u64::from(u32::MAX)) as u32;
     let most_rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
     let (mut times, mut rows, outcome) = {
-        let window = Window::new(field, state.time, &unit, most_rows);
+        let window = Window::new(field, state.time, &unit, most_rows, kept.finishes);
         integrate(window, &y, span / time_unit, first, most)
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
     kept.failure = None;
-    if interruption::is_asked() {
+    if !kept.finishes && interruption::is_asked() {
         *statistics = before;
         kept.clear();
         return Ok(());
@@ -286,7 +286,7 @@ fn shorter<F: OdeSystem + ?Sized>(
     inside.clone_from(from);
     inside.memory.clear();
     inside.memory.push((time - from.time).hi);
-    let mut rows = Rows::default();
+    let mut rows = Rows { finishes: true, ..Rows::default() };
     let outcome = part(&mut rows, stepper, integrate, field, inside, time, &mut Statistics::default());
     if outcome.is_ok() && rows.failure.is_none() && !rows.after.is_empty() {
         rows.last = rows.after.len() - 1;

@@ -49,7 +49,7 @@ pub struct ExactMechanism<C> {
     /// What acts.
     pub acting: Acting<C>,
     laws: Option<Arc<Formulas<C>>>,
-    all: Arc<ForceElements<C>>,
+    all: Arc<AllParts<C>>,
     /// Constraint equations.
     pub constraints: Vec<ConstraintEquation<C>>,
     /// The gap of each wall, and its restitution.
@@ -58,12 +58,13 @@ pub struct ExactMechanism<C> {
     ground_energy: C,
 }
 
-/// All springs, torsion springs, and applied forces and torques, whatever acts.
+/// All springs, torsion springs, applied forces and torques, and constraint equations, whatever acts.
 #[derive(Debug)]
-struct ForceElements<C> {
+struct AllParts<C> {
     springs: Vec<Spring<C>>,
     torsions: Vec<Torsion<C>>,
     actions: Vec<Action<C>>,
+    constraints: Vec<ConstraintEquation<C>>,
 }
 
 /// What acts at a moment, and how.
@@ -75,6 +76,8 @@ pub struct Acting<C> {
     pub modes: Vec<bool>,
     /// Parts that rest, by name.
     pub off: Vec<String>,
+    /// How far motors, and locks without an angle, go on from what they said, row by row \[rad, m\].
+    pub shifts: Vec<C>,
 }
 
 /// An event.
@@ -130,8 +133,13 @@ impl<C: Decimal> ExactMechanism<C> {
         let laws = Formulas::of(scene, &forest).map_err(|error| error.to_string())?.map(Arc::new);
         let acting = Acting {
             parameters: laws.as_ref().map_or_else(Vec::new, |laws| laws.parameters.clone()),
-            modes: structure.laws.as_ref().map_or_else(Vec::new, |laws| laws.modes.clone()),
-            off: structure.whole.as_ref().map_or_else(Vec::new, |(_, inactive)| inactive.clone()),
+            modes: {
+                let known = structure.laws.as_ref().map_or(&[][..], |laws| &laws.modes);
+                let count = laws.as_ref().map_or(0, |laws| laws.conditions.len());
+                known.iter().copied().chain(std::iter::repeat(false)).take(count).collect()
+            },
+            off: structure.resting().to_vec(),
+            shifts: vec![C::ZERO; constraints.len()],
         };
         let event = |event: &SceneEvent| ExactEvent {
             name: event.name.clone(),
@@ -139,10 +147,11 @@ impl<C: Decimal> ExactMechanism<C> {
             stop: event.stop,
             changes: event.changes(),
         };
-        let all = ForceElements {
+        let all = AllParts {
             springs: parts::springs(scene, &forest),
             torsions: parts::torsions(scene),
             actions: parts::actions(scene, &forest),
+            constraints,
         };
         let ground_energy = (bodies.iter().zip(&forest.roots()))
             .fold(C::ZERO, |sum, (body, &root)| sum - body.mass * gravity.dot(root));
@@ -166,7 +175,7 @@ impl<C: Decimal> ExactMechanism<C> {
                     (parts::along_wall(&forest, wall, normal, wall.law.clone()).0, wall.restitution)
                 })
                 .collect(),
-            constraints,
+            constraints: Vec::new(),
             ground_energy,
             bodies,
             forest,
@@ -181,10 +190,20 @@ impl<C: Decimal> ExactMechanism<C> {
     pub fn with(&self, acting: Acting<C>) -> Result<Self, CompileError> {
         let mut next = self.clone();
         let acts = |name: &String| !acting.off.contains(name);
-        let ForceElements { springs, torsions, actions } = &*self.all;
+        if acting.off != self.structure.resting() {
+            let whole = self.structure.with_all_parts().clone();
+            next.structure = Arc::new(whole.acting(&acting.off)?);
+        }
+        let AllParts { springs, torsions, actions, constraints } = &*self.all;
         next.springs = springs.iter().filter(|spring| acts(&spring.name)).cloned().collect();
         next.torsions = torsions.iter().filter(|torsion| acts(&torsion.name)).cloned().collect();
         next.actions = actions.iter().filter(|action| acts(&action.name)).cloned().collect();
+        next.constraints.clone_from(constraints);
+        for (row, &shift) in next.constraints.iter_mut().zip(&acting.shifts) {
+            if let Some(law) = &mut row.law {
+                law.start += shift;
+            }
+        }
         if let Some(laws) = &self.laws {
             let Acting { parameters, modes, .. } = &acting;
             next.forces = laws.record(parameters, modes)?;
@@ -203,6 +222,12 @@ impl<C: Decimal> ExactMechanism<C> {
                 }
             }
             next.partition = next.partition.renewed(&next.constraints)?;
+        }
+        let whole = next.structure.with_all_parts();
+        for (r, row) in next.constraints.iter_mut().enumerate() {
+            if next.structure.constraints[r].is_released(&whole.constraints[r]) {
+                row.release(next.bodies.len());
+            }
         }
         next.acting = acting;
         Ok(next)
@@ -354,6 +379,12 @@ impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
 
 #[cfg(feature = "digits")]
 impl<C: Decimal + Over<C>> ExactMechanism<C> {
+    /// The rows that are in force and were not in force of this mechanism before.
+    pub fn closing(&self, before: &Self) -> Vec<usize> {
+        let rows = before.structure.constraints.iter().zip(&self.structure.constraints).enumerate();
+        rows.filter(|(_, (before, now))| before.is_released(now)).map(|(r, _)| r).collect()
+    }
+
     /// What acts after an event at a time, coordinates and rates.
     pub fn after(&self, event: usize, t: C, phi: &[C], omega: &[C]) -> Acting<C> {
         let mut next = self.acting.clone();

@@ -2,8 +2,6 @@
 
 use super::{CompileError, Laws, Mechanism, Switches};
 use crate::dynamics::Motion;
-use crate::dynamics::constraint::Measure;
-use crate::dynamics::quadratic::Quadratic;
 use crate::scene::Scene;
 use std::sync::Arc;
 
@@ -131,6 +129,11 @@ impl Mechanism {
         }
     }
 
+    /// Parts that do not act, by name.
+    pub(crate) fn resting(&self) -> &[String] {
+        self.whole.as_ref().map_or(&[], |(_, inactive)| inactive)
+    }
+
     /// The mechanism with all its parts, whatever acts at the start.
     pub(crate) fn with_all_parts(&self) -> &Self {
         self.whole.as_ref().map_or(self, |(whole, _)| whole)
@@ -147,8 +150,7 @@ impl Mechanism {
         for &r in &rows {
             let angles = self.bodies.len();
             let row = &mut self.constraints[r];
-            row.measure = Measure::Place(Quadratic { angles, ..Quadratic::default() });
-            (row.law, row.push, row.aim) = (None, None, None);
+            row.release(angles);
             // As those that depend on others, they say nothing of the position.
             self.assembly.redundant.push(row.name.clone());
             self.recursion = None;
@@ -159,7 +161,7 @@ impl Mechanism {
     /// Puts back what was released, as `before` has it.
     pub(super) fn put_back(&mut self, before: &Self) {
         for (row, before) in self.constraints.iter_mut().zip(&before.constraints) {
-            if row.coordinates().is_empty() && !before.coordinates().is_empty() {
+            if row.is_released(before) {
                 self.assembly.redundant.retain(|name| *name != row.name);
                 row.clone_from(before);
             }

@@ -165,6 +165,17 @@ impl<C: Real> ConstraintEquation<C> {
         found
     }
 
+    /// Lets it constrain nothing any more, of a mechanism of so many angles.
+    pub(super) fn release(&mut self, angles: usize) {
+        self.measure = Measure::Place(Quadratic { angles, ..Quadratic::default() });
+        (self.law, self.push, self.aim) = (None, None, None);
+    }
+
+    /// True where it constrains nothing, and as it is in another mechanism it would.
+    pub(super) fn is_released(&self, elsewhere: &Self) -> bool {
+        self.coordinates().is_empty() && !elsewhere.coordinates().is_empty()
+    }
+
     /// C, for a row without a law \[m\]: the gap of a wall.
     pub fn gap<T: Over<C>>(&self, z: &[Complex<T>]) -> T {
         match &self.measure {

@@ -5,14 +5,14 @@
 //! on the other branch, so that no method ever steps across a corner.
 
 use super::law::{Acts, Law};
+use crate::arithmetic::Scalar;
 use crate::arithmetic::tape::Symbol;
-use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
-use crate::scene::formula::Formula;
+use crate::scene::formula::{Formula, Numbers, Origin};
 use crate::scene::{
-    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, Scene, Scope, Wall,
+    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, PointTable, Scene, Scope, Wall,
 };
 use std::sync::Arc;
 
@@ -59,13 +59,13 @@ impl<C: Copy> Meaning<Site<C>> {
 pub(super) struct Expression<C = f64> {
     pub formula: Formula,
     pub meanings: Vec<Meaning<Site<C>>>,
-    /// The numbers of its nodes, where they may be no doubles.
-    numbers: Vec<C>,
+    /// Its numbers, where they may be no doubles.
+    pub(super) numbers: Option<Box<Numbers<C>>>,
     /// The number of its first condition among all.
     first: usize,
 }
 
-impl<C: Real> Expression<C> {
+impl<C: Decimal> Expression<C> {
     pub fn values<S: Scalar>(&self, at: &Configuration<S, C>, parameters: &[C], signals: &[S]) -> Vec<S> {
         self.meanings.iter().map(|meaning| meaning.value(at, parameters, signals)).collect()
     }
@@ -79,10 +79,12 @@ impl<C: Real> Expression<C> {
         modes: &[bool],
     ) -> S {
         let (values, modes) = (self.values(at, parameters, signals), self.modes(modes));
-        if self.numbers.is_empty() {
-            return self.formula.evaluate(&values, modes);
+        match &self.numbers {
+            None => self.formula.evaluate(&values, modes),
+            Some(numbers) => {
+                self.formula.evaluate_over(&values, modes, |origin| at.constant(numbers.at(origin)))
+            }
         }
-        self.formula.evaluate_over(&values, modes, |node| at.constant(self.numbers[node]))
     }
 
     /// Adds the values of its conditions on those branches.
@@ -95,8 +97,8 @@ impl<C: Real> Expression<C> {
         all: &mut Vec<S>,
     ) {
         let (values, modes) = (self.values(at, parameters, signals), self.modes(modes));
-        let number = |node: usize, value: f64| match self.numbers.get(node) {
-            Some(&number) => at.constant(number),
+        let number = |origin: Origin, value: f64| match &self.numbers {
+            Some(numbers) => at.constant(numbers.at(origin)),
             None => S::of(value),
         };
         self.formula.condition_values_over(&values, modes, &number, all);
@@ -170,6 +172,7 @@ pub(crate) struct Formulas<C = f64> {
 /// Collects expressions and numbers their conditions.
 struct Binder<'a, C> {
     forest: &'a Forest<C>,
+    tables: &'a [PointTable<C>],
     conditions: Vec<String>,
 }
 
@@ -185,7 +188,7 @@ impl<C: Decimal> Binder<'_, C> {
         self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
         let site = |place| self.forest.site(&place);
         let meanings = meanings.into_iter().map(|meaning| meaning.with_points(site)).collect();
-        let numbers = if C::HAS_CONSTANTS { formula.numbers() } else { Vec::new() };
+        let numbers = C::HAS_CONSTANTS.then(|| Box::new(Numbers::of(&formula, self.tables)));
         Expression { formula, meanings, numbers, first }
     }
 
@@ -218,7 +221,7 @@ impl<C: Decimal> Formulas<C> {
             return Ok(None);
         }
         let mut names = Names::of(scene);
-        let mut binder = Binder { forest, conditions: Vec::new() };
+        let mut binder = Binder { forest, tables: &scene.tables, conditions: Vec::new() };
         let mut signals = Vec::new();
         for signal in &scene.signals {
             let bound = Binder::bind(&names.alone(), &signal.formula, &signal.name)?;
@@ -280,10 +283,19 @@ impl<C: Decimal> Formulas<C> {
             let part = Driven { name: name.clone(), is_wall: true };
             aims.push((part, Vec::new(), binder.expression(&names.alone(), aim, name)?));
         }
-        let conditions = std::mem::take(&mut binder.conditions);
+        let mut whens = Vec::new();
+        let of_laws = binder.conditions.len();
+        for event in &scene.events {
+            whens.push(binder.expression(&names.alone(), &event.when, &event.name)?);
+        }
+        let mut conditions = std::mem::take(&mut binder.conditions);
+        if !C::HAS_CONSTANTS {
+            // In doubles the functions of events are never extended beyond their corners.
+            conditions.truncate(of_laws);
+        }
         let parameter = |name: &String| scene.parameters.iter().position(|known| known.name == *name);
         let mut events = Vec::new();
-        for event in &scene.events {
+        for (event, when) in scene.events.iter().zip(whens) {
             let mut set = Vec::new();
             for (name, text) in &event.set {
                 let number = parameter(name)
@@ -292,7 +304,7 @@ impl<C: Decimal> Formulas<C> {
             }
             events.push(FormulaEvent {
                 name: event.name.clone(),
-                when: binder.expression(&names.alone(), &event.when, &event.name)?,
+                when,
                 direction: event.direction,
                 stop: event.stop,
                 on: event.on.clone(),
@@ -342,7 +354,8 @@ impl<C: Decimal> Formulas<C> {
     fn switched(&self) -> impl Iterator<Item = &Expression<C>> {
         let laws = self.laws.iter().flat_map(Law::expressions);
         let profiles = self.profiles.iter().map(|profile| &profile.1);
-        self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
+        let laws = self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2));
+        laws.chain(self.events.iter().filter(|_| C::HAS_CONSTANTS).map(|event| &event.when))
     }
 }
 

@@ -84,7 +84,10 @@ impl<C: Decimal> Formulas<C> {
                 _ => None,
             };
             let values: Vec<Option<C>> = expression.meanings.iter().map(value).collect();
-            (part, Profile::on_branch(&expression.formula, &values, expression.modes(modes)))
+            (part, {
+                let Expression { formula, numbers, .. } = expression;
+                Profile::on_branch(formula, numbers.as_deref(), &values, expression.modes(modes))
+            })
         })
     }
 

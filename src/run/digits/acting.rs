@@ -1,11 +1,15 @@
 //! What acts on a motion in many digits changes: events switch parts and set parameters, formulas come to their
 //! corners.
+//!
+//! What closes does so plastically, as in all methods (`run/latch.rs`): its points have to meet, a motor and a
+//! lock without an angle go on from where they are, and the energy lost is booked with the event.
 
 use super::branches::Branches;
 use super::confirm::Probe;
 use super::events::Watch;
 use super::functions::Functions;
-use super::motion::Motion;
+use super::keep::Keeper;
+use super::motion::{LongState, Motion};
 use super::posture::Posture;
 use super::wall;
 use crate::arithmetic::digits::Digits;
@@ -17,6 +21,8 @@ use crate::stepping::{Cause, StepError};
 
 /// Part of the bits carried in which the laws of motors agree on both sides of a corner.
 const SAME: f64 = 0.5;
+/// How far apart what closes may be: angles \[rad\], and points over the size of the mechanism.
+const MEETS: f64 = 1e-6;
 /// How far behind a wall a point may be when it begins to stand in the way, over the size of the mechanism.
 const BEHIND: f64 = 1e-9;
 
@@ -55,13 +61,21 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.
-    fn let_act(&mut self, acting: Acting<Digits<W>>) -> Result<(), StepError> {
+    fn let_act(&mut self, mut acting: Acting<Digits<W>>) -> Result<(), StepError> {
         let before = (self.state_posture(), self.energy());
         let walls: Vec<_> =
             self.mechanism.walls.iter().map(|(row, _)| (self.is_off(row), row.law.clone())).collect();
         let unsuited = |motion: &Self, what: &str, hint: &str| motion.stop(Cause::Unsuited, 0.0, what, hint);
+        let mechanism = self.mechanism.clone();
         if let Err(error) = self.exchange(&acting) {
             return Err(unsuited(self, &format!("the run cannot go on: {error}"), "look at that formula"));
+        }
+        let closing = self.mechanism.closing(&mechanism);
+        if let Some(shifts) = self.engaged(&closing, &acting.shifts) {
+            acting.shifts = shifts;
+            if let Err(error) = self.exchange(&acting) {
+                return Err(unsuited(self, &format!("the run cannot go on: {error}"), "look at its law"));
+            }
         }
         self.state.acting = acting;
         // The next series is another one.
@@ -80,11 +94,12 @@ impl<const W: usize> Motion<W> {
                 return Err(unsuited(self, &what, hint));
             }
         }
+        self.close(&closing)?;
         let after = self.state_posture();
         let apart = |(a, b): (&Digits<W>, &Digits<W>)| (*a - *b).log2() - a.log2().max(0.0);
         let moved = |a: &[Digits<W>], b: &[Digits<W>]| a.iter().zip(b).map(apart).fold(f64::MIN, f64::max);
         let jump = moved(&before.0.phi, &after.phi).max(moved(&before.0.omega, &after.omega));
-        if jump > -SAME * self.precision.bits as f64 {
+        if closing.is_empty() && jump > -SAME * self.precision.bits as f64 {
             let what = format!("the law of a motor jumps by {:.1e}", libm::exp2(jump));
             return Err(unsuited(self, &what, "it must keep its value and its rate through its corners"));
         }
@@ -101,8 +116,53 @@ impl<const W: usize> Motion<W> {
         self.probe = Probe::of(&mechanism, self.coordinates);
         self.watch = std::mem::take(&mut self.watch).renewed([&self.mechanism, &mechanism], order);
         self.branches = Branches::new(Functions::new(&mechanism.conditions, order));
+        self.keeper = Keeper::new(&mechanism, self.precision);
         self.mechanism = mechanism;
         Ok(())
+    }
+
+    /// The shifts with which those rows that close and are motors, or locks without an angle, go on from where
+    /// they are; `None` where none of them is.
+    fn engaged(&mut self, closing: &[usize], shifts: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
+        let clutches = &self.mechanism.structure.switches.clutches;
+        let names = self.mechanism.constraints.iter().map(|row| clutches.contains(&row.name));
+        let is_clutch: Vec<bool> = names.collect();
+        let rows: Vec<usize> = closing.iter().copied().filter(|&r| is_clutch[r]).collect();
+        if rows.is_empty() {
+            return None;
+        }
+        let residuals = self.residuals();
+        let mut shifts = shifts.to_vec();
+        rows.into_iter().for_each(|r| shifts[r] += residuals[r]);
+        Some(shifts)
+    }
+
+    /// What is left of every constraint equation \[rad, m\].
+    fn residuals(&mut self) -> Vec<Digits<W>> {
+        let Posture { phi, omega, .. } = self.state_posture();
+        let residuals = self.keeper.residuals(&self.mechanism, self.state.t, &phi, &omega);
+        residuals.into_iter().map(|residual| residual[0]).collect()
+    }
+
+    /// Lets those rows take hold that were not in force before.
+    fn close(&mut self, closing: &[usize]) -> Result<(), StepError> {
+        if closing.is_empty() {
+            return Ok(());
+        }
+        let (residuals, size) = (self.residuals(), self.mechanism.structure.size_of_parts());
+        for &r in closing {
+            let row = &self.mechanism.structure.constraints[r];
+            let (off, unit) = (residuals[r].value(), if row.is_in_radians() { 1.0 } else { size });
+            if off.is_nan() || off.abs() > MEETS * unit {
+                let what = format!("an event closes {}, which is off by {off:.3e} {}", row.name, row.unit());
+                return Err(self.stop(Cause::Unsuited, 0.0, &what, "let the event be where it meets"));
+            }
+        }
+        let LongState { t, u, rate, .. } = &mut self.state;
+        let work = self.keeper.close(&self.mechanism, *t, u, rate);
+        self.state.work += work;
+        self.state.jump_energy -= work;
+        self.settle()
     }
 
     /// Kinetic and potential energy of the state \[J\].

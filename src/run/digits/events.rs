@@ -62,10 +62,13 @@ impl<const W: usize> Watch<W> {
         Self { functions, sides: vec![0; mechanism.events.len()], ..Self::default() }
     }
 
-    /// The same where another mechanism acts than before: functions that are others now may have jumped.
+    /// The same where another mechanism acts than before: functions of parameters that are others now may have
+    /// jumped, which is no passage; at a corner of their own it is one.
     pub fn renewed(self, [before, now]: [&ExactMechanism<Digits<W>>; 2], order: usize) -> Self {
         let functions = Functions::new(&now.functions, order);
-        let is_same = before.functions.iter().zip(&now.functions).map(|(before, now)| before == now);
+        let keeps = before.acting.parameters == now.acting.parameters;
+        let functions_of = before.functions.iter().zip(&now.functions);
+        let is_same = functions_of.map(|(before, now)| keeps || before == now);
         let sides = self.sides.iter().zip(is_same).map(|(&side, is_same)| if is_same { side } else { 0 });
         Self { functions, sides: sides.collect(), happened: self.happened, ..Self::default() }
     }

@@ -9,6 +9,7 @@ use super::precision::Precision;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
+use crate::dynamics::series::Constants;
 use crate::dynamics::{schur, tree};
 use crate::stepping::{Cause, StepError};
 
@@ -100,7 +101,8 @@ impl<const W: usize> Keeper<W> {
         for column in order {
             let size = |r: usize| matrix[r * n + column].log2();
             let Some(&row) = free.iter().max_by(|&&a, &&b| size(a).total_cmp(&size(b))) else { break };
-            if size(row) < libm::log2(LEAST_PIVOT * self.scale[row].sqrt().min(1.0)) {
+            let least = libm::log2(LEAST_PIVOT * self.scale[row].sqrt().min(1.0));
+            if size(row) < least || size(row) == f64::NEG_INFINITY {
                 continue;
             }
             free.retain(|&other| other != row);
@@ -126,7 +128,7 @@ impl<const W: usize> Keeper<W> {
     }
 
     /// Residuals and their rates; leaves the Jacobian.
-    fn residuals(
+    pub(super) fn residuals(
         &mut self,
         mechanism: &ExactMechanism<Digits<W>>,
         t: Digits<W>,
@@ -209,6 +211,30 @@ impl<const W: usize> Keeper<W> {
                 *x -= entry * *multiplier;
             }
         }
+    }
+
+    /// Lets rows take hold at a posture: changes the rates to the nearest in kinetic energy that all of them
+    /// allow, and returns the work of motors \[J\].
+    ///
+    /// ```text
+    /// M (w⁺ - w⁻) + Gᵀ sigma = 0,   G w⁺ = s'(t)         work = -sigma · s'
+    /// ```
+    pub(super) fn close(
+        &mut self,
+        mechanism: &ExactMechanism<Digits<W>>,
+        t: Digits<W>,
+        phi: &[Digits<W>],
+        omega: &mut [Digits<W>],
+    ) -> Digits<W> {
+        let residuals = self.residuals(mechanism, t, phi, omega);
+        self.factor(mechanism, phi);
+        let mut impulses: Vec<_> = residuals.iter().map(|residual| residual[1]).collect();
+        self.take_off(&mut impulses, omega);
+        let driven = mechanism.constraints.iter().zip(impulses);
+        driven.fold(Digits::ZERO, |work, (row, impulse)| match &row.law {
+            Some(law) => work - impulse * Digits::phase(law, t).rate,
+            None => work,
+        })
     }
 
     /// The change of the rates by an impulse of one along `gradient`, the constraints kept; all at a posture.

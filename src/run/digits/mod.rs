@@ -122,6 +122,7 @@ pub struct Saved {
     parameters: Vec<Vec<u64>>,
     modes: Vec<bool>,
     off: Vec<String>,
+    shifts: Vec<Vec<u64>>,
 }
 
 impl Saved {
@@ -323,6 +324,7 @@ impl<const W: usize> LongRun for Runner<W> {
             parameters: acting.parameters.iter().map(Digits::to_words).collect(),
             modes: acting.modes.clone(),
             off: acting.off.clone(),
+            shifts: acting.shifts.iter().map(Digits::to_words).collect(),
         }
     }
 
@@ -345,7 +347,10 @@ impl<const W: usize> LongRun for Runner<W> {
             return false;
         }
         let f = self.motion.state().u.len();
-        let Some(parameters) = numbers_of(&saved.parameters) else { return false };
+        let (Some(parameters), Some(shifts)) = (numbers_of(&saved.parameters), numbers_of(&saved.shifts))
+        else {
+            return false;
+        };
         let (&[t, work, jump_energy], rest) = match numbers.split_first_chunk::<3>() {
             Some(split) if split.1.len() == 2 * f && saved.precision == self.precision() => split,
             _ => return false,
@@ -360,7 +365,7 @@ impl<const W: usize> LongRun for Runner<W> {
             steps: saved.steps,
             impacts: saved.impacts,
             radius: saved.radius,
-            acting: Acting { parameters, modes: saved.modes.clone(), off: saved.off.clone() },
+            acting: Acting { parameters, modes: saved.modes.clone(), off: saved.off.clone(), shifts },
         });
         (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
         is_known

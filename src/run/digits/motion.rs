@@ -174,7 +174,9 @@ impl<const W: usize> Motion<W> {
     /// Goes on from a state of this motion; false where it is none.
     pub fn resume(&mut self, state: LongState<W>) -> bool {
         let is_known = state.acting == self.mechanism.acting || {
-            let fits = |acting: &Acting<Digits<W>>| (acting.parameters.len(), acting.modes.len());
+            let fits = |acting: &Acting<Digits<W>>| {
+                (acting.parameters.len(), acting.modes.len(), acting.shifts.len())
+            };
             fits(&state.acting) == fits(&self.mechanism.acting) && self.exchange(&state.acting).is_ok()
         };
         self.state = state;

@@ -32,11 +32,11 @@ pub(in crate::run) struct EventMemory {
     pub(super) last: Vec<(usize, Time)>,
     /// Events of that moment which are still to happen, and whether their functions rise: the step was cut
     /// short by another one, or a jump of the rates has carried the function across zero.
-    due: Vec<(usize, bool)>,
+    pub(super) due: Vec<(usize, bool)>,
     /// What is to be done at the end of the step.
     pub pending: Option<(usize, Action)>,
     /// Conditions that changed sign last, and when.
-    flipped: Vec<(usize, Time)>,
+    pub(super) flipped: Vec<(usize, Time)>,
     /// Events of the scene that close a joint which is closed: they rest, as their functions do at zero.
     pub(super) resting: Vec<usize>,
     /// Those that rested until the last step.
@@ -362,13 +362,15 @@ impl StepWatcher for EventDetector {
         let mut passages = Vec::new();
         self.passages(inside, begin, span, 0, &mut passages);
         self.memory.woken.clear();
+        // In the order of their times for each function.
+        let all = passages.clone();
         passages.retain(|passage| self.counts(passage.event, passage.rises));
-        for passage in passages.iter_mut().filter(|passage| passage.t > begin) {
+        for passage in passages.iter_mut().filter(|passage| passage.t > begin && !passage.jumps) {
             passage.t = self.polished(inside, passage.event, passage.t);
         }
         let due = std::mem::take(&mut self.memory.due).into_iter();
         let due = due.filter(|&(event, rises)| self.counts(event, rises));
-        passages.extend(due.map(|(event, rises)| Passage { t: begin, event, rises }));
+        passages.extend(due.map(|(event, rises)| Passage { t: begin, event, rises, jumps: true }));
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for (number, &Passage { t, event, .. }) in passages.iter().enumerate() {
             let is_friction = matches!(self.owner(event), Owner::Friction(..));
@@ -391,6 +393,7 @@ impl StepWatcher for EventDetector {
                 }
                 self.memory.pending = Some((event, self.action(event, &motion)));
                 self.put_off(&passages[number + 1..], t, span);
+                self.cut(&all, t);
                 return Some(t);
             }
             self.count += 1;
@@ -406,6 +409,7 @@ impl StepWatcher for EventDetector {
                 self.memory.flipped.clear();
                 self.memory.pending = Some((event, action));
                 self.put_off(&passages[number + 1..], t, span);
+                self.cut(&all, t);
                 return Some(t);
             }
         }
@@ -414,6 +418,13 @@ impl StepWatcher for EventDetector {
 }
 
 impl EventDetector {
+    /// Takes back what passes zero later than the step is cut short.
+    fn cut(&mut self, passages: &[Passage], t: Time) {
+        for Passage { event, rises, .. } in passages.iter().rev().filter(|passage| passage.t > t) {
+            self.memory.sides[*event] = if *rises { -1 } else { 1 };
+        }
+    }
+
     /// Remembers the events that happen at the very moment, too, at which another one cuts a step short:
     /// where the next one begins rounding may have them behind.  Conditions stay on their sides until they
     /// flip.

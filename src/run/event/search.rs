@@ -1,12 +1,13 @@
 //! Zeros of event functions in a step: they are interpolated at Chebyshev points, by as high a degree as they
 //! ask for, and searched by the same root finding as walls and flips ([`search`](crate::stepping)); a zero is
-//! then polished on the dense output itself.
+//! then polished on the dense output itself.  Of functions that no interpolant resolves, as those with corners
+//! and jumps, the changes of sign between the nodes are bisected.
 
 use super::detector::{EventDetector, EventMemory, Owner, SAME};
 use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
 use crate::run::inside::Inside;
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root};
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
@@ -27,14 +28,21 @@ pub(super) const NO_VALUE: f64 = 1e-12;
 /// while.
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
+/// Share of a step after which a function has left a corner that began it, and share of its largest value there
+/// that tells a side.
+const AFTER: f64 = 1e-6;
+const BEYOND: f64 = 1e-4;
 /// Steps of this share of the time are rounding.
 const INSTANT: f64 = 8.0 * f64::EPSILON;
 
 /// A passage of an event function.
+#[derive(Clone)]
 pub(super) struct Passage {
     pub t: Time,
     pub event: usize,
     pub rises: bool,
+    /// True where the function jumps past zero.
+    pub jumps: bool,
 }
 
 /// Where a curve has left what it may be `off` by about its zero, from `share` on; `None` where that is not
@@ -67,7 +75,8 @@ impl EventDetector {
         self.friction.iter().for_each(FrictionWatch::search);
         let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
         let is_enough = |curve: &Chebyshev| curve.tail() <= self.resolved * curve.most();
-        let Interpolants { curves, values, .. } = interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));
+        let Interpolants { curves, values, nodes: Nodes { places, .. }, .. } =
+            interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));
         let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
         if !is_resolved && depth < HALVINGS {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);
@@ -103,10 +112,13 @@ impl EventDetector {
                 let other = if mode { -1 } else { 1 };
                 let is_there = first.abs() <= NO_VALUE * curve.most() || sign(first) == other;
                 if is_there && sign(soon(curve, first, self.resolved).unwrap_or(next)) == other {
-                    all.push(Passage { t: begin, event, rises: !mode });
+                    all.push(Passage { t: begin, event, rises: !mode, jumps: false });
                 }
             }
-            let EventMemory { sides, largest, last, .. } = &mut self.memory;
+            let is_now = |before: &Time| (begin - *before).hi <= SAME * span;
+            let is_corner = mode.is_none() && self.memory.flipped.iter().any(|(_, flip)| is_now(flip));
+            let beyond = is_corner.then(|| self.values(inside.at(begin + AFTER * span))[event]);
+            let EventMemory { sides, largest, last, due, .. } = &mut self.memory;
             let (side, largest) = (&mut sides[event], &mut largest[event]);
             *largest = largest.max(curve.most());
             // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding
@@ -116,10 +128,30 @@ impl EventDetector {
             }
             let is_at_zero = first == 0.0 || mode.is_none() && first.abs() <= NO_VALUE * *largest;
             if mode.is_none() && is_at_zero && *side != 0 && sign(next) == -*side {
-                all.push(Passage { t: begin, event, rises: *side < 0 });
+                all.push(Passage { t: begin, event, rises: *side < 0, jumps: false });
+            }
+            let mut is_behind = due.iter().any(|(due, _)| *due == event)
+                || last.iter().any(|(last, before)| *last == event && is_now(before));
+            // A corner of a formula it asks for, at which the last step ended, may have carried it across.
+            let beyond = beyond.filter(|value| value.abs() > BEYOND * most);
+            if let Some(value) = beyond {
+                if *side != 0 && sign(value) == -*side && !is_behind {
+                    all.push(Passage { t: begin, event, rises: *side < 0, jumps: true });
+                }
+                is_behind = true;
             }
             let begins = mode.is_none() && is_at_zero && *side == 0;
             *side = if is_at_zero || last.contains(&(event, begin)) { sign(next) } else { sign(first) };
+            if mode.is_none() && !is_enough(curve) && most.is_finite() {
+                let off = self.resolved.max(NO_VALUE) * most;
+                let known = (if is_behind { sign(beyond.unwrap_or(next)) } else { *side }, off);
+                let known_nodes = places.iter().copied().zip(nodes.iter().copied()).rev();
+                let known_nodes = known_nodes.skip(usize::from(is_behind));
+                let (found, side) = self.between(inside, (begin, span), event, known, known_nodes);
+                self.memory.sides[event] = side;
+                all.extend(found);
+                continue;
+            }
             // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
             let mut share = if is_woken || begins { LEAVES } else { 0.0 };
             if is_woken || begins {
@@ -134,12 +166,48 @@ impl EventDetector {
                 let after = sign(curve.at(share.min(1.0))[0]);
                 // At the very end of a step what follows is not known: it is on the other side.
                 *side = if after == 0 || share >= 1.0 { -*side } else { after };
-                all.push(Passage { t: begin + zero * span, event, rises: *side > 0 });
+                all.push(Passage { t: begin + zero * span, event, rises: *side > 0, jumps: false });
                 if share >= 1.0 {
                     break;
                 }
             }
         }
+    }
+
+    /// Passages of a function between the nodes, each a share of a part of a step that begins at a time and
+    /// lasts so long, and the value there; and the side of zero it is on in the end.  Values that are `off` by
+    /// less than that tell no side.
+    fn between(
+        &self,
+        inside: &mut dyn Inside,
+        (begin, span): (Time, f64),
+        event: usize,
+        (mut side, off): (i8, f64),
+        nodes: impl Iterator<Item = (f64, f64)>,
+    ) -> (Vec<Passage>, i8) {
+        let mut found = Vec::new();
+        let mut before = 0.0;
+        for (node, value) in nodes {
+            if value.abs() <= off || value.is_nan() {
+                continue;
+            }
+            let rises = value > 0.0;
+            if side != 0 && rises != (side > 0) {
+                let mut at = |share: f64| self.values(inside.at(begin + share * span))[event];
+                let (mut from, mut to) = (before, node);
+                loop {
+                    let middle = 0.5 * (from + to);
+                    if middle <= from || middle >= to || (to - from) * span <= f64::EPSILON * begin.hi.abs() {
+                        break;
+                    }
+                    if (at(middle) > 0.0) == rises { to = middle } else { from = middle }
+                }
+                let jumps = at(from).abs().min(at(to).abs()) > off;
+                found.push(Passage { t: begin + to * span, event, rises, jumps });
+            }
+            (side, before) = (if rises { 1 } else { -1 }, node);
+        }
+        (found, side)
     }
 
     /// Where a passage near `near` is on the dense output, between the ends of the step.

@@ -1,10 +1,10 @@
 //! Formulas of time and state, which are kept as texts, and what they speak of.
 
-use super::{Cursor, Decimal, Reader, Watched};
+use super::{Cursor, Decimal, Reader, Watched, shortest};
 use crate::scene::error::SceneError;
-use crate::scene::formula::{Formula, Interpolant};
+use crate::scene::formula::{Formula, Interpolant, Numbers};
 use crate::scene::locate::Value;
-use crate::scene::{Load, LoadLaw, NamedPoint, Profile, Scene, SceneEvent};
+use crate::scene::{Load, LoadLaw, NamedPoint, PointTable, Profile, Scene, SceneEvent};
 
 /// The list a law stands in.
 fn list<C>(load: &Load<C>) -> &'static str {
@@ -25,6 +25,23 @@ impl<'a, C: Decimal> Reader<'a, C> {
             laws.any(|law| crate::scene::set::name(at.node) == Some(&law.name))
         };
         self.root.items(of).into_iter().filter(|at| !is_law(at)).collect()
+    }
+
+    /// Tables: numbers that stand in the text by their digits, those of files as the nearest doubles' shortest.
+    pub(super) fn tables(&self, plain: &Scene) -> Vec<PointTable<C>> {
+        let holder = self.root.child("tables");
+        let table = |plain: &PointTable| {
+            let listed = holder.as_ref().map_or(Vec::new(), |holder| holder.items(&plain.name));
+            let point = |(number, values): (usize, &[f64; 2])| {
+                let Some(Value::List(nodes)) = listed.get(number).map(|at| &at.node.value) else {
+                    return values.map(shortest);
+                };
+                std::array::from_fn(|k| self.literal(&nodes[k], values[k]))
+            };
+            let points = plain.points.iter().enumerate().map(point).collect();
+            PointTable { name: plain.name.clone(), points }
+        };
+        plain.tables.iter().map(table).collect()
     }
 
     /// Named points.
@@ -96,16 +113,14 @@ impl<'a, C: Decimal> Reader<'a, C> {
         Ok(plain.to_owned())
     }
 
-    /// Events, where they are those of this run; their functions are smooth.
+    /// Events, where they are those of this run.
     pub(super) fn events(&self, plain: &Scene) -> Result<Vec<SceneEvent>, SceneError> {
         if self.watched == Watched::Beside {
             return Ok(Vec::new());
         }
         let event = |(at, event): (&Cursor, &SceneEvent)| {
             let when = at.child("when").unwrap_or_else(|| at.clone());
-            if self.read(&when, &event.when)?.conditions() > 0 {
-                return Err(self.refuse_part(&when, "the function of the event has corners"));
-            }
+            self.read(&when, &event.when)?;
             let values = at.child("set");
             let value = |(name, text): &(String, String)| {
                 let at = values.as_ref().and_then(|values| values.child(name));
@@ -117,7 +132,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         self.root.items("events").iter().zip(&plain.events).map(event).collect()
     }
 
-    /// A formula without tables, and without corners where nobody watches for them.
+    /// A formula, without corners and tables where nobody watches for them.
     fn read(&self, at: &Cursor, text: &str) -> Result<Formula, SceneError> {
         let tables = &self.plain.tables;
         let tables: Vec<_> =
@@ -125,17 +140,15 @@ impl<'a, C: Decimal> Reader<'a, C> {
         let formula = Formula::parse_with(text, &tables).map_err(|error| {
             self.refuse(at, &format!("is no formula: {}", error.problem), "give a formula")
         })?;
-        if formula.has_tables() {
-            return Err(self.refuse_part(at, "its formula has tables, whose splines are known in doubles"));
-        }
         if formula.conditions() > 0 && self.watched == Watched::Beside {
-            return Err(self.refuse_part(at, "its formula has corners, across which there is no series"));
+            let why = "its formula has corners or tables, across whose pieces there is no series";
+            return Err(self.refuse_part(at, why));
         }
         Ok(formula)
     }
 
-    /// Refuses signals and integrals with tables, and with corners that nobody watches for.
-    pub(super) fn refuse_tables(&self) -> Result<(), SceneError> {
+    /// Refuses signals and integrals with corners that nobody watches for.
+    pub(super) fn refuse_corners(&self) -> Result<(), SceneError> {
         for key in ["signals", "integrals"] {
             let Some(holder) = self.root.child(key) else { continue };
             let Value::Object(members) = &holder.node.value else { continue };
@@ -156,6 +169,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             known.map(|known| known.1)
         };
         let values: Vec<Option<C>> = formula.names().map(value).collect();
-        Ok(Profile::new(&formula, &values))
+        let numbers = C::HAS_CONSTANTS.then(|| Numbers::of(&formula, &self.tables));
+        Ok(Profile::new(&formula, numbers.as_ref(), &values))
     }
 }

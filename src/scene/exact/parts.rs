@@ -195,11 +195,13 @@ impl<'a, C: Decimal> Reader<'a, C> {
             parameters: (self.parameters.iter())
                 .map(|(name, value)| Parameter { name: name.clone(), value: *value })
                 .collect(),
+            tables: self.tables.clone(),
             points: self.points(plain)?,
             signals: plain.signals.clone(),
             integrals: plain.integrals.clone(),
             laws: self.laws(plain)?,
             events: self.events(plain)?,
+            inactive: plain.inactive.clone(),
             until: plain.until,
             every: plain.every,
             ..Scene::default()

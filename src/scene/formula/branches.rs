@@ -18,8 +18,8 @@ pub(super) trait Branches<S> {
     /// True where the condition of this number, with this value, chooses its first branch.
     fn is_positive(&mut self, condition: usize, value: S) -> bool;
 
-    /// The piece of a table at `x`, whose conditions begin with number `first`.
-    fn piece(&mut self, first: usize, knots: &Knots, x: S) -> usize;
+    /// The piece of a table at `x`, whose conditions begin with number `first`; `knot` gives the x of a point.
+    fn piece(&mut self, first: usize, knots: &Knots, x: S, knot: impl Fn(usize) -> S) -> usize;
 }
 
 /// The knots of a table.
@@ -46,18 +46,17 @@ impl Knots<'_> {
         (piece ^ (piece >> 1)) >> j & 1 == 1
     }
 
-    /// The condition of bit `j` on a piece.
-    fn condition<S: Scalar>(&self, piece: usize, j: usize, x: S) -> S {
+    /// The condition of bit `j` on a piece; `at` gives the x of a point.
+    fn condition<S: Scalar>(&self, piece: usize, j: usize, x: S, at: impl Fn(usize) -> S) -> S {
         let (first, period) = (1 << j, 2 << j);
         // The least number of a knot above the piece at which the bit changes.
         let above = if piece < first { first } else { first + (piece - first) / period * period + period };
-        let knot = |number: usize| self.0[number - 1][0];
-        let from = (above > first).then(|| knot(above - period));
-        let until = (above <= self.0.len()).then(|| knot(above));
+        let from = (above > first).then(|| above - period - 1);
+        let until = (above <= self.0.len()).then(|| above - 1);
         let value = match (from, until) {
-            (Some(a), Some(b)) => ((x - S::of(a)) * (S::of(b) - x)).scale(1.0 / (b - a)),
-            (Some(a), None) => x - S::of(a),
-            (None, Some(b)) => S::of(b) - x,
+            (Some(a), Some(b)) => ((x - at(a)) * (at(b) - x)).scale(1.0 / (self.0[b][0] - self.0[a][0])),
+            (Some(a), None) => x - at(a),
+            (None, Some(b)) => at(b) - x,
             (None, None) => S::ONE,
         };
         if Self::bit(piece, j) { value } else { -value }
@@ -72,7 +71,7 @@ impl Branches<f64> for BySign {
         value > 0.0
     }
 
-    fn piece(&mut self, _: usize, knots: &Knots, x: f64) -> usize {
+    fn piece(&mut self, _: usize, knots: &Knots, x: f64, _: impl Fn(usize) -> f64) -> usize {
         knots.0.partition_point(|knot| x - knot[0] > 0.0)
     }
 }
@@ -85,8 +84,9 @@ impl<S: crate::arithmetic::Real> Branches<S> for ByOrder {
         value > S::ZERO
     }
 
-    fn piece(&mut self, _: usize, knots: &Knots, x: S) -> usize {
-        knots.0.partition_point(|knot| x > S::of(knot[0]))
+    fn piece(&mut self, _: usize, knots: &Knots, x: S, knot: impl Fn(usize) -> S) -> usize {
+        let numbers: Vec<usize> = (0..knots.0.len()).collect();
+        numbers.partition_point(|&number| x > knot(number))
     }
 }
 
@@ -99,8 +99,8 @@ impl Branches<f64> for Noted {
         self.0[condition]
     }
 
-    fn piece(&mut self, first: usize, knots: &Knots, x: f64) -> usize {
-        let piece = BySign.piece(first, knots, x);
+    fn piece(&mut self, first: usize, knots: &Knots, x: f64, knot: impl Fn(usize) -> f64) -> usize {
+        let piece = BySign.piece(first, knots, x, knot);
         (0..knots.bits()).for_each(|j| self.0[first + j] = Knots::bit(piece, j));
         piece
     }
@@ -114,7 +114,7 @@ impl<S> Branches<S> for Given<'_> {
         self.0.get(condition).copied().unwrap_or(false)
     }
 
-    fn piece(&mut self, first: usize, knots: &Knots, _: S) -> usize {
+    fn piece(&mut self, first: usize, knots: &Knots, _: S, _: impl Fn(usize) -> S) -> usize {
         knots.piece(self.0.get(first..first + knots.bits()).unwrap_or(&[]))
     }
 }
@@ -131,9 +131,9 @@ impl<S: Scalar> Branches<S> for Watched<'_, S> {
         self.given.is_positive(condition, value)
     }
 
-    fn piece(&mut self, first: usize, knots: &Knots, x: S) -> usize {
-        let piece = self.given.piece(first, knots, x);
-        (0..knots.bits()).for_each(|j| self.values[first + j] = knots.condition(piece, j, x));
+    fn piece(&mut self, first: usize, knots: &Knots, x: S, knot: impl Fn(usize) -> S) -> usize {
+        let piece = self.given.piece(first, knots, x, &knot);
+        (0..knots.bits()).for_each(|j| self.values[first + j] = knots.condition(piece, j, x, &knot));
         piece
     }
 }
@@ -155,8 +155,8 @@ mod tests {
                     _ if piece == count => points[count - 1][0] + 1.0,
                     _ => 0.5 * (points[piece - 1][0] + points[piece][0]),
                 };
-                assert_eq!(BySign.piece(0, &knots, inside), piece);
-                let condition = |j: usize, x: f64| knots.condition(piece, j, x);
+                assert_eq!(BySign.piece(0, &knots, inside, |k| points[k][0]), piece);
+                let condition = |j: usize, x: f64| knots.condition(piece, j, x, |k| points[k][0]);
                 for j in 0..knots.bits() {
                     assert_eq!(condition(j, inside) > 0.0, bits(piece)[j], "{count} points, piece {piece}");
                 }

@@ -1,21 +1,46 @@
-//! The numbers in the text of a formula exactly as written: 0.1 is 1/10, 30 deg is π/6.
+//! The numbers of a formula exactly as written: 0.1 is 1/10, 30 deg is π/6; and those of its tables.
 
 use super::parse::Parser;
+use super::table::Spline;
 use super::unit::Unit;
-use super::{Formula, Node};
+use super::{Formula, Node, Origin};
+use crate::scene::PointTable;
 use crate::scene::number::Decimal;
 use std::f64::consts::PI;
 
-impl Formula {
-    /// What its nodes are as numbers of its text; zero for those that are none.
-    pub(crate) fn numbers<C: Decimal>(&self) -> Vec<C> {
+/// The numbers of a formula.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Numbers<C> {
+    /// Those of its text, node by node; zero for nodes that are none.
+    nodes: Vec<C>,
+    /// Its tables.
+    splines: Vec<Spline<C>>,
+}
+
+impl<C: Decimal> Numbers<C> {
+    /// Those of a formula of a scene with these tables.
+    pub fn of(formula: &Formula, tables: &[PointTable<C>]) -> Self {
         let number = |(&node, &(start, end)): (&Node, &(u32, u32))| match node {
             Node::Number(value) => {
-                written(&self.text[start as usize..end as usize]).unwrap_or_else(|| C::of(value))
+                written(&formula.text[start as usize..end as usize]).unwrap_or_else(|| C::of(value))
             }
             _ => C::ZERO,
         };
-        self.nodes.iter().zip(&self.places).map(number).collect()
+        let spline = |name: &String| tables.iter().find(|table| table.name == *name);
+        let splines = formula.tables.iter().filter_map(|table| spline(&table.name));
+        Self {
+            nodes: formula.nodes.iter().zip(&formula.places).map(number).collect(),
+            splines: splines.map(|table| Spline::new(&table.points)).collect(),
+        }
+    }
+
+    /// The number there.
+    pub fn at(&self, origin: Origin) -> C {
+        match origin {
+            Origin::Node(node) => self.nodes[node],
+            Origin::Knot { table, point } => self.splines[table].knot(point),
+            Origin::Coefficient { table, piece, power } => self.splines[table].coefficients(piece)[power],
+        }
     }
 }
 

@@ -19,6 +19,7 @@ mod wave;
 use branches::{Branches, BySign, Given, Noted, Watched};
 pub use error::FormulaError;
 pub(crate) use error::meant;
+pub(crate) use exact::Numbers;
 pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
@@ -103,6 +104,17 @@ impl Node {
     }
 }
 
+/// Where a number stands that a formula is evaluated with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Origin {
+    /// In its text: a node.
+    Node(usize),
+    /// The x of a point of a table.
+    Knot { table: usize, point: usize },
+    /// Of the polynomial on a piece of a table.
+    Coefficient { table: usize, piece: usize, power: usize },
+}
+
 /// A formula that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formula {
@@ -159,11 +171,6 @@ impl Formula {
         self.conditions.len()
     }
 
-    /// True where it has tables.
-    pub(crate) fn has_tables(&self) -> bool {
-        !self.tables.is_empty()
-    }
-
     /// An error at a name of this formula that nothing has.
     pub fn unknown(&self, name: &str, known: &[&str]) -> FormulaError {
         self.refused(name, format!("unknown name {name}"), meant(name, known))
@@ -186,20 +193,20 @@ impl Formula {
         self.run(values, &mut Given(bits))
     }
 
-    /// The same where `number` gives the numbers of its nodes as such scalars.
+    /// The same where `number` gives its numbers as such scalars.
     pub(crate) fn evaluate_over<S: Scalar>(
         &self,
         values: &[S],
         bits: &[bool],
-        number: impl Fn(usize) -> S,
+        number: impl Fn(Origin) -> S,
     ) -> S {
-        self.run_over(values, &|node, _| number(node), &mut Given(bits))
+        self.run_over(values, &|origin, _| number(origin), &mut Given(bits))
     }
 
     /// Its value over a scalar with an order, with the numbers of its text exactly as written.
     pub(crate) fn exact_value<S: Decimal>(&self, values: &[S]) -> S {
-        let numbers = self.numbers();
-        self.run_over(values, &|node, _| numbers[node], &mut branches::ByOrder)
+        let numbers = Numbers::of(self, &[]);
+        self.run_over(values, &|origin, _| numbers.at(origin), &mut branches::ByOrder)
     }
 
     /// The branches that hold at these values, by the signs of the conditions there.
@@ -214,12 +221,12 @@ impl Formula {
         self.condition_values_over(values, bits, &|_, value| S::of(value), all);
     }
 
-    /// The same where `number` gives the numbers of its nodes.
+    /// The same where `number` gives its numbers.
     pub(crate) fn condition_values_over<S: Scalar>(
         &self,
         values: &[S],
         bits: &[bool],
-        number: &impl Fn(usize, f64) -> S,
+        number: &impl Fn(Origin, f64) -> S,
         all: &mut Vec<S>,
     ) {
         if self.conditions.is_empty() {
@@ -237,7 +244,7 @@ impl Formula {
     fn run_over<S: Scalar>(
         &self,
         values: &[S],
-        number: &impl Fn(usize, f64) -> S,
+        number: &impl Fn(Origin, f64) -> S,
         branches: &mut impl Branches<S>,
     ) -> S {
         if let [Node::Name(number)] = self.nodes[..] {
@@ -262,12 +269,13 @@ impl Formula {
                         at(b)
                     }
                 }
-                Node::Table(table, first, a) => {
-                    let table = &self.tables[table];
-                    let piece = branches.piece(first, &table.knots(), at(a));
-                    table.value(piece, at(a), &|value| number(place, value))
+                Node::Table(number_of, first, a) => {
+                    let table = &self.tables[number_of];
+                    let knot = |point: usize| table.knot(number_of, point, number);
+                    let piece = branches.piece(first, &table.knots(), at(a), knot);
+                    table.value(number_of, piece, at(a), number)
                 }
-                Node::Number(value) => number(place, value),
+                Node::Number(value) => number(Origin::Node(place), value),
                 node => self.smooth(node, at),
             };
             results.push(result);

@@ -8,34 +8,68 @@
 //! Source: C. de Boor, *A Practical Guide to Splines* (1978), chapter IV (complete cubic spline
 //! interpolation).
 
-use super::branches::Knots;
-use super::{Formula, Node};
-use crate::arithmetic::Scalar;
+use super::branches::{Branches, BySign, Knots};
+use super::{Formula, Node, Origin};
+use crate::arithmetic::{Real, Scalar};
 use std::sync::Arc;
 
 /// Points of a table at least and at most: every one of them ends a step.
 pub const POINTS: [usize; 2] = [2, 1_000_000];
+
+/// A cubic spline that is level at both ends.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Spline<C = f64> {
+    /// Points (x, y), x ascending.
+    points: Arc<[[C; 2]]>,
+    /// Slopes there.
+    slopes: Arc<[C]>,
+}
+
+impl<C: Real> Spline<C> {
+    /// The spline through points with ascending x.
+    pub fn new(points: &[[C; 2]]) -> Self {
+        Self { points: points.into(), slopes: slopes(points).into() }
+    }
+
+    /// The x of a point.
+    pub fn knot(&self, point: usize) -> C {
+        self.points[point][0]
+    }
+
+    /// The coefficients on a piece, by rising powers of the distance from the point it begins at: of piece 0,
+    /// which ends at the first point, and of the last one a constant.
+    pub fn coefficients(&self, piece: usize) -> [C; 4] {
+        let Some(k) = piece.checked_sub(1) else {
+            let first = self.points.first().map_or(C::ZERO, |point| point[1]);
+            return [first, C::ZERO, C::ZERO, C::ZERO];
+        };
+        let [knot, y] = self.points[k];
+        let Some(&[next, value]) = self.points.get(k + 1) else { return [y, C::ZERO, C::ZERO, C::ZERO] };
+        let (h, b, end) = (next - knot, self.slopes[k], self.slopes[k + 1]);
+        let chord = (value - y) / h;
+        let c = (chord.scale(3.0) - b.scale(2.0) - end) / h;
+        let d = (b + end - chord.scale(2.0)) / (h * h);
+        [y, b, c, d]
+    }
+}
 
 /// A table with its spline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Interpolant {
     /// Name, as formulas call it.
     pub name: String,
-    /// Points (x, y), x ascending.
-    points: Arc<[[f64; 2]]>,
-    /// Slopes of the spline there.
-    slopes: Arc<[f64]>,
+    spline: Spline,
 }
 
 impl Interpolant {
     /// The spline through points with ascending x.
     pub fn new(name: &str, points: &[[f64; 2]]) -> Self {
-        Self { name: name.to_owned(), points: points.into(), slopes: slopes(points).into() }
+        Self { name: name.to_owned(), spline: Spline::new(points) }
     }
 
     /// Its knots, one a point.
     pub(super) fn knots(&self) -> Knots<'_> {
-        Knots(&self.points)
+        Knots(&self.spline.points)
     }
 
     /// Adds it at an argument to a formula; returns its result.
@@ -51,39 +85,58 @@ impl Interpolant {
     }
 
     /// Its value at `x` by the polynomial of a piece: 0 before the first point, one more after each; `number`
-    /// gives numbers as such scalars.
-    pub(super) fn value<S: Scalar>(&self, piece: usize, x: S, number: &impl Fn(f64) -> S) -> S {
-        let Some(k) = piece.checked_sub(1) else {
-            return self.points.first().map_or(S::ZERO, |point| number(point[1]));
-        };
-        let [knot, y] = self.points[k];
-        let Some(&[next, value]) = self.points.get(k + 1) else { return number(y) };
-        let (h, b) = (next - knot, self.slopes[k]);
-        let chord = (value - y) / h;
-        let c = (3.0 * chord - 2.0 * b - self.slopes[k + 1]) / h;
-        let d = (b + self.slopes[k + 1] - 2.0 * chord) / (h * h);
-        let from_knot = x - number(knot);
-        [c, b, y].into_iter().fold(number(d), |sum, coefficient| sum * from_knot + number(coefficient))
+    /// gives numbers of table number `table` as such scalars.
+    pub(super) fn value<S: Scalar>(
+        &self,
+        table: usize,
+        piece: usize,
+        x: S,
+        number: &impl Fn(Origin, f64) -> S,
+    ) -> S {
+        let coefficients = self.spline.coefficients(piece);
+        let coefficient =
+            |power: usize| number(Origin::Coefficient { table, piece, power }, coefficients[power]);
+        if piece == 0 || piece == self.spline.points.len() {
+            return coefficient(0);
+        }
+        let from_knot = x - self.knot(table, piece - 1, number);
+        (0..3).rev().fold(coefficient(3), |sum, power| sum * from_knot + coefficient(power))
+    }
+
+    /// Its value in doubles.
+    pub(super) fn at(&self, x: f64) -> f64 {
+        let piece = BySign.piece(0, &self.knots(), x, |point| self.spline.knot(point));
+        self.value(0, piece, x, &|_, number| number)
+    }
+
+    /// The x of a point, likewise.
+    pub(super) fn knot<S: Scalar>(
+        &self,
+        table: usize,
+        point: usize,
+        number: &impl Fn(Origin, f64) -> S,
+    ) -> S {
+        number(Origin::Knot { table, point }, self.spline.knot(point))
     }
 }
 
 /// Slopes at the points of the cubic spline that is level at both ends, by elimination in a tridiagonal
 /// system.
-fn slopes(points: &[[f64; 2]]) -> Vec<f64> {
+fn slopes<C: Real>(points: &[[C; 2]]) -> Vec<C> {
     let n = points.len();
-    let mut slopes = vec![0.0; n];
+    let mut slopes = vec![C::ZERO; n];
     if n < 3 {
         return slopes;
     }
     let length = |k: usize| points[k + 1][0] - points[k][0];
     let chord = |k: usize| (points[k + 1][1] - points[k][1]) / length(k);
     // h_k s_{k-1} + 2 (h_{k-1} + h_k) s_k + h_{k-1} s_{k+1} = 3 (h_k m_{k-1} + h_{k-1} m_k)
-    let (mut above, mut right) = (vec![0.0; n], vec![0.0; n]);
+    let (mut above, mut right) = (vec![C::ZERO; n], vec![C::ZERO; n]);
     for k in 1..n - 1 {
         let (before, after) = (length(k - 1), length(k));
-        let pivot = 2.0 * (before + after) - after * above[k - 1];
+        let pivot = (before + after).scale(2.0) - after * above[k - 1];
         above[k] = before / pivot;
-        right[k] = (3.0 * (after * chord(k - 1) + before * chord(k)) - after * right[k - 1]) / pivot;
+        right[k] = ((after * chord(k - 1) + before * chord(k)).scale(3.0) - after * right[k - 1]) / pivot;
     }
     for k in (1..n - 1).rev() {
         slopes[k] = right[k] - above[k] * slopes[k + 1];

@@ -8,7 +8,6 @@
 //! Such sums are closed under sums and, as far as no t stands before a sine, under products:
 //! `cos a cos b = (cos(a - b) + cos(a + b))/2`, and so on.
 
-use super::branches::{Branches, BySign};
 use super::{Formula, FormulaError, Node};
 use crate::scene::{Law, Sine};
 
@@ -163,10 +162,7 @@ impl Formula {
                             .and_then(|c| constant(a).map(|a| if c > 0.0 { a } else { -a })),
                         Node::Select(condition, a, b) => constant(self.conditions[condition])
                             .and_then(|c| if c > 0.0 { constant(a) } else { constant(b) }),
-                        Node::Table(table, _, a) => constant(a).map(|x| {
-                            let table = &self.tables[table];
-                            table.value(BySign.piece(0, &table.knots(), x), x, &|number| number)
-                        }),
+                        Node::Table(table, _, a) => constant(a).map(|x| self.tables[table].at(x)),
                         node => Some(self.smooth(node, |node| constant(node).unwrap_or(0.0))),
                     };
                     value.map(Wave::constant)

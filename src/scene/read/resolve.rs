@@ -61,7 +61,7 @@ impl<'a> Constants<'a> {
             let known = self.parameters.iter().find(|known| known.name == name);
             known.map(|known| known.value)
         };
-        Some(Profile::new(&formula, &formula.names().map(value).collect::<Vec<_>>()))
+        Some(Profile::new(&formula, None, &formula.names().map(value).collect::<Vec<_>>()))
     }
 }
 

@@ -21,6 +21,9 @@ pub struct Rows {
     /// Why the window ends with them, where it failed: told once all are handed out, since whoever looks at
     /// them may change the motion before.
     pub(super) failure: Option<StepError>,
+    /// True where they are integrated to the end though the process was asked to stop: whoever watches a step
+    /// that is made has to see all of it.
+    pub(super) finishes: bool,
 }
 
 impl Rows {

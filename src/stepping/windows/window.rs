@@ -21,17 +21,20 @@ pub struct Window<'a, F: ?Sized> {
     y: RefCell<Vec<f64>>,
     /// Rows that may still be kept.
     rows: usize,
+    /// True where it goes on to its end in any case.
+    finishes: bool,
     /// Rows made, and the time of the last one that was looked at.
     made: u64,
     mark: f64,
 }
 
 impl<'a, F: OdeSystem + ?Sized> Window<'a, F> {
-    /// A window from a time on, in these units, that may keep so many rows.
-    pub fn new(field: &'a mut F, start: Time, unit: &'a [f64], rows: usize) -> Self {
+    /// A window from a time on, in these units, that may keep so many rows; unless it `finishes`, it ends where
+    /// the process is asked to stop.
+    pub fn new(field: &'a mut F, start: Time, unit: &'a [f64], rows: usize, finishes: bool) -> Self {
         let (n, time_unit) = (unit.len(), field.time_unit());
         let y = RefCell::new(vec![0.0; n]);
-        Self { field: RefCell::new(field), start, n, unit, time_unit, y, rows, made: 0, mark: 0.0 }
+        Self { field: RefCell::new(field), start, n, unit, time_unit, y, rows, finishes, made: 0, mark: 0.0 }
     }
 
     /// The rate of scaled unknowns and time.
@@ -58,6 +61,6 @@ impl<'a, F: OdeSystem + ?Sized> Window<'a, F> {
             is_stalled = time - self.mark < STALLED.1 * time;
             self.mark = time;
         }
-        self.rows == 0 || is_stalled || interruption::is_asked()
+        self.rows == 0 || is_stalled || !self.finishes && interruption::is_asked()
     }
 }
