@@ -95,7 +95,7 @@ fn variants((scene, varied, _): &(&str, Varied, f64)) -> Vec<(Arc<Mechanism>, St
     (0..11).map(at).collect()
 }
 
-fn started(scene: &Scene) -> (Arc<Mechanism>, State) {
+pub fn started(scene: &Scene) -> (Arc<Mechanism>, State) {
     let mechanism = compile(scene);
     let state = Multiplier::<0, true>::new(Arc::clone(&mechanism)).state(&mechanism.start(scene));
     (mechanism, state)
@@ -107,11 +107,11 @@ fn starts((scene, varied, from, by, _): (&str, &str, f64, f64, f64)) -> Vec<(Arc
     (0..11).map(at).collect()
 }
 
-fn members(all: &[(Arc<Mechanism>, State)]) -> Vec<BatchMember<'_>> {
+pub fn members(all: &[(Arc<Mechanism>, State)]) -> Vec<BatchMember<'_>> {
     all.iter().map(|(mechanism, state)| BatchMember::new(mechanism, state.clone())).collect()
 }
 
-fn at(tolerance: f64) -> Batch {
+pub fn at(tolerance: f64) -> Batch {
     Batch::new(Tolerance { relative: tolerance, absolute: tolerance })
 }
 
@@ -125,7 +125,7 @@ fn ends(batch: &Batch, mut members: Vec<BatchMember>, until: Time) -> Vec<State>
 
 /// Integrates all against double-double, in order and backwards, one alone, and without the processor's
 /// vectors.
-fn agree_with_double_double(scene: &str, all: &[(Arc<Mechanism>, State)], until: f64) {
+pub fn agree_with_double_double(scene: &str, all: &[(Arc<Mechanism>, State)], until: f64) {
     let until = Time::from(until);
     let exact = |(mechanism, state): &(Arc<Mechanism>, State)| {
         let (mut exact, mut statistics) = (state.clone(), Default::default());
@@ -148,9 +148,9 @@ fn agree_with_double_double(scene: &str, all: &[(Arc<Mechanism>, State)], until:
         assert_eq!(ends(&batch.clone().with_kernel(Kernel::Portable), members(all), until), found);
         for (i, ((mechanism, _), (exact, found))) in all.iter().zip(exact.iter().zip(&found)).enumerate() {
             assert_eq!((found.time, &found.turns), (exact.time, &exact.turns));
-            let n = mechanism.bodies.len();
+            let n = mechanism.coordinates();
             let fastest = exact.y[n..2 * n].iter().fold(1.0, |most: f64, rate| most.max(rate.abs()));
-            // Angles, rates and work.
+            // Angles and places, rates and work.
             for k in 0..=2 * n {
                 let energy = mechanism.energy_scale.max(exact.y[2 * n].abs());
                 let scale = [1.0, fastest, energy][(k / n).min(2)];

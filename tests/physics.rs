@@ -24,6 +24,7 @@ mod trees;
 
 mod assembly;
 mod batch;
+mod batch_couplings;
 mod batch_loops;
 mod benchmarks;
 mod chains;

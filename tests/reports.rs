@@ -42,6 +42,7 @@ mod joint_forces;
 mod resume;
 mod stress;
 mod sweep;
+mod sweep_couplings;
 mod sweep_loops;
 mod sweep_walls;
 mod trust;

@@ -7,11 +7,11 @@ use driftless::run::{Request, Shard, Status, Sweep, Vary, simulate};
 use driftless::scene::Template;
 use driftless::stepping::taylor::batch::Batch;
 
-fn shipped(name: &str) -> Template {
+pub fn shipped(name: &str) -> Template {
     Template::read(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
 }
 
-fn by_taylor(until: f64, rtol: f64) -> Request {
+pub fn by_taylor(until: f64, rtol: f64) -> Request {
     Request {
         method: Some("taylor".parse().expect("a method")),
         until: Some(until),
@@ -21,7 +21,7 @@ fn by_taylor(until: f64, rtol: f64) -> Request {
     }
 }
 
-fn planned(template: &Template, vary: &[&str], request: &Request) -> Sweep {
+pub fn planned(template: &Template, vary: &[&str], request: &Request) -> Sweep {
     let vary: Vec<Vary> = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
     let plan = Sweep::new(template, vary, request).expect("a sweep");
     assert!(Batch::takes_own_numbers(plan.mechanism()));

@@ -308,7 +308,7 @@ impl<T: SeriesNumber> Series<T> {
         }
         self.rows.begin(t);
         let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
-        self.rows.advance_aims(0, at, &mut self.load);
+        self.rows.advance_aims(0, at, &self.factors.scale, &mut self.load);
     }
 
     /// The powers from `first` on, by the code for this number of bodies where there is one: in double-double

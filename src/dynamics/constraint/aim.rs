@@ -20,6 +20,8 @@ use std::cell::RefCell;
 /// What a formula of time and place asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::dynamics) enum Input {
+    /// A number that is no double.
+    Number(usize),
     Time,
     Angle(usize),
     Cosine(usize),
@@ -32,9 +34,11 @@ pub(in crate::dynamics) enum Input {
 
 /// A formula of time and place with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Aim {
+pub struct Aim<C = f64> {
     pub(in crate::dynamics) tape: Tape,
     pub(in crate::dynamics) inputs: Vec<Input>,
+    /// Numbers that are no doubles.
+    pub(in crate::dynamics) numbers: Vec<C>,
     /// f, f_t and f'' at zero acceleration.
     pub(in crate::dynamics) value: Slot,
     pub(in crate::dynamics) drive: Slot,
@@ -72,6 +76,7 @@ impl Aim {
         });
         let inputs = recorder.inputs.into_inner();
         (!has_rates).then(|| Self {
+            numbers: Vec::new(),
             value: slots[0],
             drive: slots[1],
             convective: slots[2],
@@ -83,18 +88,31 @@ impl Aim {
         })
     }
 
-    /// The bodies whose whole turns matter to it.
-    pub(crate) fn counted_angles(&self) -> impl Iterator<Item = usize> {
-        self.inputs.iter().filter_map(|input| if let Input::Angle(k) = *input { Some(k) } else { None })
-    }
-
-    /// The coordinates it depends on.
-    pub fn coordinates(&self) -> impl Iterator<Item = usize> {
-        self.slopes.iter().map(|slope| slope.0)
+    /// The same formula with other numbers in it, one by one.
+    pub(in crate::dynamics) fn map<D>(&self, mut of: impl FnMut(f64) -> D) -> Aim<D> {
+        let (mut inputs, mut numbers) = (self.inputs.clone(), Vec::new());
+        let (tape, new) = self.tape.lifted(|value| {
+            inputs.push(Input::Number(numbers.len()));
+            numbers.push(of(value));
+            inputs.len() as u32 - 1
+        });
+        let at = |slot: Slot| new[slot as usize];
+        Aim {
+            value: at(self.value),
+            drive: at(self.drive),
+            convective: at(self.convective),
+            slopes: self.slopes.iter().map(|&(k, slope)| (k, at(slope))).collect(),
+            angles: self.angles.clone(),
+            is_timed: self.is_timed,
+            tape,
+            inputs,
+            numbers,
+        }
     }
 
     fn results<T: Real, R>(&self, t: Time, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
         let input = |number: u32| match self.inputs[number as usize] {
+            Input::Number(number) => T::of(self.numbers[number]),
             Input::Time => T::split(t).0,
             Input::Angle(k) | Input::Origin(k) => at.phi[k],
             Input::Cosine(k) => at.z[k].re,
@@ -136,6 +154,18 @@ impl Aim {
     }
 }
 
+impl<C> Aim<C> {
+    /// The bodies whose whole turns matter to it.
+    pub(crate) fn counted_angles(&self) -> impl Iterator<Item = usize> {
+        self.inputs.iter().filter_map(|input| if let Input::Angle(k) = *input { Some(k) } else { None })
+    }
+
+    /// The coordinates it depends on.
+    pub fn coordinates(&self) -> impl Iterator<Item = usize> {
+        self.slopes.iter().map(|slope| slope.0)
+    }
+}
+
 /// Hands out inputs while a formula is recorded.
 #[derive(Default)]
 struct Recorder {
@@ -161,6 +191,7 @@ impl Recorder {
         for (number, weight) in of.gradient() {
             let input = self.inputs.borrow()[number as usize];
             let (k, slope) = match input {
+                Input::Number(_) => continue,
                 Input::Time => {
                     found.time += weight;
                     continue;

@@ -126,7 +126,7 @@ pub struct ConstraintEquation<C = f64> {
     /// The force it exerts, where it is one.
     pub push: Option<Push<C>>,
     /// The formula of time and place that is taken off.
-    pub aim: Option<Arc<Aim>>,
+    pub aim: Option<Arc<Aim<C>>>,
 }
 
 impl<C: Real> ConstraintEquation<C> {

@@ -9,18 +9,19 @@
 //! ```
 
 use super::coefficient::SeriesNumber;
+use super::factors::Scale;
+use super::tape::Powers;
 use super::user::At;
 use crate::arithmetic::DoubleDouble;
-use crate::arithmetic::tape::TapeSeries;
 use crate::dynamics::constraint::Aim;
 use crate::dynamics::constraint::aim::Input;
 use std::sync::Arc;
 
 /// Series of one aim, powers 0 to P.
 #[derive(Clone, Debug)]
-pub struct AimSeries<T> {
-    aim: Arc<Aim>,
-    tape: TapeSeries<T>,
+pub struct AimSeries<T: SeriesNumber> {
+    aim: Arc<Aim<T::Constant>>,
+    powers: Powers<T>,
     /// Elements from this one on are translational coordinates.
     angles: usize,
     /// What f'' has at the present power without the accelerations of that power.
@@ -29,36 +30,47 @@ pub struct AimSeries<T> {
 
 impl<T: SeriesNumber> AimSeries<T> {
     /// Room for powers up to `order`, of a motion whose first so many elements are angles.
-    pub fn new(aim: &Arc<Aim>, angles: usize, order: usize) -> Self {
-        Self { aim: Arc::clone(aim), tape: TapeSeries::new(&aim.tape, order), angles, known: T::ZERO }
+    pub fn new(aim: &Arc<Aim<T::Constant>>, angles: usize, order: usize) -> Self {
+        let is_number = |input: u32| matches!(aim.inputs[input as usize], Input::Number(_));
+        let powers = Powers::new(&aim.tape, order, is_number);
+        Self { aim: Arc::clone(aim), powers, angles, known: T::ZERO }
+    }
+
+    /// Takes the constants of another aim of the same structure.
+    pub fn renew(&mut self, aim: &Arc<Aim<T::Constant>>) {
+        self.aim.clone_from(aim);
     }
 
     /// Finds power m of the aim and its derivatives, from the powers up to m of the motion's elements and
     /// rates.
     #[inline(always)]
-    pub fn advance(&mut self, m: usize, at: At<T>) {
-        self.advance_tape(m, at);
+    pub fn advance(&mut self, m: usize, at: At<T>, scale: &Scale<T>) {
+        self.advance_tape(m, at, scale);
         let n = at.n;
-        let slopes = self.aim.slopes.iter();
-        let accelerations = slopes.fold(T::ZERO, |sum, &(k, slope)| {
-            let slope = self.tape.of(slope);
-            (1..=m)
-                .fold(sum, |sum, l| sum + slope[l] * at.omega[(m - l + 1) * n + k].scale((m - l + 1) as f64))
-        });
-        self.known = accelerations + self.tape.of(self.aim.convective)[m];
+        let mut accelerations = T::ZERO;
+        for &(k, slope) in &self.aim.slopes {
+            let slope = self.powers.of(slope);
+            for l in 1..slope.len().min(m + 1) {
+                accelerations += slope[l] * at.omega[(m - l + 1) * n + k].scale((m - l + 1) as f64);
+            }
+        }
+        self.known = accelerations + self.powers.power(self.aim.convective, m);
     }
 
     /// All powers of the aim of a motion that is expanded, as many as there is room for.
     pub fn values(&mut self, order: usize, at: At<T>) -> &[T] {
         for m in 0..=order {
-            self.advance_tape(m, at);
+            self.advance_tape(m, at, &Scale::<T>::default());
         }
-        self.tape.of(self.aim.value)
+        self.powers.of(self.aim.value)
     }
 
-    fn advance_tape(&mut self, m: usize, at: At<T>) {
-        let n = at.n;
-        let input = |number: u32| match (self.aim.inputs[number as usize], m) {
+    #[inline(always)]
+    fn advance_tape(&mut self, m: usize, at: At<T>, scale: &Scale<T>) {
+        let (n, aim, angles) = (at.n, &*self.aim, self.angles);
+        let input = |number: u32| match (aim.inputs[number as usize], m) {
+            (Input::Number(number), 0) => T::constant(aim.numbers[number]),
+            (Input::Number(_), _) => T::ZERO,
             (Input::Time, 0) => at.time,
             (Input::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
             (Input::Angle(k), 0) => at.phi[k],
@@ -66,36 +78,54 @@ impl<T: SeriesNumber> AimSeries<T> {
             (Input::Cosine(k), m) => at.z[m * n + k].re,
             (Input::Sine(k), m) => at.z[m * n + k].im,
             // A coordinate of an origin is part of the element at the place of its x.
-            (Input::Origin(k), m) if (k - self.angles).is_multiple_of(2) => at.z[m * n + k].re,
+            (Input::Origin(k), m) if (k - angles).is_multiple_of(2) => at.z[m * n + k].re,
             (Input::Origin(k), m) => at.z[m * n + k - 1].im,
             // Elements are known to one power more, and the aim with them.
             (Input::Rate(k), m) => at.omega.get(m * n + k).copied().unwrap_or(T::ZERO),
         };
-        self.tape.advance(&self.aim.tape, m, input);
+        self.powers.advance(&aim.tape, m, scale, input);
+    }
+
+    /// f at the start.
+    #[inline(always)]
+    pub fn value(&self) -> T {
+        self.powers.power(self.aim.value, 0)
     }
 
     /// df/dq at the start, coordinate by coordinate.
     #[inline(always)]
     pub fn slopes(&self, mut each: impl FnMut(usize, T)) {
-        self.aim.slopes.iter().for_each(|&(k, slope)| each(k, self.tape.of(slope)[0]));
+        self.aim.slopes.iter().for_each(|&(k, slope)| each(k, self.powers.power(slope, 0)));
+    }
+
+    /// The same off a row of a Jacobian.
+    #[inline(always)]
+    pub fn take_slopes_off(&self, row: &mut [T]) {
+        for &(k, slope) in &self.aim.slopes {
+            row[k] -= self.powers.power(slope, 0);
+        }
     }
 
     /// Adds power m of the generalized forces that multipliers below that power exert.
     #[inline(always)]
     pub fn turning_terms(&self, m: usize, multiplier: impl Fn(usize) -> T, load: &mut [T]) {
         for &(k, slope) in &self.aim.slopes {
-            let slope = self.tape.of(slope);
-            load[k] += (1..=m).fold(T::ZERO, |sum, l| sum + slope[l] * multiplier(m - l));
+            let slope = self.powers.of(slope);
+            let mut sum = T::ZERO;
+            for l in 1..slope.len().min(m + 1) {
+                sum += slope[l] * multiplier(m - l);
+            }
+            load[k] += sum;
         }
     }
 
-    /// Powers of its explicit rate, where it depends on time.
+    /// Powers of its explicit rate, where it depends on time; one alone may stand for a constant.
     pub fn drive(&self) -> Option<&[T]> {
-        self.aim.is_timed.then(|| self.tape.of(self.aim.drive))
+        self.aim.is_timed.then(|| self.powers.of(self.aim.drive))
     }
 
     /// The first powers from a series in more digits.
     pub fn take(&mut self, other: &AimSeries<DoubleDouble>) {
-        self.tape.take(&other.tape);
+        self.powers.take(&other.powers);
     }
 }

@@ -33,6 +33,8 @@ pub struct Landing<'a> {
     pub is_going: [bool; LANES],
     /// What rates count as at least \[rad/s\].
     pub unit: Octet,
+    /// What places and their rates count as in angles \[1/m\].
+    pub per_length: Octet,
 }
 
 /// Powers of eight motions.

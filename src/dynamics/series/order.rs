@@ -253,7 +253,7 @@ impl<T: SeriesNumber> Series<T> {
         self.rows.geometric_terms(m, &self.z, n, rest);
         if m > 0 {
             let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
-            self.rows.advance_aims(m, at, &mut self.load);
+            self.rows.advance_aims(m, at, &self.factors.scale, &mut self.load);
         }
         if let Some(friction) = &self.friction {
             friction.geometric_terms(m, &self.z, n, rest);

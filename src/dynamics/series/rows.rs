@@ -15,9 +15,10 @@ mod bordered;
 mod measures;
 
 pub use self::measures::RowMeasures;
-use self::measures::{in_force, measures};
+use self::measures::{growing, in_force, measures};
 use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
+use super::factors::Scale;
 use super::polynomial::{copy, zeros};
 use super::user::At;
 use crate::arithmetic::{Complex, DoubleDouble, Over, Real};
@@ -53,6 +54,9 @@ pub struct RowSeries<T: SeriesNumber> {
     found: Vec<T>,
     /// Which rows do work, for these numbers.
     works: Vec<bool>,
+    /// The coordinates whose magnitudes a row's rounding grows with, for these numbers: angles with all their
+    /// turns, and places.
+    growing: Vec<Vec<usize>>,
     /// Where rows are to be put back to, see [`face`](Self::face).
     goals: Vec<Complex<T>>,
     /// lambda: powers 0…P-1 (P × r).
@@ -131,6 +135,7 @@ impl<T: SeriesNumber> RowSeries<T> {
         };
         let in_force = in_force(&mechanism.constraints, partition);
         let works = in_force.iter().map(|row| row.is_motor()).collect();
+        let growing = in_force.iter().map(|row| growing(row)).collect();
         // Where each lane has its own, whoever looks at the pivots has them.
         let (scale, metric) =
             if T::HAS_BORDER { Default::default() } else { measures(mechanism, partition, &in_force) };
@@ -152,6 +157,7 @@ impl<T: SeriesNumber> RowSeries<T> {
             found: zeros(if T::HAS_BORDER { r + f } else { 0 }),
             goals: Vec::new(),
             works,
+            growing,
             multiplier: zeros(order * r),
         }
     }
@@ -193,11 +199,11 @@ impl<T: SeriesNumber> RowSeries<T> {
     /// Power m of the aims, and what multipliers below that power exert on the coordinates by them into
     /// `load`.
     #[inline(always)]
-    pub fn advance_aims(&mut self, m: usize, at: At<T>, load: &mut [T]) {
+    pub fn advance_aims(&mut self, m: usize, at: At<T>, scale: &Scale<T>, load: &mut [T]) {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter_mut().enumerate() {
             if let Kind::Place { aim: Some(aim), .. } = kind {
-                aim.advance(m, at);
+                aim.advance(m, at, scale);
                 aim.turning_terms(m, |l| self.multiplier[l * r + i], load);
             }
         }

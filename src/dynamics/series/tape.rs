@@ -5,7 +5,69 @@
 //! [`TapeSeries`]: crate::arithmetic::tape::TapeSeries
 
 use super::factors::{CauchyFactor, Factored, Scale};
-use crate::arithmetic::tape::{Operation, Slot, Tape};
+use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::tape::{Operation, Slot, Tape, TapeSeries};
+
+/// The series of a tape, as the numbers they are of multiply series.
+#[derive(Clone, Debug)]
+pub enum Powers<T: Factored> {
+    /// Plainly.
+    Plain(TapeSeries<T>),
+    /// As factors.
+    Factored(FactorTape<T>),
+}
+
+impl<T: Factored> Powers<T> {
+    /// Room for powers up to `order`; `is_number` tells the inputs that do not change with time.
+    pub fn new(tape: &Tape, order: usize, is_number: impl Fn(u32) -> bool) -> Self {
+        match T::HAS_CONSTANTS {
+            true => Self::Factored(FactorTape::new(tape, order, is_number)),
+            false => Self::Plain(TapeSeries::new(tape, order)),
+        }
+    }
+
+    /// Finds power `m` of all results, from that of the inputs and from all powers before.
+    #[inline(always)]
+    pub fn advance(&mut self, tape: &Tape, m: usize, scale: &Scale<T>, input: impl Fn(u32) -> T) {
+        match self {
+            Self::Plain(series) => series.advance(tape, m, input),
+            Self::Factored(series) => series.advance(tape, m, scale, input),
+        }
+    }
+
+    /// Power `m` of a result.
+    #[inline(always)]
+    pub fn power(&self, slot: Slot, m: usize) -> T {
+        match self {
+            Self::Plain(series) => series.of(slot)[m],
+            Self::Factored(series) => series.power(slot, m),
+        }
+    }
+
+    /// Powers 0, 1, … of a result; one alone where the others are zero.
+    #[inline(always)]
+    pub fn of(&self, slot: Slot) -> &[T] {
+        match self {
+            Self::Plain(series) => series.of(slot),
+            Self::Factored(series) => &series.results[slot as usize].powers,
+        }
+    }
+
+    /// False where powers grow by more than products are made for.
+    pub fn is_sound(&self) -> bool {
+        match self {
+            Self::Plain(_) => true,
+            Self::Factored(series) => series.is_sound(),
+        }
+    }
+
+    /// The first powers from a series in more digits.
+    pub fn take(&mut self, other: &Powers<DoubleDouble>) {
+        if let (Self::Plain(series), Powers::Plain(other)) = (self, other) {
+            series.take(other);
+        }
+    }
+}
 
 /// The series of one result.
 #[derive(Clone, Debug)]

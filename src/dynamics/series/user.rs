@@ -2,15 +2,15 @@
 
 use super::coefficient::SeriesNumber;
 use super::factors::Scale;
-use super::tape::FactorTape;
-use crate::arithmetic::tape::{Slot, TapeSeries};
+use super::tape::Powers;
+use crate::arithmetic::tape::TapeSeries;
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::force::UserForce;
-use crate::dynamics::force::user::{Input, Part};
+use crate::dynamics::force::user::Input;
 
 /// Series of one force, powers 0 to P.
 #[derive(Clone, Debug)]
-pub struct UserSeries<T: SeriesNumber>([PartSeries<T>; 2]);
+pub struct UserSeries<T: SeriesNumber>([Powers<T>; 2]);
 
 /// The series of a formula that is recorded as a torque, powers 0 to P.
 #[derive(Clone, Debug)]
@@ -31,14 +31,6 @@ impl<T: SeriesNumber> FormulaSeries<T> {
         }
         part.torques.first().map_or(&[], |&(_, slot)| self.0.of(slot))
     }
-}
-
-/// Those of what its potential does, or of what it applies beside.
-#[derive(Clone, Debug)]
-enum PartSeries<T: SeriesNumber> {
-    Plain(TapeSeries<T>),
-    /// Where series are multiplied as factors.
-    Factored(FactorTape<T>),
 }
 
 /// What the powers of a motion of `n` elements are, as far as they are known.
@@ -85,36 +77,16 @@ impl<T: SeriesNumber> At<'_, T> {
     }
 }
 
-impl<T: SeriesNumber> PartSeries<T> {
-    fn new(force: &UserForce<T::Constant>, part: &Part, order: usize) -> Self {
-        let is_number = |input: u32| matches!(force.inputs[input as usize], Input::Number(_));
-        match T::HAS_CONSTANTS {
-            true => Self::Factored(FactorTape::new(&part.tape, order, is_number)),
-            false => Self::Plain(TapeSeries::new(&part.tape, order)),
-        }
-    }
-
-    #[inline(always)]
-    fn power(&self, slot: Slot, m: usize) -> T {
-        match self {
-            Self::Plain(series) => series.of(slot)[m],
-            Self::Factored(series) => series.power(slot, m),
-        }
-    }
-}
-
 impl<T: SeriesNumber> UserSeries<T> {
     /// Room for powers up to `order`.
     pub fn new(force: &UserForce<T::Constant>, order: usize) -> Self {
-        Self(force.parts.each_ref().map(|part| PartSeries::new(force, part, order)))
+        let is_number = |input: u32| matches!(force.inputs[input as usize], Input::Number(_));
+        Self(force.parts.each_ref().map(|part| Powers::new(&part.tape, order, is_number)))
     }
 
     /// False where powers grow by more than products are made for.
     pub fn is_sound(&self) -> bool {
-        self.0.iter().all(|part| match part {
-            PartSeries::Plain(_) => true,
-            PartSeries::Factored(series) => series.is_sound(),
-        })
+        self.0.iter().all(Powers::is_sound)
     }
 
     /// Takes power m of the forces off the elements' balance, and adds that of torques to `load`.
@@ -129,10 +101,7 @@ impl<T: SeriesNumber> UserSeries<T> {
     ) {
         for (part, series) in force.parts.iter().zip(&mut self.0) {
             let input = |number: u32| at.power(force, force.inputs[number as usize], m);
-            match series {
-                PartSeries::Plain(series) => series.advance(&part.tape, m, input),
-                PartSeries::Factored(series) => series.advance(&part.tape, m, scale, input),
-            }
+            series.advance(&part.tape, m, scale, input);
             for &(site, [x, y]) in &part.forces {
                 force.sites[site]
                     .point
@@ -164,10 +133,6 @@ impl<T: SeriesNumber> UserSeries<T> {
 
     /// The first powers from a series in more digits.
     pub fn take(&mut self, other: &UserSeries<DoubleDouble>) {
-        for (series, other) in self.0.iter_mut().zip(&other.0) {
-            if let (PartSeries::Plain(series), PartSeries::Plain(other)) = (series, other) {
-                series.take(other);
-            }
-        }
+        self.0.iter_mut().zip(&other.0).for_each(|(series, other)| series.take(other));
     }
 }

@@ -152,8 +152,9 @@ impl Batch {
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
     /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off their
     /// axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls, all by
-    /// smooth formulas or without, and no friction; and the same with closed loops and sliders, their states in
-    /// the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
+    /// smooth formulas or without, and no friction; and the same with closed loops, sliders, gears and cams,
+    /// their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).  Bodies that float
+    /// have no walls beside them.
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         goes_on(mechanism) && trees::fits(mechanism)
     }

@@ -19,6 +19,7 @@ use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::point::Point;
 use crate::dynamics::quadratic::Quadratic;
 use crate::dynamics::tree::Tree;
+use std::sync::Arc;
 
 /// All terms of a mechanism with constants of the kind `C`.
 #[derive(Debug, PartialEq)]
@@ -243,8 +244,9 @@ fn equation<C>(row: &ConstraintEquation, of: &mut impl FnMut(f64) -> C) -> Const
         }),
     };
     let law = row.law.as_ref().map(|one| law(one, of));
+    let aim = row.aim.as_ref().map(|aim| Arc::new(aim.map(&mut *of)));
     // What a row pushes is asked of the mechanism.
-    ConstraintEquation { name: row.name.clone(), measure, law, push: None, aim: row.aim.clone() }
+    ConstraintEquation { name: row.name.clone(), measure, law, push: None, aim }
 }
 
 #[cfg(test)]

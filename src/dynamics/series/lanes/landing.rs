@@ -5,7 +5,8 @@
 //! moved as often as it needs by itself, so that none depends on the others.
 
 use super::super::rows::RowMeasures;
-use super::super::{Series, Terms};
+use super::super::user::At;
+use super::super::{Constants, Series, Terms};
 use super::number::InLanes;
 use super::{Landing, Times};
 use crate::arithmetic::Complex;
@@ -161,13 +162,15 @@ impl<W: EightLanes> Task for Land<'_, '_, W> {
     #[inline(always)]
     fn perform(self) -> [bool; LANES] {
         let Self { series, regularity, begin: [u, rest, rate], terms, times, landing } = self;
-        let f = u.len();
-        let Landing { high, low, is_going, unit } = landing;
+        let (f, angles) = (u.len(), series.angles);
+        let Landing { high, low, is_going, unit, per_length } = landing;
+        let per_length = W::of(&per_length.0);
         for c in 0..f {
             u[c] = InLanes(W::of(&high[c].0));
             rest[c] = InLanes(W::of(&low[c].0));
             rate[c] = InLanes(W::of(&high[f + c].0));
         }
+        series.time = InLanes::moment(times);
         series.begin(times, u, rest, rate);
         series.rows.face(times);
         series.factor_for_rows(terms);
@@ -175,25 +178,17 @@ impl<W: EightLanes> Task for Land<'_, '_, W> {
         let mut sieve = Sieve::new(is_going);
         let mut turned = W::ZERO;
         for _ in 0..SWEEPS {
-            let violations = series.rows.violations(&series.z[..f]);
-            let mut worst = W::ZERO;
-            for i in 0..violations.len() {
-                worst = violations[i].0.mul(W::of(&regularity.per_lever[i].0)).larger(worst);
-            }
+            series.rows.violations(&series.z[..f]);
+            let worst = series.worst_violation(&regularity.per_lever, high, per_length);
             if !sieve.sift(&worst.array(), ROUNDING) {
                 break;
             }
             let (mask, way) = (sieve.mask::<W>(), series.rows.way_back());
             for c in 0..f {
-                let turn = way[c].0.mul(mask);
-                turned = turn.larger(turned);
-                u[c] = InLanes(turn);
+                u[c] = InLanes(way[c].0.mul(mask));
             }
-            for c in 0..f {
-                let turn = u[c].0;
-                series.z[c] = turned_back(series.z[c], turn);
-                move_by(&mut high[c], &mut low[c], turn);
-            }
+            turned = series.turn_back(u, high, low).larger(turned);
+            series.aim_here();
         }
         let (far, mut is_landed) = (turned.array(), [false; LANES]);
         for lane in 0..LANES {
@@ -204,8 +199,11 @@ impl<W: EightLanes> Task for Land<'_, '_, W> {
         let mut sieve = Sieve::new(is_landed);
         for _ in 0..SWEEPS {
             let mut fastest = W::of(&unit.0);
-            for c in 0..f {
+            for c in 0..angles {
                 fastest = rate[c].0.larger(fastest);
+            }
+            for c in angles..f {
+                fastest = rate[c].0.mul(per_length).larger(fastest);
             }
             let slips = series.rows.slips(rate);
             let mut worst = W::ZERO;
@@ -252,6 +250,56 @@ fn move_by<W: EightLanes>(high: &mut Octet, low: &mut Octet, change: W) {
 }
 
 impl<W: EightLanes> Series<InLanes<W>> {
+    /// The largest of the violations just found of every lane over their levers, and over angles and places
+    /// where rounding grows with these.
+    #[inline(always)]
+    fn worst_violation(&self, per_lever: &[Octet], high: &[Octet], per_length: W) -> W {
+        let mut worst = W::ZERO;
+        for i in 0..self.rows.count() {
+            let far = self.rows.off(i).0.mul(W::of(&per_lever[i].0));
+            let growing = self.rows.growing(i);
+            if growing.is_empty() {
+                worst = far.larger(worst);
+                continue;
+            }
+            let mut most = W::ONE;
+            for &k in growing {
+                let size = W::of(&high[k].0);
+                most = if k < self.angles { size } else { size.mul(per_length) }.larger(most);
+            }
+            worst = far.div(most).larger(worst);
+        }
+        worst
+    }
+
+    /// Takes changes off the coordinates; returns the largest of an angle of every lane.
+    #[inline(always)]
+    fn turn_back(&mut self, changes: &[InLanes<W>], high: &mut [Octet], low: &mut [Octet]) -> W {
+        let (angles, mut turned) = (self.angles, W::ZERO);
+        for c in 0..changes.len() {
+            let turn = changes[c].0;
+            move_by(&mut high[c], &mut low[c], turn);
+            if c < angles {
+                turned = turn.larger(turned);
+                self.z[c] = turned_back(self.z[c], turn);
+                self.phi[c] = InLanes(W::of(&high[c].0));
+            } else if (c - angles).is_multiple_of(2) {
+                self.z[c].re -= InLanes(turn);
+            } else {
+                self.z[c - 1].im -= InLanes(turn);
+            }
+        }
+        turned
+    }
+
+    /// Aims and their slopes at the elements that are there now.
+    #[inline(always)]
+    fn aim_here(&mut self) {
+        let n = self.elements;
+        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        self.rows.advance_aims(0, at, &self.factors.scale, &mut self.load);
+    }
+
     /// The factors of M_0 and of the rows at unit vectors that are there already, and nothing more.
     #[inline(always)]
     fn factor_for_rows(&mut self, terms: &Terms<InLanes<W>>) {

@@ -9,7 +9,7 @@
 //! One sum stands between an order and the next.  No row is ever left out: where that would be called for,
 //! the numbers that come out are of no use, and whoever asks for them looks at the pivots first.
 //!
-//! The elements are bodies, and the coordinates their angles.
+//! All coordinates are free: the angles of the bodies, and the places of those that float.
 
 // Iterators and closures are left out of these loops: they are not compiled into code for the vectors.
 
@@ -26,9 +26,12 @@ impl<T: SeriesNumber> RowSeries<T> {
     pub fn renew(&mut self, terms: &Terms<T::Constant>, partition: &CoordinatePartition<T::Constant>) {
         for (kind, row) in self.kinds.iter_mut().zip(in_force(terms.constraints, partition)) {
             match (kind, &row.measure) {
-                (Kind::Place { place, law, .. }, Measure::Place(other)) => {
+                (Kind::Place { place, law, aim, .. }, Measure::Place(other)) => {
                     place.clone_from(other);
                     law.clone_from(&row.law);
+                    if let (Some(aim), Some(other)) = (aim, &row.aim) {
+                        aim.renew(other);
+                    }
                 }
                 (Kind::Angle { law, .. }, _) => *law = row.law.clone().unwrap_or_default(),
                 _ => {}
@@ -47,16 +50,26 @@ impl<T: SeriesNumber> RowSeries<T> {
         [&self.jacobian, &self.pivot]
     }
 
-    /// Power 0 of the rate of a row's law \[rad/s, m/s\].
+    /// Power 0 of the rate of a row's law, or of its aim where nothing moves \[rad/s, m/s\].
     #[inline(always)]
-    pub fn drive(&self, row: usize) -> T {
+    fn drive(&self, row: usize) -> T {
         match &self.kinds[row] {
             Kind::Place { drive, law: Some(_), .. } | Kind::Angle { drive, .. } => drive[0],
+            Kind::Place { aim: Some(aim), .. } => match aim.drive() {
+                Some(drive) => drive[0],
+                None => T::ZERO,
+            },
             Kind::Place { .. } => T::ZERO,
         }
     }
 
-    /// J at the elements `z`.
+    /// The coordinates whose magnitudes a row's rounding grows with.
+    #[inline(always)]
+    pub fn growing(&self, row: usize) -> &[usize] {
+        &self.growing[row]
+    }
+
+    /// J at the elements `z`, and where aims are.
     #[inline(always)]
     pub fn linearise(&mut self, z: &[Complex<T>]) {
         let f = self.coordinates;
@@ -64,13 +77,16 @@ impl<T: SeriesNumber> RowSeries<T> {
         for (i, kind) in self.kinds.iter().enumerate() {
             let row = &mut self.jacobian[i * f..(i + 1) * f];
             match kind {
-                Kind::Place { place, .. } => {
+                Kind::Place { place, aim, .. } => {
                     for &(k, g) in &place.linear {
-                        row[k] += z[k].cross(Complex::of(g));
+                        add_slope(row, place.angles, k, z, Complex::of(g));
                     }
                     for &(j, k, h) in &place.bilinear {
-                        row[k] += z[k].cross(z[j].turn(h.conj()));
-                        row[j] += z[j].cross(z[k].turn(h));
+                        add_slope(row, place.angles, k, z, z[j].turn(h.conj()));
+                        add_slope(row, place.angles, j, z, z[k].turn(h));
+                    }
+                    if let Some(aim) = aim {
+                        aim.take_slopes_off(row);
                     }
                 }
                 Kind::Angle { body, base, .. } => {
@@ -150,8 +166,11 @@ impl<T: SeriesNumber> RowSeries<T> {
         right[..f].copy_from_slice(solution);
         for (i, kind) in self.kinds.iter().enumerate() {
             right[f + i] = match kind {
-                Kind::Place { place, drive, law, .. } => {
-                    let known = bent(place, m, z, bend);
+                Kind::Place { place, drive, law, aim } => {
+                    let mut known = bent(place, m, z, bend);
+                    if let Some(aim) = aim {
+                        known -= aim.known;
+                    }
                     if law.is_some() { known - drive[m + 1].scale((m + 1) as f64) } else { known }
                 }
                 Kind::Angle { drive, .. } => -drive[m + 1].scale((m + 1) as f64),
@@ -179,10 +198,15 @@ impl<T: SeriesNumber> RowSeries<T> {
                     }
                     &speed[..=m]
                 }
-                Kind::Place { drive, .. } => &drive[..=m],
+                Kind::Place { drive, law: Some(_), .. } => &drive[..=m],
+                Kind::Place { aim, .. } => match aim.as_ref().and_then(|aim| aim.drive()) {
+                    // Its other powers are zero where there is but one.
+                    Some(drive) => &drive[..drive.len().min(m + 1)],
+                    None => &[],
+                },
             };
             let mut sum = T::ZERO;
-            for j in 0..=m {
+            for j in m + 1 - rates.len()..=m {
                 sum = sum.with_product(self.multiplier[j * r + i], rates[m - j], true);
             }
             power -= sum;
@@ -202,15 +226,17 @@ impl<T: SeriesNumber> RowSeries<T> {
         }
     }
 
-    /// How far the rows are off their laws at unit vectors `z`, an angle by its sine's series up to the fifth
+    /// How far the rows are off their laws and aims at elements `z`, an angle by its sine's series up to the fifth
     /// power \[m, rad\].
     #[inline(always)]
-    pub fn violations(&mut self, z: &[Complex<T>]) -> &[T] {
-        let r = self.kinds.len();
+    pub fn violations(&mut self, z: &[Complex<T>]) {
         for (i, kind) in self.kinds.iter().enumerate() {
             self.right[i] = match kind {
-                Kind::Place { place, .. } => {
+                Kind::Place { place, aim, .. } => {
                     let mut sum = T::constant(place.constant) - self.goals[i].re;
+                    if let Some(aim) = aim {
+                        sum -= aim.value();
+                    }
                     for &(k, g) in &place.linear {
                         sum += Complex::of(g).dot(z[k]);
                     }
@@ -230,7 +256,12 @@ impl<T: SeriesNumber> RowSeries<T> {
                 }
             };
         }
-        &self.right[..r]
+    }
+
+    /// What was found of a row.
+    #[inline(always)]
+    pub fn off(&self, row: usize) -> T {
+        self.right[row]
     }
 
     /// How fast they go off at rates `omega`, with the J at hand \[m/s, rad/s\].
@@ -262,5 +293,22 @@ impl<T: SeriesNumber> RowSeries<T> {
             way[c] = sum;
         }
         &way[..f]
+    }
+}
+
+/// Adds to a row of J what a gradient on element `k` makes of it.
+#[inline(always)]
+fn add_slope<T: SeriesNumber>(
+    row: &mut [T],
+    angles: usize,
+    k: usize,
+    z: &[Complex<T>],
+    gradient: Complex<T>,
+) {
+    if k < angles {
+        row[k] += z[k].cross(gradient);
+    } else {
+        row[k] += gradient.re;
+        row[k + 1] += gradient.im;
     }
 }

@@ -26,16 +26,35 @@ impl RowMeasures {
         let partition = CoordinatePartition::<f64>::free(mechanism);
         let in_force = in_force(&mechanism.constraints, &partition);
         let (scale, metric) = measures(mechanism, &partition, &in_force);
-        let levers = in_force.iter().map(|row| longest_lever(row)).collect();
+        let levers = in_force.iter().map(|row| longest_lever(row, mechanism.units.length)).collect();
         Self { levers, scale, columns: metric.columns, rows: metric.rows }
     }
 }
 
-fn longest_lever(row: &ConstraintEquation) -> f64 {
+/// The longest lever of a row; one of an origin is the unit of length \[m\], and so is that of an aim at least,
+/// or 1 where it gives an angle.
+fn longest_lever(row: &ConstraintEquation, unit: f64) -> f64 {
     let Measure::Place(place) = &row.measure else { return 1.0 };
-    let linear = place.linear.iter().map(|(_, g)| g);
-    let all = linear.chain(place.bilinear.iter().map(|(_, _, h)| h));
-    all.map(|g| libm::hypot(g.re, g.im)).fold(0.0, f64::max)
+    let least = match (&row.aim, row.is_in_radians()) {
+        (None, _) => 0.0,
+        (Some(_), true) => 1.0,
+        (Some(_), false) => unit,
+    };
+    let per = |k: usize| if k < place.angles { 1.0 } else { unit };
+    let linear = place.linear.iter().map(|(k, g)| (per(*k), g));
+    let all = linear.chain(place.bilinear.iter().map(|(j, k, h)| (per(*j).min(per(*k)), h)));
+    all.map(|(unit, g)| unit * libm::hypot(g.re, g.im)).fold(least, f64::max)
+}
+
+/// The coordinates whose magnitudes a row's rounding grows with.
+pub(super) fn growing(row: &ConstraintEquation) -> Vec<usize> {
+    let Measure::Place(place) = &row.measure else { return Vec::new() };
+    let angles = row.aim.iter().flat_map(|aim| aim.counted_angles());
+    let mut growing: Vec<usize> =
+        row.coordinates().into_iter().filter(|&k| k >= place.angles).chain(angles).collect();
+    growing.sort_unstable();
+    growing.dedup();
+    growing
 }
 
 /// The rows that a partition does not fulfil already.

@@ -1,8 +1,8 @@
-//! Hinge trees with springs, torsion springs, forces, formulas and motors, and mechanisms with closed loops and
-//! sliders, all lanes of mechanisms with one structure: the series of [`dynamics`](crate::dynamics::series) on numbers
-//! with a lane for each trajectory.
+//! Hinge trees with springs, torsion springs, forces, formulas and motors, and mechanisms with closed loops,
+//! sliders, gears and cams, all lanes of mechanisms with one structure: the series of
+//! [`dynamics`](crate::dynamics::series) on numbers with a lane for each trajectory.
 //!
-//! Loops and sliders are kept by multipliers, and by a projection after every step.  A trajectory leaves the
+//! Constraint equations are kept by multipliers, and by a projection after every step.  A trajectory leaves the
 //! lanes where a step begins or ends near a singular position, does not end on its rows, or may come to a
 //! wall: from where that step began it has to go on alone.
 
@@ -57,8 +57,8 @@ pub(super) struct TreeTeam {
     present: [Option<usize>; LANES],
 }
 
-/// True for hinge trees whose motors are all eliminated, with a motion left, and for mechanisms with loops or
-/// sliders.
+/// True for hinge trees whose motors are all eliminated, with a motion left, and for mechanisms with loops,
+/// sliders, gears or cams.
 ///
 /// Not for bodies on their axes under gravity and springs alone: more of them than have lanes of their own
 /// are faster one by one.
@@ -68,29 +68,25 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.contacts.iter().all(clearance::takes)
         && mechanism.frictions.is_empty()
         && mechanism.vibration.is_none()
+        && (mechanism.coordinates() == mechanism.bodies.len() || mechanism.contacts.is_empty())
         && (is_tree(mechanism) || is_looped(mechanism))
 }
 
 /// True where there are no rows to be kept.
 fn is_tree(mechanism: &Mechanism) -> bool {
-    let has_only_angles = mechanism.coordinates() == mechanism.bodies.len();
-    !super::free::fits(mechanism)
-        && mechanism.partition.count() > 0
-        && !mechanism.has_multipliers()
-        && (has_only_angles || mechanism.contacts.is_empty())
+    !super::free::fits(mechanism) && mechanism.partition.count() > 0 && !mechanism.has_multipliers()
 }
 
 fn is_looped(mechanism: &Mechanism) -> bool {
     mechanism.has_multipliers()
-        && mechanism.coordinates() == mechanism.bodies.len()
         && !mechanism.has_released()
-        && !mechanism.has_aims()
         && !mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name))
 }
 
 /// True where nothing tells beforehand how fast a motion may change: with formulas, and bodies that float.
 fn is_unbounded(mechanism: &Mechanism) -> bool {
     !mechanism.forces.is_empty()
+        || mechanism.has_aims()
         || mechanism.coordinates() != mechanism.bodies.len()
         || laws(mechanism).any(|law| law.profile.is_some())
 }
@@ -148,8 +144,13 @@ impl TreeTeam {
             self.is_going[lane] &= self.taken.0[lane] > 0.0;
         }
         self.keep(&self.is_going.map(|is_going| !is_going));
-        let landing =
-            Landing { high: &mut self.high, low: &mut self.low, is_going: self.is_going, unit: self.slowest };
+        let landing = Landing {
+            high: &mut self.high,
+            low: &mut self.low,
+            is_going: self.is_going,
+            unit: self.slowest,
+            per_length: self.per_length,
+        };
         let is_landed = self.series.land(&self.mechanism, times, landing);
         for lane in 0..LANES {
             self.is_leaving[lane] |= self.is_going[lane] && !is_landed[lane];
@@ -177,7 +178,7 @@ impl Team for TreeTeam {
             mechanism: like.clone(),
             order,
             coordinates: f,
-            angles: if is_kept { f } else { like.partition.turning() },
+            angles: if is_kept { like.bodies.len() } else { like.partition.turning() },
             per_length: Octet::splat(1.0),
             energy: Octet::splat(1.0),
             slowest: Octet::splat(1.0),
