@@ -64,6 +64,8 @@ mod many_digits;
 #[cfg(feature = "digits")]
 mod many_digits_corners;
 #[cfg(feature = "digits")]
+mod many_digits_couplings;
+#[cfg(feature = "digits")]
 mod many_digits_events;
 #[cfg(feature = "digits")]
 mod many_digits_switched;

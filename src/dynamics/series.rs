@@ -50,6 +50,7 @@ pub mod varied;
 mod work_integral;
 
 use self::action::ActionSeries;
+use self::aim::AimSeries;
 use self::bodywise::Bodywise;
 pub use self::coefficient::{Coefficient, Constants, SeriesNumber, Terms};
 pub use self::drive::powers;
@@ -61,11 +62,13 @@ use self::spring::SpringSeries;
 pub use self::user::FormulaSeries;
 use self::user::{At, UserSeries};
 use super::Coordinates;
+use super::constraint::Aim;
 use super::force::UserForce;
 use super::partition::CoordinatePartition;
 use super::schur::Weakest;
 use super::tree::size;
 use crate::arithmetic::Complex;
+use std::sync::Arc;
 
 /// Power series of a motion about one time; nothing is allocated after [`Series::new`].
 #[derive(Clone, Debug)]
@@ -136,6 +139,14 @@ impl<T: SeriesNumber> Series<T> {
     ) -> &'a [T] {
         let at = At { time, phi, z: &self.z, omega: &self.omega, n: self.elements };
         series.values(formula, self.order, at)
+    }
+
+    /// The powers of a formula of time and place in that motion, to that of the unit vectors.
+    pub fn aim(&self, aim: &Arc<Aim<T::Constant>>) -> Vec<T> {
+        let n = self.elements.max(1);
+        let order = (self.z.len() / n).saturating_sub(1);
+        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        AimSeries::new(aim, self.angles, order).values(order, at).to_vec()
     }
 
     /// Room for series of the terms of a mechanism in some coordinates up to this power of the rates, at

@@ -192,14 +192,13 @@ impl<'a, C: Decimal> Reader<'a, C> {
         }
         let is_refused = |wall: &Wall| {
             let moves = wall.moves() || wall.on.is_some();
-            wall.aim.is_some() || moves && !is_watched
+            (moves || wall.aim.is_some()) && !is_watched
         };
         if let Some(wall) = scene.walls.iter().position(is_refused) {
             let at = self.root.items("walls").into_iter().nth(wall).unwrap_or_else(|| self.root.clone());
-            let why = if is_watched { "its wall follows a formula of the state" } else { "the wall moves" };
-            return Err(self.refuse_part(&at, why));
+            return Err(self.refuse_part(&at, "the wall moves"));
         }
-        if let Some(coupling) = scene.couplings.first() {
+        if let Some(coupling) = scene.couplings.first().filter(|_| !is_watched) {
             let mut items = self.root.items("motors").into_iter();
             let at = items.find(|at| super::set::name(at.node) == Some(&coupling.name));
             let at = at.unwrap_or_else(|| self.root.clone());

@@ -380,7 +380,7 @@ fn walls_known<T: Coefficient>(mechanism: &Mechanism, t: Time, series: &Series<T
     let known = |contact: &Contact| {
         let powers = match (&contact.row.law, &contact.row.aim) {
             _ if contact.is_off => return None,
-            (_, Some(aim)) => series.aim(aim),
+            (_, Some(aim)) => series.aim(aim).iter().map(|power| power.value()).collect(),
             (Some(law), None) => powers(law, t, order + 1),
             (None, None) => return None,
         };

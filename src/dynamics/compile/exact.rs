@@ -3,6 +3,7 @@
 
 use super::parts;
 use super::{Body, CompileError, Mechanism, dense_constants};
+use crate::arithmetic::tape::Slot;
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 #[cfg(feature = "digits")]
 use crate::dynamics::configuration::{Configuration, Values};
@@ -130,6 +131,7 @@ impl<C: Decimal> ExactMechanism<C> {
             .map_err(|error| error.to_string())?;
         parts::joints(scene, &forest, &mut constraints);
         constraints.extend(parts::guides(scene, &forest));
+        constraints.extend(scene.couplings.iter().map(|coupling| parts::follows(&forest, coupling, scene)));
         let laws = Formulas::of(scene, &forest).map_err(|error| error.to_string())?.map(Arc::new);
         let acting = Acting {
             parameters: laws.as_ref().map_or_else(Vec::new, |laws| laws.parameters.clone()),
@@ -221,6 +223,8 @@ impl<C: Decimal> ExactMechanism<C> {
                     law.profile = Some(profile);
                 }
             }
+            let aims = laws.aims(parameters, modes)?;
+            parts::give(&mut next.constraints, next.walls.iter_mut().map(|wall| &mut wall.0), aims);
             next.partition = next.partition.renewed(&next.constraints)?;
         }
         let whole = next.structure.with_all_parts();
@@ -370,7 +374,14 @@ impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
                 }
             };
             let phase = row.law.as_ref().map(|law| (T::law_value(law, t), T::phase(law, t).rate));
-            let (wanted, rate) = phase.unwrap_or((T::ZERO, T::ZERO));
+            let (mut wanted, mut rate) = phase.unwrap_or((T::ZERO, T::ZERO));
+            if let Some(aim) = &row.aim {
+                aim.at(T::moment(t), Posture { phi, z: &z, omega }, |slots| {
+                    let slot = |slot: Slot| slots[slot as usize];
+                    (wanted, rate) = (wanted + slot(aim.value), rate + slot(aim.drive));
+                    aim.slopes.iter().for_each(|&(k, slope)| jacobian[k] -= slot(slope));
+                });
+            }
             [whole_turns_off(measured - wanted, row.is_angle()), dot(jacobian, omega) - rate]
         })
         .collect()

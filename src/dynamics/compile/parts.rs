@@ -2,9 +2,9 @@
 
 use super::{Body, Joint};
 use crate::arithmetic::{Complex, Real};
-use crate::dynamics::constraint::{self, Aim, ConstraintEquation, Measure};
+use crate::dynamics::constraint::{self, ConstraintEquation, Measure};
 use crate::dynamics::force::action::Kind;
-use crate::dynamics::force::formula::Driven;
+use crate::dynamics::force::formula::{Driven, PlacedAim};
 use crate::dynamics::force::{Action, Spring, Torsion};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::impact::Contact;
@@ -12,7 +12,6 @@ use crate::dynamics::law::Law;
 use crate::dynamics::point::Point;
 use crate::dynamics::quadratic::Quadratic;
 use crate::scene::{Coupled, Coupling, Place, Scene, Slider, Wall};
-use std::sync::Arc;
 
 /// The bodies, counted from the points they hang on.
 pub(super) fn bodies<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Body<C>> {
@@ -109,11 +108,11 @@ pub(in crate::dynamics) fn travel_along(forest: &Forest, slider: &Slider) -> Con
 }
 
 /// The row of a motor whose aim depends on the mechanism, without its aim.
-pub(super) fn follows(
-    forest: &Forest,
+pub(super) fn follows<C: Real>(
+    forest: &Forest<C>,
     Coupling { name, coupled, .. }: &Coupling,
-    scene: &Scene,
-) -> ConstraintEquation {
+    scene: &Scene<C>,
+) -> ConstraintEquation<C> {
     match *coupled {
         Coupled::Travel(slider) => {
             on_rail(forest, name, &scene.sliders[slider], rail(&scene.sliders[slider]), None)
@@ -135,11 +134,21 @@ pub(super) fn follows(
 pub(super) fn give_aims(
     rows: &mut [ConstraintEquation],
     contacts: &mut [Contact],
-    aims: Vec<(&Driven, Arc<Aim>)>,
+    aims: Vec<PlacedAim<'_, f64>>,
 ) {
+    give(rows, contacts.iter_mut().map(|wall| &mut wall.row), aims);
+}
+
+/// The same where the rows of walls are by themselves.
+pub(super) fn give<'a, C: Real + 'a>(
+    rows: &mut [ConstraintEquation<C>],
+    walls: impl Iterator<Item = &'a mut ConstraintEquation<C>>,
+    aims: Vec<PlacedAim<'_, C>>,
+) {
+    let mut walls: Vec<_> = walls.collect();
     for (Driven { name, is_wall }, aim) in aims {
         let row = match is_wall {
-            true => contacts.iter_mut().map(|wall| &mut wall.row).find(|row| row.name == *name),
+            true => walls.iter_mut().map(|row| &mut **row).find(|row| row.name == *name),
             false => rows.iter_mut().find(|row| row.name == *name && !row.is_angle()),
         };
         if let Some(row) = row {

@@ -12,7 +12,7 @@
 
 use super::{Linearised, Posture, Site};
 use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::configuration::{Configuration, Source};
 use std::cell::RefCell;
@@ -40,25 +40,25 @@ pub struct Aim<C = f64> {
     /// Numbers that are no doubles.
     pub(in crate::dynamics) numbers: Vec<C>,
     /// f, f_t and f'' at zero acceleration.
-    pub(in crate::dynamics) value: Slot,
-    pub(in crate::dynamics) drive: Slot,
+    pub(crate) value: Slot,
+    pub(crate) drive: Slot,
     pub(in crate::dynamics) convective: Slot,
     /// f_q by coordinate.
-    pub(in crate::dynamics) slopes: Vec<(usize, Slot)>,
+    pub(crate) slopes: Vec<(usize, Slot)>,
     /// The angles it is the aim of; none where that is a travel.
     pub angles: Vec<usize>,
     /// True where it depends on time.
     pub is_timed: bool,
 }
 
-impl Aim {
+impl<C: Real> Aim<C> {
     /// Records a formula, from which the angle of `angles[0]`, less that of `angles[1]`, is taken; `None`
     /// where it depends on rates.
     pub(in crate::dynamics) fn record(
         angles: &[usize],
-        formula: impl FnOnce(&Configuration<Symbol>) -> Symbol,
+        formula: impl FnOnce(&Configuration<Symbol, C>) -> Symbol,
     ) -> Option<Self> {
-        let recorder = Recorder::default();
+        let recorder = Recorder::<C>::default();
         let (mut coordinates, mut has_rates, mut is_timed) = (Vec::new(), false, false);
         let [(tape, slots)] = Symbol::record(|| {
             let signs = [1.0, -1.0];
@@ -76,7 +76,7 @@ impl Aim {
         });
         let inputs = recorder.inputs.into_inner();
         (!has_rates).then(|| Self {
-            numbers: Vec::new(),
+            numbers: recorder.numbers.into_inner(),
             value: slots[0],
             drive: slots[1],
             convective: slots[2],
@@ -88,6 +88,22 @@ impl Aim {
         })
     }
 
+    /// What it comes to at a time [s] and a posture: all results of its tape.
+    pub fn at<T: Over<C>, R>(&self, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
+        let input = |number: u32| match self.inputs[number as usize] {
+            Input::Number(number) => T::constant(self.numbers[number]),
+            Input::Time => time,
+            Input::Angle(k) | Input::Origin(k) => at.phi[k],
+            Input::Cosine(k) => at.z[k].re,
+            Input::Sine(k) => at.z[k].im,
+            // Values and slopes are asked for without rates.
+            Input::Rate(k) => at.omega.get(k).copied().unwrap_or(T::ZERO),
+        };
+        self.tape.results(input, then)
+    }
+}
+
+impl Aim {
     /// The same formula with other numbers in it, one by one.
     pub(in crate::dynamics) fn map<D>(&self, mut of: impl FnMut(f64) -> D) -> Aim<D> {
         let (mut inputs, mut numbers) = (self.inputs.clone(), Vec::new());
@@ -111,16 +127,7 @@ impl Aim {
     }
 
     fn results<T: Real, R>(&self, t: Time, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
-        let input = |number: u32| match self.inputs[number as usize] {
-            Input::Number(number) => T::of(self.numbers[number]),
-            Input::Time => T::split(t).0,
-            Input::Angle(k) | Input::Origin(k) => at.phi[k],
-            Input::Cosine(k) => at.z[k].re,
-            Input::Sine(k) => at.z[k].im,
-            // Values and slopes are asked for without rates.
-            Input::Rate(k) => at.omega.get(k).copied().unwrap_or(T::ZERO),
-        };
-        self.tape.results(input, then)
+        self.at(T::split(t).0, at, then)
     }
 
     /// f, at angles and translational coordinates `phi` and elements `z`.
@@ -168,8 +175,9 @@ impl<C> Aim<C> {
 
 /// Hands out inputs while a formula is recorded.
 #[derive(Default)]
-struct Recorder {
+struct Recorder<C> {
     inputs: RefCell<Vec<Input>>,
+    numbers: RefCell<Vec<C>>,
 }
 
 /// Derivatives of a result.
@@ -180,7 +188,7 @@ struct Derivatives {
     rates: Vec<Symbol>,
 }
 
-impl Recorder {
+impl<C: Real> Recorder<C> {
     fn input(&self, input: Input) -> Symbol {
         Symbol::input(number_of(&self.inputs, &input) as u32)
     }
@@ -212,13 +220,25 @@ impl Recorder {
         found
     }
 
+    fn vector(&self, Complex { re, im }: Complex<C>) -> Complex<Symbol> {
+        Complex::new(self.constant(re), self.constant(im))
+    }
+
+    /// A vector of a body's frame.
+    fn turned(&self, body: usize, gamma: Complex<C>) -> Complex<Symbol> {
+        if C::HAS_CONSTANTS {
+            return self.direction(body) * self.vector(gamma);
+        }
+        self.direction(body).turn(Complex::new(gamma.re.value(), gamma.im.value()))
+    }
+
     /// The derivative along the motion, at zero acceleration.
     fn along(&self, of: &Derivatives) -> Symbol {
         of.slopes.iter().fold(of.time, |sum, &(k, slope)| sum + slope * self.input(Input::Rate(k)))
     }
 }
 
-impl Source<Symbol> for Recorder {
+impl<C: Real> Source<Symbol, C> for Recorder<C> {
     fn time(&self) -> Symbol {
         self.input(Input::Time)
     }
@@ -235,27 +255,32 @@ impl Source<Symbol> for Recorder {
         Complex::new(self.input(Input::Cosine(body)), self.input(Input::Sine(body)))
     }
 
-    fn position(&self, site: &Site) -> Complex<Symbol> {
+    fn position(&self, site: &Site<C>) -> Complex<Symbol> {
         let turned = site
             .point
             .terms
             .iter()
-            .fold(Complex::of(site.point.root), |sum, &(k, gamma)| sum + self.direction(k).turn(gamma));
+            .fold(self.vector(site.point.root), |sum, &(k, gamma)| sum + self.turned(k, gamma));
         site.point.shifts.iter().fold(turned, |sum, &(x, share)| {
             let origin = Complex::new(self.input(Input::Origin(x)), self.input(Input::Origin(x + 1)));
             sum + origin.times(Symbol::of(share))
         })
     }
 
-    fn velocity(&self, site: &Site) -> Complex<Symbol> {
+    fn velocity(&self, site: &Site<C>) -> Complex<Symbol> {
         // Whatever it comes to, it depends on rates.
         let rates =
             site.point.terms.iter().map(|term| term.0).chain(site.point.shifts.iter().map(|shift| shift.0));
         rates.fold(Complex::ZERO, |sum, k| sum + Complex::new(self.rate(k), self.rate(k)))
     }
 
-    fn constant(&self, value: f64) -> Symbol {
-        Symbol::of(value)
+    /// What is no double is an input: the tape folds constants in doubles.
+    fn constant(&self, value: C) -> Symbol {
+        if C::HAS_CONSTANTS {
+            self.input(Input::Number(number_of(&self.numbers, &value)))
+        } else {
+            Symbol::of(value.value())
+        }
     }
 }
 
@@ -270,7 +295,7 @@ mod tests {
     #[test]
     fn its_derivatives_are_those_of_its_position() {
         // An angle that follows another, a point, an origin and time.
-        let aim = Aim::record(&[0], |at| {
+        let aim = Aim::<f64>::record(&[0], |at| {
             let ([x, y], [u, w]) = (at.position(&rod()), at.position(&free()));
             (at.angle(1).scale(2.0) + at.time() * x).sin_cos().0
                 + (x * y + u * w).scale(0.3)
@@ -295,7 +320,7 @@ mod tests {
 
     #[test]
     fn a_formula_of_rates_is_none() {
-        assert!(Aim::record(&[0], |at| at.angle(1) + at.rate(1)).is_none());
-        assert!(Aim::record(&[0], |at| at.velocity(&rod())[0]).is_none());
+        assert!(Aim::<f64>::record(&[0], |at| at.angle(1) + at.rate(1)).is_none());
+        assert!(Aim::<f64>::record(&[0], |at| at.velocity(&rod())[0]).is_none());
     }
 }

@@ -152,6 +152,9 @@ pub(crate) struct Driven {
     pub is_wall: bool,
 }
 
+/// An aim and what has it.
+pub(crate) type PlacedAim<'a, C> = (&'a Driven, Arc<Aim<C>>);
+
 /// All formulas of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Formulas<C = f64> {
@@ -350,6 +353,23 @@ impl<C: Decimal> Formulas<C> {
         all
     }
 
+    /// The aims of motors and walls that depend on the mechanism, on the branches that `modes` say.
+    ///
+    /// # Errors
+    /// One that depends on rates.
+    pub fn aims(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<PlacedAim<'_, C>>, CompileError> {
+        let aim = |(part, angles, expression): &'_ (Driven, Vec<usize>, Expression<C>)| {
+            let formula = |at: &Configuration<Symbol, C>| {
+                let signals = self.signals(at, parameters, modes);
+                expression.evaluated(at, parameters, &signals, modes)
+            };
+            Aim::record(angles, formula)
+                .map(Arc::new)
+                .ok_or_else(|| CompileError::Unsound(format!("law of {}: it depends on rates", part.name)))
+        };
+        self.aims.iter().map(|of| Ok((&of.0, aim(of)?))).collect()
+    }
+
     /// Every formula whose conditions count, in the order in which they are numbered.
     fn switched(&self) -> impl Iterator<Item = &Expression<C>> {
         let laws = self.laws.iter().flat_map(Law::expressions);
@@ -375,23 +395,6 @@ impl Formulas {
     /// True where laws of motors or walls are formulas.
     pub fn drives(&self) -> bool {
         !self.profiles.is_empty() || !self.aims.is_empty()
-    }
-
-    /// The aims of motors and walls that depend on the mechanism, on the branches that `modes` say.
-    ///
-    /// # Errors
-    /// One that depends on rates.
-    pub fn aims(&self, parameters: &[f64], modes: &[bool]) -> Result<Vec<(&Driven, Arc<Aim>)>, CompileError> {
-        let aim = |(part, angles, expression): &'_ (Driven, Vec<usize>, Expression)| {
-            let formula = |at: &Configuration<Symbol>| {
-                let signals = self.signals(at, parameters, modes);
-                expression.evaluated(at, parameters, &signals, modes)
-            };
-            Aim::record(angles, formula)
-                .map(Arc::new)
-                .ok_or_else(|| CompileError::Unsound(format!("law of {}: it depends on rates", part.name)))
-        };
-        self.aims.iter().map(|of| Ok((&of.0, aim(of)?))).collect()
     }
 
     /// The modes at a configuration, by the signs of the conditions there.

@@ -1,14 +1,11 @@
 //! Series of the numbers whose constants are doubles.
 
-use super::aim::AimSeries;
 use super::polynomial::{copy, copy_vectors};
-use super::user::At;
 use super::{Coefficient, Series, drive};
 use crate::arithmetic::{Complex, DoubleDouble};
-use crate::dynamics::constraint::{Aim, Measure};
+use crate::dynamics::constraint::Measure;
 use crate::dynamics::impact::{AWAY, Contact};
 use crate::dynamics::{Coordinates, Mechanism, Time};
-use std::sync::Arc;
 
 impl<T: Coefficient> Series<T> {
     /// Room for series of a mechanism in some coordinates up to this power of the rates, at least 2.
@@ -88,21 +85,12 @@ impl<T: Coefficient> Series<T> {
         }
         if let Some(aim) = &contact.row.aim {
             for (power, moved) in powers.iter_mut().zip(self.aim(aim)) {
-                *power -= moved;
+                *power -= moved.value();
             }
         }
         if let Some(first) = powers.first_mut() {
             *first += place.constant;
         }
         powers.iter_mut().for_each(|power| *power /= contact.length);
-    }
-
-    /// Powers of a formula of time and place, to that of the unit vectors.
-    pub fn aim(&self, aim: &Arc<Aim>) -> Vec<f64> {
-        let n = self.elements.max(1);
-        let order = (self.z.len() / n).saturating_sub(1);
-        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
-        let mut series = AimSeries::new(aim, self.angles, order);
-        series.values(order, at).iter().map(|power| power.value()).collect()
     }
 }

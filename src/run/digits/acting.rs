@@ -63,8 +63,12 @@ impl<const W: usize> Motion<W> {
     /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.
     fn let_act(&mut self, mut acting: Acting<Digits<W>>) -> Result<(), StepError> {
         let before = (self.state_posture(), self.energy());
-        let walls: Vec<_> =
-            self.mechanism.walls.iter().map(|(row, _)| (self.is_off(row), row.law.clone())).collect();
+        let walls: Vec<_> = self
+            .mechanism
+            .walls
+            .iter()
+            .map(|(row, _)| (self.is_off(row), row.law.clone(), row.aim.clone()))
+            .collect();
         let unsuited = |motion: &Self, what: &str, hint: &str| motion.stop(Cause::Unsuited, 0.0, what, hint);
         let mechanism = self.mechanism.clone();
         if let Err(error) = self.exchange(&acting) {
@@ -80,9 +84,9 @@ impl<const W: usize> Motion<W> {
         self.state.acting = acting;
         // The next series is another one.
         self.state.radius = None;
-        for ((was_off, law), (row, _)) in walls.into_iter().zip(&self.mechanism.walls) {
+        for ((was_off, law, aim), (row, _)) in walls.into_iter().zip(&self.mechanism.walls) {
             let gap = wall::distance(self, row);
-            let has_changed = was_off || law != row.law;
+            let has_changed = was_off || law != row.law || aim != row.aim;
             if has_changed
                 && !self.is_off(row)
                 && gap < Digits::of(-BEHIND * self.mechanism.structure.size_of_parts())
@@ -94,12 +98,14 @@ impl<const W: usize> Motion<W> {
                 return Err(unsuited(self, &what, hint));
             }
         }
+        let kept = self.kept(&closing);
         self.close(&closing)?;
         let after = self.state_posture();
         let apart = |(a, b): (&Digits<W>, &Digits<W>)| (*a - *b).log2() - a.log2().max(0.0);
         let moved = |a: &[Digits<W>], b: &[Digits<W>]| a.iter().zip(b).map(apart).fold(f64::MIN, f64::max);
-        let jump = moved(&before.0.phi, &after.phi).max(moved(&before.0.omega, &after.omega));
-        if closing.is_empty() && jump > -SAME * self.precision.bits as f64 {
+        let turned = moved(&before.0.phi, &after.phi).max(moved(&before.0.omega, &after.omega));
+        let jump = if closing.is_empty() { kept.max(turned) } else { kept };
+        if jump > -SAME * self.precision.bits as f64 {
             let what = format!("the law of a motor jumps by {:.1e}", libm::exp2(jump));
             return Err(unsuited(self, &what, "it must keep its value and its rate through its corners"));
         }
@@ -139,9 +145,19 @@ impl<const W: usize> Motion<W> {
 
     /// What is left of every constraint equation \[rad, m\].
     fn residuals(&mut self) -> Vec<Digits<W>> {
+        self.residuals_and_rates().into_iter().map(|residual| residual[0]).collect()
+    }
+
+    fn residuals_and_rates(&mut self) -> Vec<[Digits<W>; 2]> {
         let Posture { phi, omega, .. } = self.state_posture();
-        let residuals = self.keeper.residuals(&self.mechanism, self.state.t, &phi, &omega);
-        residuals.into_iter().map(|residual| residual[0]).collect()
+        self.keeper.residuals(&self.mechanism, self.state.t, &phi, &omega)
+    }
+
+    /// log2 of the largest residual, or rate of one, of rows that were in force before.
+    fn kept(&mut self, closing: &[usize]) -> f64 {
+        let residuals = self.residuals_and_rates().into_iter().enumerate();
+        let kept = residuals.filter(|(r, _)| !closing.contains(r)).flat_map(|(_, residual)| residual);
+        kept.map(|residual| residual.log2()).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// Lets those rows take hold that were not in force before.

@@ -6,10 +6,11 @@
 //! ```
 
 use super::precision::Precision;
+use super::wall::travel_rate;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
-use crate::dynamics::series::Constants;
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::{schur, tree};
 use crate::stepping::{Cause, StepError};
 
@@ -230,11 +231,10 @@ impl<const W: usize> Keeper<W> {
         self.factor(mechanism, phi);
         let mut impulses: Vec<_> = residuals.iter().map(|residual| residual[1]).collect();
         self.take_off(&mut impulses, omega);
+        let z = mechanism.elements(phi);
+        let at = Posture { phi, z: &z, omega };
         let driven = mechanism.constraints.iter().zip(impulses);
-        driven.fold(Digits::ZERO, |work, (row, impulse)| match &row.law {
-            Some(law) => work - impulse * Digits::phase(law, t).rate,
-            None => work,
-        })
+        driven.fold(Digits::ZERO, |work, (row, impulse)| work - impulse * travel_rate(row, t, at))
     }
 
     /// The change of the rates by an impulse of one along `gradient`, the constraints kept; all at a posture.

@@ -11,7 +11,7 @@
 //! digits.  Walls whose point does not approach have no restitution.
 
 use super::motion::Motion;
-use super::wall::{Jump, distance, gap_rate, travel_rate};
+use super::wall::{Jump, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::kernel::dot;
@@ -52,10 +52,12 @@ impl<const W: usize> Meeting<W> {
             other == wall || !motion.is_off(row) && gap.log2() - libm::log2(length) < rounding
         };
         let walls: Vec<usize> = (0..motion.mechanism.walls.len()).filter(touches).collect();
-        let (gradients, velocity): (Vec<_>, Vec<_>) =
-            walls.iter().map(|&wall| gap_rate(motion, wall)).unzip();
-        let t = motion.state().t;
-        let rates = walls.iter().map(|&wall| travel_rate(&motion.mechanism.walls[wall].0, t)).collect();
+        let (mut gradients, mut rates, mut velocity) = (Vec::new(), Vec::new(), Vec::new());
+        for gap in walls.iter().map(|&wall| gap_rate(motion, wall)) {
+            gradients.push(gap.gradient);
+            rates.push(gap.travel);
+            velocity.push(gap.rate);
+        }
         let still = largest(&velocity) + rounding;
         let approached = velocity.iter().filter(|v| **v < Digits::ZERO && v.log2() > still).count();
         (approached > 1).then_some(Self { walls, gradients, rates, velocity, rounding })

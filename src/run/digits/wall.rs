@@ -13,11 +13,12 @@ use super::motion::Motion;
 use super::several::Meeting;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{Aim, ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Constants;
 use crate::stepping::search::{Crossing, Powers, crossing};
 use crate::stepping::{Cause, StepError};
+use std::sync::Arc;
 
 /// Part of the bits carried in which an impact leaves nothing of an approach.
 const SURE: f64 = 0.5;
@@ -97,19 +98,32 @@ fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) 
             };
         }
     }
+    if let Some(aim) = &row.aim {
+        let moved = motion.series.aim(aim);
+        powers.iter_mut().zip(moved).for_each(|(power, moved)| *power -= moved);
+    }
     powers
 }
 
 /// The gap of a wall at the state \[m\].
 pub(super) fn distance<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) -> Digits<W> {
-    let z = motion.mechanism.elements(&motion.state_posture().phi);
-    let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, motion.state.t));
-    row.gap(&z) - travel
+    let (t, posture) = (motion.state.t, motion.state_posture());
+    let z = motion.mechanism.elements(&posture.phi);
+    let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, t));
+    let at = Posture { phi: &posture.phi, z: &z, omega: &[] };
+    let aim = |aim: &Arc<Aim<Digits<W>>>| aim.at(t, at, |slots| slots[aim.value as usize]);
+    row.gap(&z) - travel - row.aim.as_ref().map_or(Digits::ZERO, aim)
 }
 
-/// How fast a wall moves along its normal \[m/s\].
-pub(super) fn travel_rate<const W: usize>(row: &ConstraintEquation<Digits<W>>, t: Digits<W>) -> Digits<W> {
-    row.law.as_ref().map_or(Digits::ZERO, |law| Digits::phase(law, t).rate)
+/// How fast a wall moves along its normal, or a motor, but for what its formula says of the state \[m/s, rad/s\].
+pub(super) fn travel_rate<const W: usize>(
+    row: &ConstraintEquation<Digits<W>>,
+    t: Digits<W>,
+    at: Posture<Digits<W>>,
+) -> Digits<W> {
+    let rate = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::phase(law, t).rate);
+    let aim = |aim: &Arc<Aim<Digits<W>>>| aim.at(t, at, |slots| slots[aim.drive as usize]);
+    rate + row.aim.as_ref().map_or(Digits::ZERO, aim)
 }
 
 /// The zero of a polynomial near a time, as far as its digits tell.
@@ -139,18 +153,19 @@ pub(super) fn refined<const W: usize>(
 
 /// The jump of the rates at a wall, and at all others that are met at the same moment.
 pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(), StepError> {
-    let (gradient, approach) = gap_rate(motion, wall);
+    let gap = gap_rate(motion, wall);
+    let approach = gap.rate;
     let several = Meeting::at(motion, wall);
     if several.is_none() && approach >= Digits::ZERO {
         return Ok(());
     }
     let jump = match several {
         Some(meeting) => meeting.jump(motion)?,
-        None => alone(motion, wall, &gradient, approach),
+        None => alone(motion, wall, &gap),
     };
     jumped(motion, &jump);
     // What motors drive there no impulse turns back.
-    let (_, after) = gap_rate(motion, wall);
+    let after = gap_rate(motion, wall).rate;
     let is_left = after < Digits::ZERO && (after / approach).log2() > -SURE * motion.precision.bits as f64;
     if is_left || !after.is_finite() {
         let name = &motion.mechanism.walls[wall].0.name;
@@ -161,33 +176,48 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     Ok(())
 }
 
-/// Gradient of the gap of a wall by all coordinates, and its rate \[m/s\].
-pub(super) fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> (Vec<Digits<W>>, Digits<W>) {
-    let posture = motion.state_posture();
+/// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap \[m/s\].
+pub(super) fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> GapRate<W> {
+    let (t, posture) = (motion.state.t, motion.state_posture());
     let z = motion.mechanism.elements(&posture.phi);
     let row = &motion.mechanism.walls[wall].0;
     let mut gradient = vec![Digits::ZERO; posture.phi.len()];
     if let Measure::Place(place) = &row.measure {
         place.slopes(&z, |k, slope| gradient[k] += slope);
     }
-    let rate = dot(&gradient, &posture.omega) - travel_rate(row, motion.state.t);
-    (gradient, rate)
+    let at = Posture { phi: &posture.phi, z: &z, omega: &posture.omega };
+    if let Some(aim) = &row.aim {
+        let slopes = aim.slopes.iter();
+        aim.at(t, at, |slots| slopes.for_each(|&(k, slope)| gradient[k] -= slots[slope as usize]));
+    }
+    let travel = travel_rate(row, t, at);
+    let rate = dot(&gradient, &posture.omega) - travel;
+    GapRate { gradient, travel, rate }
+}
+
+/// How the gap of a wall changes.
+pub(super) struct GapRate<const W: usize> {
+    /// Its gradient by all coordinates.
+    pub gradient: Vec<Digits<W>>,
+    /// How fast the wall moves along its normal by itself \[m/s\].
+    pub travel: Digits<W>,
+    /// Its rate \[m/s\].
+    pub rate: Digits<W>,
 }
 
 /// What the impulse of one wall does.
 fn alone<const W: usize>(
     motion: &mut Motion<W>,
     wall: usize,
-    gradient: &[Digits<W>],
-    approach: Digits<W>,
+    GapRate { gradient, travel, rate }: &GapRate<W>,
 ) -> Jump<W> {
     let (t, posture) = (motion.state.t, motion.state_posture());
     let at = [&posture.phi[..], &posture.omega[..]];
     let response = motion.keeper.response(&motion.mechanism, t, at, gradient);
-    let (row, restitution) = &motion.mechanism.walls[wall];
-    let impulse = -(Digits::ONE + *restitution) * approach / dot(gradient, &response);
+    let restitution = motion.mechanism.walls[wall].1;
+    let impulse = -(Digits::ONE + restitution) * *rate / dot(gradient, &response);
     let change = response.iter().map(|&a| a * impulse).collect();
-    Jump { change, work: impulse * travel_rate(row, t), walls: 1 }
+    Jump { change, work: impulse * *travel, walls: 1 }
 }
 
 /// What impulses do at one moment.

@@ -4,7 +4,7 @@ use super::{Cursor, Decimal, Reader, Watched, shortest};
 use crate::scene::error::SceneError;
 use crate::scene::formula::{Formula, Interpolant, Numbers};
 use crate::scene::locate::Value;
-use crate::scene::{Load, LoadLaw, NamedPoint, PointTable, Profile, Scene, SceneEvent};
+use crate::scene::{Coupling, Load, LoadLaw, NamedPoint, PointTable, Profile, Scene, SceneEvent};
 
 /// The list a law stands in.
 fn list<C>(load: &Load<C>) -> &'static str {
@@ -97,7 +97,18 @@ impl<'a, C: Decimal> Reader<'a, C> {
         Ok(LoadLaw { name: name.clone(), load })
     }
 
-    fn formula(&self, at: &Cursor, key: &str, plain: &str) -> Result<String, SceneError> {
+    /// Motors whose aim is a formula of the state.
+    pub(super) fn couplings(&self, plain: &Scene) -> Result<Vec<Coupling>, SceneError> {
+        let items = self.root.items("motors");
+        let coupling = |plain: &Coupling| {
+            let named = |at: &&Cursor| crate::scene::set::name(at.node) == Some(&plain.name);
+            let at = items.iter().find(named).unwrap_or(&self.root);
+            Ok(Coupling { aim: self.formula(at, "law", &plain.aim)?, ..plain.clone() })
+        };
+        plain.couplings.iter().map(coupling).collect()
+    }
+
+    pub(super) fn formula(&self, at: &Cursor, key: &str, plain: &str) -> Result<String, SceneError> {
         at.child(key).map_or_else(|| Ok(plain.to_owned()), |at| self.formula_at(&at, plain))
     }
 
