@@ -35,6 +35,9 @@ fn a_value_is_set_by_the_names_and_numbers_that_vary_takes() {
         ("spring", "spring.stiffness=2*pi", format!("springs.spring.stiffness={}", 4.0 * FRAC_PI_2)),
         ("motor", "motor.rate=pi", format!("motors.motor.law.rate={}", 2.0 * FRAC_PI_2)),
         ("free", "gravity[1]=1/8", "gravity[1]=0.125".to_owned()),
+        ("free", "bar1.phi=1/2*pi", format!("start.bar1.phi={FRAC_PI_2}")),
+        ("free", "bar1.phi=3*pi/4", format!("start.bar1.phi={}", 6.0 * FRAC_PI_2 / 4.0)),
+        ("free", "bar1.phi=2pi/3", format!("start.bar1.phi={}", 4.0 * FRAC_PI_2 / 3.0)),
     ] {
         let inspected =
             |set: &str| program.run(&format!("inspect {scene}.json --json --set {set}")).exits(0).object();
@@ -45,6 +48,14 @@ fn a_value_is_set_by_the_names_and_numbers_that_vary_takes() {
     assert_eq!(object["scene"], "pi");
     program.run("check free.json --set bra1.phi=0").exits(3).says(&["bra1", "does not exist"]);
     program.run("check free.json --set bar1.phi=ten").exits(3).says(&["start.bar1.phi", "must be a number"]);
+    // Half of pi, or one over a whole turn?
+    program.run("check free.json --set bar1.phi=1/2pi").exits(3).says(&[
+        "start.bar1.phi",
+        "1/2pi",
+        "write products with *",
+    ]);
+    program.run("sweep free.json --vary bar1.phi=0..1/2pi:3").exits(2).says(&["`1/2pi`", "1/2*pi"]);
+    program.run("check free.json --until 1/2pi").exits(2).says(&["1/2pi", "1/2*pi"]);
     // Options take the same numbers.
     let until = program.run("check free.json --json --until pi").exits(0).object();
     assert_eq!(
