@@ -233,11 +233,11 @@ fn no_hint_speaks_of_the_library() {
 fn outputs_are_columns_of_runs_and_sweeps_and_moments() {
     let program = Program::with_scenes(&["crank_rocker", "latch"]);
     let run =
-        program.run("run crank_rocker.json --json --no-charts --every 0.01 --output work=O.force*pen.y");
+        program.run("run crank_rocker.json --json --no-charts --every 0.01 --output load=O.force*pen.y");
     let outputs = run.exits(0).object()["outputs"].clone();
     let peak = |name: &str| outputs[name]["max"]["value"].as_f64().expect("a number");
-    assert!(peak("work") > 0.1 * peak("O") && peak("work") < 0.28 * peak("O"), "{outputs:#}");
-    assert_eq!(outputs["work"]["unit"], "J");
+    assert!(peak("load") > 0.1 * peak("O") && peak("load") < 0.28 * peak("O"), "{outputs:#}");
+    assert_eq!(outputs["load"]["unit"], "J");
 
     // A run of the sweep has the extremes of the run itself.
     program
@@ -260,6 +260,15 @@ fn outputs_are_columns_of_runs_and_sweeps_and_moments() {
         .run("sweep crank_rocker.json --vary speed=20..40:3 --map max:Q --out wrong")
         .exits(2)
         .says(&["max:Q", "max:O"]);
+
+    // No two columns have one name, unless one is the other.
+    for output in ["crank.phi=pen.y", "kinetic=pen.y", "t=pen.y", "motor.torque=2*motor.torque", "O.C=pen.y"]
+    {
+        let name = output.split('=').next().expect("a name");
+        let refused = program.run(&format!("run crank_rocker.json --output {output} --out twice")).exits(2);
+        refused.says(&[&format!("the name {name} is that of another column"), "rename"]);
+    }
+    program.run("check crank_rocker.json --output crank.phi").exits(0);
 
     // What is asked for and does not exist is refused with what there is.
     program.run("run crank_rocker.json --output Q.force").exits(2).says(&["--output Q.force", "O.force"]);

@@ -582,6 +582,8 @@ fn outputs_are_read_written_and_refused_by_name() {
         (r#"{"a": 3}"#, "must be a formula in quotes"),
         (r#"["O.fx", "O.fx"]"#, "is there twice"),
         (r#"{"a,b": "O.fx"}"#, "has a name that no column can have"),
+        (r#"{"bar.phi": "O.fx"}"#, "the name bar.phi is that of another column"),
+        (r#"{"imbalance": "O.fx"}"#, "the name imbalance is that of another column"),
         (r#"3"#, "must be {name: formula in quotes}, or a list"),
     ] {
         let error = parse_scene(&text(outputs), "test", &[]).expect_err("no scene").to_string();
