@@ -434,6 +434,7 @@ fn parts_of_a_sweep_join_to_its_very_bytes() {
         .says(&["parts 2, 5 of 5 missing", "--shard 2/5"]);
     program.run(&format!("merge {} --out few", named[0])).exits(6).says(&["parts 2, 3, 4, 5 of 5 missing"]);
     program.run("merge one --out few").exits(6).says(&["one holds no part of a sweep", "--shard"]);
+    program.run("merge nowhere --out few").exits(6).says(&["nowhere is not there", "hint: "]);
     // A part of another grid, of another number of parts, a copy, an altered table.
     program.run(&format!("{} --out other --shard 2/5", SWEEP.replace(":13", ":12"))).exits(0);
     let other = format!("other/{PLACE}/shard-2-of-5");
