@@ -4,7 +4,7 @@
 use crate::formulas::{adaptive, run, scene};
 use driftless::dynamics::Mechanism;
 use driftless::run::{
-    Extremes, Limits, MethodId, Plan, Request, Run, Running, Sample, Stabilization, integrate,
+    Extremes, Limits, MethodId, Plan, Request, Run, Running, Sample, Stabilization, integrate, simulate,
 };
 use driftless::scene::{Output, Place, Scene, parse_scene, read_scene};
 use nalgebra::{DMatrix, DVector};
@@ -551,6 +551,18 @@ fn walls_and_dry_friction_have_their_forces() {
     assert!(outcome.last.outputs[1].abs() < 1e-11 && outcome.last.outputs[2].abs() < 1e-12);
     let friction = found(&outcome.extremes, "floor.friction");
     assert!((friction.min[0] + 0.2 * weight).abs() < 1e-11 && friction.max[0].abs() < 1e-11, "{friction:?}");
+}
+
+#[test]
+fn an_absolute_value_of_zero_has_no_sign() {
+    let scene = with(crate::common::free(), &["abs(bar1.vx)", "-abs(bar2.omega)"]);
+    let mut first = None;
+    simulate(&scene, &adaptive(MethodId::Dp8, 1e-9), &mut |sample| {
+        first.get_or_insert_with(|| sample.outputs.clone());
+        Ok(())
+    })
+    .expect("a run");
+    assert_eq!(first.map(|outputs| format!("{outputs:?}")).as_deref(), Some("[0.0, 0.0]"));
 }
 
 #[test]

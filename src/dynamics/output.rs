@@ -156,7 +156,8 @@ impl Outputs {
             }
             sources.clear();
             sources.extend(expression.sources.iter().map(source));
-            expression.formula.value(sources)
+            // The zero of an absolute value has no sign: -0.0 + 0.0 is 0.0.
+            expression.formula.value(sources) + 0.0
         };
         for signal in &self.signals {
             signals.push(value(signal, signals));
