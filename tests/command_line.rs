@@ -35,6 +35,9 @@ fn a_value_is_set_by_the_names_and_numbers_that_vary_takes() {
         ("spring", "spring.stiffness=2*pi", format!("springs.spring.stiffness={}", 4.0 * FRAC_PI_2)),
         ("motor", "motor.rate=pi", format!("motors.motor.law.rate={}", 2.0 * FRAC_PI_2)),
         ("free", "gravity[1]=1/8", "gravity[1]=0.125".to_owned()),
+        ("free", "bar1.phi=1/2*pi", format!("start.bar1.phi={FRAC_PI_2}")),
+        ("free", "bar1.phi=3*pi/4", format!("start.bar1.phi={}", 6.0 * FRAC_PI_2 / 4.0)),
+        ("free", "bar1.phi=2pi/3", format!("start.bar1.phi={}", 4.0 * FRAC_PI_2 / 3.0)),
     ] {
         let inspected =
             |set: &str| program.run(&format!("inspect {scene}.json --json --set {set}")).exits(0).object();
@@ -45,6 +48,14 @@ fn a_value_is_set_by_the_names_and_numbers_that_vary_takes() {
     assert_eq!(object["scene"], "pi");
     program.run("check free.json --set bra1.phi=0").exits(3).says(&["bra1", "does not exist"]);
     program.run("check free.json --set bar1.phi=ten").exits(3).says(&["start.bar1.phi", "must be a number"]);
+    // Half of pi, or one over a whole turn?
+    program.run("check free.json --set bar1.phi=1/2pi").exits(3).says(&[
+        "start.bar1.phi",
+        "1/2pi",
+        "write products with *",
+    ]);
+    program.run("sweep free.json --vary bar1.phi=0..1/2pi:3").exits(2).says(&["`1/2pi`", "1/2*pi"]);
+    program.run("check free.json --until 1/2pi").exits(2).says(&["1/2pi", "1/2*pi"]);
     // Options take the same numbers.
     let until = program.run("check free.json --json --until pi").exits(0).object();
     assert_eq!(
@@ -222,11 +233,11 @@ fn no_hint_speaks_of_the_library() {
 fn outputs_are_columns_of_runs_and_sweeps_and_moments() {
     let program = Program::with_scenes(&["crank_rocker", "latch"]);
     let run =
-        program.run("run crank_rocker.json --json --no-charts --every 0.01 --output work=O.force*pen.y");
+        program.run("run crank_rocker.json --json --no-charts --every 0.01 --output load=O.force*pen.y");
     let outputs = run.exits(0).object()["outputs"].clone();
     let peak = |name: &str| outputs[name]["max"]["value"].as_f64().expect("a number");
-    assert!(peak("work") > 0.1 * peak("O") && peak("work") < 0.28 * peak("O"), "{outputs:#}");
-    assert_eq!(outputs["work"]["unit"], "J");
+    assert!(peak("load") > 0.1 * peak("O") && peak("load") < 0.28 * peak("O"), "{outputs:#}");
+    assert_eq!(outputs["load"]["unit"], "J");
 
     // A run of the sweep has the extremes of the run itself.
     program
@@ -249,6 +260,15 @@ fn outputs_are_columns_of_runs_and_sweeps_and_moments() {
         .run("sweep crank_rocker.json --vary speed=20..40:3 --map max:Q --out wrong")
         .exits(2)
         .says(&["max:Q", "max:O"]);
+
+    // No two columns have one name, unless one is the other.
+    for output in ["crank.phi=pen.y", "kinetic=pen.y", "t=pen.y", "motor.torque=2*motor.torque", "O.C=pen.y"]
+    {
+        let name = output.split('=').next().expect("a name");
+        let refused = program.run(&format!("run crank_rocker.json --output {output} --out twice")).exits(2);
+        refused.says(&[&format!("the name {name} is that of another column"), "rename"]);
+    }
+    program.run("check crank_rocker.json --output crank.phi").exits(0);
 
     // What is asked for and does not exist is refused with what there is.
     program.run("run crank_rocker.json --output Q.force").exits(2).says(&["--output Q.force", "O.force"]);
@@ -414,6 +434,7 @@ fn parts_of_a_sweep_join_to_its_very_bytes() {
         .says(&["parts 2, 5 of 5 missing", "--shard 2/5"]);
     program.run(&format!("merge {} --out few", named[0])).exits(6).says(&["parts 2, 3, 4, 5 of 5 missing"]);
     program.run("merge one --out few").exits(6).says(&["one holds no part of a sweep", "--shard"]);
+    program.run("merge nowhere --out few").exits(6).says(&["nowhere is not there", "hint: "]);
     // A part of another grid, of another number of parts, a copy, an altered table.
     program.run(&format!("{} --out other --shard 2/5", SWEEP.replace(":13", ":12"))).exits(0);
     let other = format!("other/{PLACE}/shard-2-of-5");

@@ -21,6 +21,19 @@ fn a_run_in_many_digits_writes_them_all_or_as_many_as_asked_for() {
     assert!(program.read(&format!("{folder}/run.json")).contains("trajectory_sha256"));
 }
 
+/// Numbers are read as in scenes, to all digits.
+#[test]
+fn half_of_pi_is_half_of_pi() {
+    let program = Program::with_scenes(&["free"]);
+    let run = "run free.json --digits 40 --until 0.5 --every 0.5 --json --set bar1.phi=";
+    let phi = |half: &str, out: &str| {
+        let object = program.run(&format!("{run}{half} --out {out}")).exits(0).object();
+        object["final"]["bodies"]["bar1"]["phi"].clone()
+    };
+    let expected = phi("pi/2", "one");
+    assert!(expected.is_string() && phi("1/2*pi", "two") == expected && phi("0.5pi", "three") == expected);
+}
+
 #[test]
 fn a_horizon_is_proved_or_the_exit_code_says_so() {
     let program = Program::with_scenes(&["free"]);

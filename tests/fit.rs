@@ -1,7 +1,7 @@
 //! Fits to synthetic data with noise: numbers found within their own standard errors, over many data sets as
 //! often as these say; a chaotic motion by multiple shooting.
 
-use driftless::run::fit::{Data, Fit, FitRequest, fit};
+use driftless::run::fit::{Data, Fit, FitError, FitRequest, fit};
 use driftless::{MethodId, Simulation, Template};
 use std::fmt::Write;
 
@@ -131,6 +131,33 @@ fn what_data_do_not_tell_is_refused() {
     assert!(told(&other).contains("other"), "{}", told(&other));
     let many = FitRequest { segments: 50, ..request("gravity[0]") };
     assert!(told(&many).contains("two rows"));
+    let twice = Data::parse("t,bar1.phi,bar1.phi\n0,1,1\n0.1,1,1\n0.2,1,1\n", "twice.csv").expect("a table");
+    let error = fit(&known, &twice, &request("gravity[0]"), &mut || false).map(|_| ()).expect_err("no fit");
+    assert!(error.to_string().contains("twice.csv: has two columns bar1.phi"), "{error}");
+}
+
+/// Whenever it is paused: at the guess, in the search, in the states between parts.
+#[test]
+fn a_fit_that_is_paused_says_so() {
+    let data = data(&template("free", &[]), 1.0, 0.1, 1e-3, 5);
+    let guess = template("free", &["gravity[0]=9"]);
+    for segments in [1, 2] {
+        let request = FitRequest { vary: vec!["gravity[0]".into()], segments, ..FitRequest::default() };
+        let mut looks = 0;
+        fit(&guess, &data, &request, &mut || {
+            looks += 1;
+            false
+        })
+        .expect("a fit");
+        for share in [0, looks / 10, looks / 2, looks - 2] {
+            let mut left = share;
+            let found = fit(&guess, &data, &request, &mut || {
+                left -= 1;
+                left < 0
+            });
+            assert!(matches!(found, Err(FitError::Interrupted)), "{segments}, {share} of {looks}: {found:?}");
+        }
+    }
 }
 
 /// A motor's motion is its own, whatever the bar weighs.

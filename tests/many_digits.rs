@@ -262,11 +262,22 @@ fn a_run_goes_on_to_the_last_bit() {
     }
 }
 
+/// It ends with the step in which it is paused.
+#[test]
+fn a_forecast_is_paused() {
+    let mut steps = 0;
+    let found = forecast(&source(&shipped("free"), &[], "10", "1"), 1e-20, false, &mut || {
+        steps += 1;
+        steps == 3
+    });
+    assert!(found.expect("no error").is_none() && steps == 3, "{steps}");
+}
+
 /// The growth is about 10^4 in 10 s, and the proof holds whatever the threads do.
 #[test]
 fn the_digits_a_horizon_takes_are_forecast_and_proved() {
     let source = source(&shipped("free"), &[], "10", "1");
-    let forecast = forecast(&source, 1e-20, false).expect("a forecast");
+    let forecast = forecast(&source, 1e-20, false, &mut || false).expect("no error").expect("a forecast");
     assert!((2.5..9.0).contains(&forecast.growth), "{forecast:?}");
     assert!((24..40).contains(&forecast.run.digits) && forecast.companion.digits == forecast.run.digits + 10);
     let mut pair = Pair::new(&source, &[forecast.run, forecast.companion]).expect("two runs");

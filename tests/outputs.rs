@@ -4,7 +4,7 @@
 use crate::formulas::{adaptive, run, scene};
 use driftless::dynamics::Mechanism;
 use driftless::run::{
-    Extremes, Limits, MethodId, Plan, Request, Run, Running, Sample, Stabilization, integrate,
+    Extremes, Limits, MethodId, Plan, Request, Run, Running, Sample, Stabilization, integrate, simulate,
 };
 use driftless::scene::{Output, Place, Scene, parse_scene, read_scene};
 use nalgebra::{DMatrix, DVector};
@@ -554,6 +554,18 @@ fn walls_and_dry_friction_have_their_forces() {
 }
 
 #[test]
+fn an_absolute_value_of_zero_has_no_sign() {
+    let scene = with(crate::common::free(), &["abs(bar1.vx)", "-abs(bar2.omega)"]);
+    let mut first = None;
+    simulate(&scene, &adaptive(MethodId::Dp8, 1e-9), &mut |sample| {
+        first.get_or_insert_with(|| sample.outputs.clone());
+        Ok(())
+    })
+    .expect("a run");
+    assert_eq!(first.map(|outputs| format!("{outputs:?}")).as_deref(), Some("[0.0, 0.0]"));
+}
+
+#[test]
 fn outputs_are_read_written_and_refused_by_name() {
     let text = |outputs: &str| {
         format!(
@@ -582,6 +594,8 @@ fn outputs_are_read_written_and_refused_by_name() {
         (r#"{"a": 3}"#, "must be a formula in quotes"),
         (r#"["O.fx", "O.fx"]"#, "is there twice"),
         (r#"{"a,b": "O.fx"}"#, "has a name that no column can have"),
+        (r#"{"bar.phi": "O.fx"}"#, "the name bar.phi is that of another column"),
+        (r#"{"imbalance": "O.fx"}"#, "the name imbalance is that of another column"),
         (r#"3"#, "must be {name: formula in quotes}, or a list"),
     ] {
         let error = parse_scene(&text(outputs), "test", &[]).expect_err("no scene").to_string();

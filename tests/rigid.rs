@@ -247,3 +247,19 @@ fn a_damped_or_slack_spring_is_no_rod() {
     let damped = rigid("\"model\": \"rigid\", \"damping\": 1").expect_err("an error");
     assert!(damped.contains("springs[0].damping") && damped.contains("decays"), "{damped}");
 }
+
+/// A mass let go from the horizontal on a rod, which carries m g + 2 m g at the lowest point.
+#[test]
+fn the_force_of_a_rod_is_an_output_by_itself() {
+    let text = r#"{"name": "rod", "gravity": [0, -9.81],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.01, "length": 0.1}],
+        "springs": [{"name": "S", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}],
+                     "stiffness": 1e12, "free_length": 1, "model": "rigid"}],
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [1, 0], "velocity": [0, 0]}},
+        "until": 1, "every": 0.1, "outputs": {"f": "S.force"}}"#;
+    let scene = driftless::scene::parse_scene(text, "rod.json", &[]).expect("a scene");
+    let outcome = simulate(&scene, &request(MethodId::Dp8, 1e-11), &mut |_| Ok(())).expect("a run");
+    assert_eq!(outcome.stop, None);
+    let most = outcome.extremes[0].max[0];
+    assert!((most - 3.0 * 9.81).abs() < 1e-6, "{most}");
+}

@@ -370,6 +370,38 @@ fn stiff_springs_stay_with_the_method_chosen_for_them() {
     assert!(chosen[0] == MethodId::Taylor && matches!(chosen[1], MethodId::Radau(_)), "{chosen:?}");
 }
 
+/// The scene as it stands is one for `taylor`, which knows no vibration of rods: points that have one get the
+/// method of a run alone.
+#[test]
+fn points_that_the_chosen_method_does_not_suit_get_their_own() {
+    let text = r#"{"name": "rod", "gravity": [0, -9.81],
+        "bars": [{"name": "b1", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1},
+                 {"name": "b2", "mass": 0.7, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b1", "point": [0, 0]}]},
+                   {"name": "B", "between": [{"body": "b1", "point": [1, 0]}, {"body": "b2", "point": [0, 0]}]}],
+        "springs": [{"name": "S", "between": [{"body": "ground", "point": [1.6, 0.4]}, {"body": "b2", "point": [0.6, 0]}],
+                     "stiffness": 1e9, "free_length": 0.1817576075152637, "model": "rigid"}],
+        "start": {"b1": {"phi": 0.1, "omega": 1}, "b2": {"phi": 0.2}}, "until": 0.2, "every": 0.1}"#;
+    let template = |set: &[Override]| Template::new(text.to_owned(), "rod.json".into(), set);
+    let sweep = |request: &Request| {
+        let vary = vec!["S.free_length=0.178..0.184:3".parse().expect("a range")];
+        Sweep::new(&template(&[]), vary, request).expect("a sweep")
+    };
+    let plan = sweep(&Request::default());
+    assert_eq!(plan.plan().method, MethodId::Taylor);
+    for point in points(&plan, 1) {
+        assert_eq!(point.status, Status::Done);
+        let set = format!("S.free_length={:?}", point.values[0]).parse().expect("a number");
+        let scene = template(&[set]).scene().expect("a scene");
+        let alone = simulate(&scene, &Request::default(), &mut |_| Ok(())).expect("a run");
+        assert!(alone.last.phi == point.phi, "{point:?}");
+        let (_, _, shown) = plan.run_of(point.index, 10.0).expect("a plan");
+        assert_ne!(shown.method, MethodId::Taylor);
+    }
+    let asked = points(&sweep(&request("taylor", 0.2)), 1);
+    assert!(asked.iter().all(|point| matches!(point.status, Status::Refused(_))), "{asked:?}");
+}
+
 /// In lanes and one by one: no point changes, and errors are those against the motion in double-double.
 #[test]
 fn estimates_of_points_are_near_the_truth() {

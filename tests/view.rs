@@ -51,6 +51,18 @@ fn folders_that_hold_runs_are_shown_with_all_of_them() {
     assert!(program.files().contains(&"pages/runs.html".to_owned()));
 }
 
+#[cfg(feature = "digits")]
+#[test]
+fn runs_in_many_digits_have_no_page() {
+    let program = with_run("--method dp5");
+    program.run("run motor.json --until 0.1 --every 0.1 --digits 30 -q").exits(0);
+    let long = "output/motor/taylor-digits-30";
+    let told = program.run("view output/motor").exits(0).says(&["note: ", long, "left out"]);
+    told.shows(&["output/motor/dp5-1e-9-elimination"]);
+    program.run("view output/motor -q").exits(0).stays_silent();
+    program.run(&format!("view {long}")).exits(6).says(&[long, "many digits", "no page"]);
+}
+
 #[test]
 fn what_is_no_run_is_refused() {
     let program = with_run("--method dp5");

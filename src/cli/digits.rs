@@ -149,7 +149,11 @@ impl<'a> Task<'a> {
             );
             return Ok(vec![precision]);
         };
-        let found = forecast(&self.source, within, has_loops)?;
+        let found = forecast(&self.source, within, has_loops, &mut interrupt::is_asked)?;
+        let found = found.ok_or_else(|| {
+            let text = "interrupted while the growth of errors was measured; there is nothing to be kept yet";
+            Failure::new(Exit::Interrupted, text)
+        })?;
         self.measured = Some([found.growth, found.mean]);
         self.tell(&found);
         Ok(vec![found.run, found.companion])

@@ -21,6 +21,7 @@ impl From<FitError> for Failure {
             FitError::Asked(_) => Exit::Usage,
             FitError::Data(_) => Exit::Scene,
             FitError::Failed(_) => Exit::Stopped,
+            FitError::Interrupted => Exit::Interrupted,
         };
         Self::new(exit, error.to_string())
     }

@@ -88,6 +88,12 @@ fn part_folders(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
         let failed = |source| FileError::Folder { folder: folder.clone(), source };
         let before = folders.len();
+        if !folder.exists() {
+            return Err(refused(format!(
+                "{} is not there\nhint: name the folders of parts, or one that holds them",
+                folder.display()
+            )));
+        }
         for entry in fs::read_dir(folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
             if is_part(&path) {

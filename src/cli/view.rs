@@ -2,7 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::{TellFlags, ViewFlags};
-use super::output::{name_files, print, print_object};
+use super::output::{message, name_files, print, print_object};
 use crate::html::Document;
 use crate::report::result::files;
 use crate::report::view::{self, MOST_RUNS, ViewError, Viewed};
@@ -34,7 +34,17 @@ impl From<ViewError> for Failure {
 pub fn run(flags: &ViewFlags) -> Result<(), Failure> {
     let mut folders: Vec<PathBuf> = Vec::new();
     for given in &flags.folders {
-        for folder in view::runs_in(given)? {
+        let (left_out, shown): (Vec<_>, Vec<_>) =
+            view::runs_in(given)?.into_iter().partition(|folder| view::is_in_digits(folder));
+        if let (Some(folder), true) = (left_out.first(), shown.is_empty()) {
+            return Err(ViewError::Digits { folder: folder.clone() }.into());
+        }
+        if !flags.tell.quiet {
+            left_out.iter().for_each(|run| {
+                message(&format!("note: {} is left out: it is in many digits", run.display()))
+            });
+        }
+        for folder in shown {
             if !folders.contains(&folder) {
                 folders.push(folder);
             }

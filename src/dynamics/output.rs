@@ -102,22 +102,24 @@ impl Outputs {
         let is_state = |source: &Source<Site>| {
             use Quantity::{Acceleration, AngularAcceleration, Gap, MovingGap, Tension, Torsion, Travel};
             let Source::Carried(quantity) = source else { return true };
-            matches!(
-                quantity,
+            match quantity {
+                // A rod pulls with its multiplier.
+                Tension(name, _) => !scene.springs.iter().any(|spring| spring.rigid && spring.name == *name),
                 AngularAcceleration(_)
-                    | Acceleration(..)
-                    | Travel(..)
-                    | Gap(..)
-                    | MovingGap(_)
-                    | Tension(..)
-                    | Torsion(_)
-            )
+                | Acceleration(..)
+                | Travel(..)
+                | Gap(..)
+                | MovingGap(_)
+                | Torsion(_) => true,
+                _ => false,
+            }
         };
-        let needs_forces = !list.iter().flat_map(|output| &output.expression.sources).all(is_state);
         let is_acceleration =
             |source: &Source<Site>| matches!(source, Source::Carried(Quantity::Acceleration(..)));
         let named = list.iter().map(|output| &output.expression).chain(&signals);
-        let needs_accelerations = named.flat_map(|expression| &expression.sources).any(is_acceleration);
+        let sources = named.flat_map(|expression| &expression.sources);
+        let needs_forces = !sources.clone().all(is_state);
+        let needs_accelerations = sources.clone().any(is_acceleration);
         let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
         Ok(Some(Self { list, signals, parameters, needs_forces, needs_accelerations }))
     }
@@ -154,7 +156,8 @@ impl Outputs {
             }
             sources.clear();
             sources.extend(expression.sources.iter().map(source));
-            expression.formula.value(sources)
+            // The zero of an absolute value has no sign: -0.0 + 0.0 is 0.0.
+            expression.formula.value(sources) + 0.0
         };
         for signal in &self.signals {
             signals.push(value(signal, signals));

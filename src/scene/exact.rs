@@ -13,6 +13,7 @@ use super::error::SceneError;
 use super::formula::Formula;
 use super::locate::{Node, Source, Span, Value, push_index, push_key};
 use super::number::Decimal;
+pub use super::number::exact_number;
 use super::read::put_together;
 use super::template::Template;
 use super::{PointTable, Scene, SceneEvent, Wall};
@@ -85,22 +86,6 @@ pub enum Watched {
     Here,
     /// Another run, which this one goes beside: events are left out, what changes the equations is refused.
     Beside,
-}
-
-/// A number as people type them on a command line, exactly; see [`number`](super::number).
-pub fn exact_number<C: Decimal>(text: &str) -> Option<C> {
-    let factor = |part: &str| {
-        let part = part.trim();
-        match part.strip_suffix("pi").or_else(|| part.strip_suffix('π')) {
-            None => C::parse(part),
-            Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -C::pi() } else { C::pi() }),
-            Some(multiple) => Some(C::parse(multiple.trim_end_matches('*').trim_end())? * C::pi()),
-        }
-    };
-    match text.split_once('/') {
-        Some((above, below)) => Some(factor(above)? / factor(below)?),
-        None => factor(text),
-    }
 }
 
 /// The shortest decimal of a double: what was written, where that has no more digits than a double holds.

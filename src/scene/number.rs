@@ -52,30 +52,39 @@ impl<const W: usize> Decimal for crate::arithmetic::digits::Digits<W> {
     }
 }
 
-/// A finite number: a decimal (`0.1`, `1e-3`), a multiple of pi (`pi`, `-0.5pi`, `2*pi`), or a fraction of
-/// two such (`1/64`, `pi/2`).
+/// A finite number: a decimal (`0.1`, `1e-3`), a multiple of pi (`pi`, `-0.5pi`), or a product or quotient of
+/// such (`1/64`, `pi/2`, `1/2*pi`), read from left to right.  What can be read in two ways is none (`1/2pi`).
 ///
 /// ```
 /// use driftless::scene::number;
 /// assert_eq!(number("-pi/2"), Some(-std::f64::consts::FRAC_PI_2));
+/// assert_eq!((number("1/2*pi"), number("1/2pi"), number("1/2 pi")), (number("pi/2"), None, None));
 /// assert_eq!((number("1/64"), number("ten"), number("1/0")), (Some(0.015625), None, None));
 /// ```
 pub fn number(text: &str) -> Option<f64> {
-    let factor = |part: &str| {
+    exact_number(text).filter(|value: &f64| value.is_finite())
+}
+
+/// The same in any numbers, finite or not.
+pub fn exact_number<C: Decimal>(text: &str) -> Option<C> {
+    let factor = |part: &str, is_below: bool| {
         let part = part.trim();
         match part.strip_suffix("pi").or_else(|| part.strip_suffix('π')) {
-            None => part.parse::<f64>().ok(),
-            Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -PI } else { PI }),
-            Some(multiple) => {
-                multiple.trim_end_matches('*').trim_end().parse::<f64>().ok().map(|multiple| multiple * PI)
-            }
+            None => C::parse(part),
+            Some(sign @ ("" | "+" | "-")) => Some(if sign == "-" { -C::pi() } else { C::pi() }),
+            // 1/2pi: half of pi, or one over a whole turn?
+            Some(_) if is_below => None,
+            Some(multiple) => Some(C::parse(multiple.trim_end())? * C::pi()),
         }
     };
-    let value = match text.split_once('/') {
-        Some((above, below)) => factor(above)? / factor(below)?,
-        None => factor(text)?,
-    };
-    value.is_finite().then_some(value)
+    let operators = ['*', '/'];
+    let mut parts = text.split(operators);
+    let first = factor(parts.next()?, false)?;
+    text.matches(operators).zip(parts).try_fold(first, |value, (operator, part)| {
+        let is_below = operator == "/";
+        let factor = factor(part, is_below)?;
+        Some(if is_below { value / factor } else { value * factor })
+    })
 }
 
 /// Two numbers in ascending order, as in `0..2pi`.

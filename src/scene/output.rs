@@ -19,7 +19,7 @@ use super::formula::unit::Dimension;
 use super::formula::{Formula, FormulaError};
 use super::{Coupled, Coupling, FrictionPlace, Load, Meaning, Names, Place, Rail, Scene};
 use serde::Serialize;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// The unit of a formula whose dimension a plain number of the scene leaves open.
 const UNKNOWN: &str = "?";
@@ -144,13 +144,16 @@ pub struct OutputNames {
     carried: HashMap<String, (Quantity, &'static str)>,
     /// In the order in which messages list them.
     order: Vec<String>,
+    /// The columns of a run that are none of its outputs.
+    columns: HashSet<String>,
 }
 
 impl OutputNames {
     /// Those of a scene.  Where two parts of different kinds have one name and a quantity alike, it is that
     /// of the kind that comes first in the table above.
     pub fn of(scene: &Scene) -> Self {
-        let mut all = Self { names: Names::with_signals(scene), carried: HashMap::new(), order: Vec::new() };
+        let (names, columns) = (Names::with_signals(scene), columns(scene));
+        let mut all = Self { names, carried: HashMap::new(), order: Vec::new(), columns };
         all.add_motion(scene);
         all.add_joints(scene);
         all.add_loads(scene);
@@ -292,8 +295,20 @@ impl OutputNames {
     /// Reads an output, finds what its names stand for, and checks its dimensions.
     ///
     /// # Errors
-    /// It is no formula, has a name that nothing has, or puts together what has different units.
-    pub fn bind(&self, Output { name, formula: text }: &Output) -> Result<BoundOutput, FormulaError> {
+    /// It is no formula, has a name that nothing has, or puts together what has different units; or its own
+    /// name is that of another column.
+    pub fn bind(&self, output: &Output) -> Result<BoundOutput, FormulaError> {
+        let bound = self.bound(output)?;
+        let Output { name, formula } = output;
+        let is_constraint = name.ends_with(".C") || name.ends_with(".C'");
+        if formula.trim() != name && (is_constraint || self.columns.contains(name)) {
+            let problem = format!("the name {name} is that of another column");
+            return Err(bound.formula.refused(formula, problem, "rename the output".into()));
+        }
+        Ok(bound)
+    }
+
+    fn bound(&self, Output { name, formula: text }: &Output) -> Result<BoundOutput, FormulaError> {
         let formula = Formula::parse_with(text, self.names.tables())?;
         let (mut sources, mut dimensions, mut unit) = (Vec::new(), Vec::new(), None);
         for name in formula.names() {
@@ -329,6 +344,28 @@ impl OutputNames {
 
     /// The same for a signal that outputs may use.
     pub(crate) fn bind_signal(&self, name: &str, formula: &str) -> Result<BoundOutput, FormulaError> {
-        self.bind(&Output { name: name.to_owned(), formula: formula.to_owned() })
+        self.bound(&Output { name: name.to_owned(), formula: formula.to_owned() })
     }
+}
+
+/// Names of the columns of a scene's runs beside its outputs, but for the residuals of constraints, which end
+/// in `.C` and `.C'`.
+fn columns(scene: &Scene) -> HashSet<String> {
+    let bars = scene.bars[..scene.own_bars()].iter().map(|bar| &bar.name);
+    let driven = (scene.motors.iter().map(|motor| &motor.name))
+        .chain(scene.drives.iter().map(|drive| &drive.name))
+        .chain(scene.couplings.iter().map(|coupling| &coupling.name))
+        .chain(scene.locks.iter().map(|lock| &lock.name));
+    let fixed = scene.welds.iter().map(|weld| &weld.name);
+    let fixed = fixed.chain(scene.sliders.iter().map(|slider| &slider.name));
+    let of = |name: &String, quantities: &[&str]| -> Vec<String> {
+        quantities.iter().map(|quantity| format!("{name}.{quantity}")).collect()
+    };
+    bars.flat_map(|name| of(name, &["phi", "omega", "x", "y", "vx", "vy"]))
+        .chain(driven.flat_map(|name| of(name, &["torque", "force", "power"])))
+        .chain(fixed.flat_map(|name| of(name, &["angle.torque"])))
+        .chain(scene.integrals.iter().map(|integral| integral.name.clone()))
+        .chain(["t", "kinetic", "potential", "work", "imbalance"].map(str::to_owned))
+        .chain((!scene.frictions.is_empty()).then(|| "friction".to_owned()))
+        .collect()
 }

@@ -32,7 +32,7 @@ pub(super) fn levels() -> impl TypedValueParser<Value = Level> {
 /// A number as everywhere on the command line; infinities and NaN, which a plan refuses, are numbers too.
 pub(super) fn number(text: &str) -> Result<f64, String> {
     let read = scene::number(text).or_else(|| text.trim().parse().ok());
-    read.ok_or_else(|| "not a number; write 0.01, 1e-9, 1/64 or pi/2".to_owned())
+    read.ok_or_else(|| "not a number; write 0.01, 1e-9, 1/64, pi/2 or 1/2*pi".to_owned())
 }
 
 /// A whole number from 1 to 1e18, as 50000 or 5e4.

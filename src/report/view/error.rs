@@ -13,6 +13,12 @@ pub enum ViewError {
         /// The folder.
         folder: PathBuf,
     },
+    /// The run is in many digits.
+    #[error("{} holds a run in many digits, which has no page\nhint: without --digits and --trusted-until a run has one", folder.display())]
+    Digits {
+        /// The folder.
+        folder: PathBuf,
+    },
     /// The record cannot be read.
     #[error("{}: {why}\nhint: only `driftless run` writes records; run the scene again", file.display())]
     Record {

@@ -129,6 +129,13 @@ pub fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     if found.is_empty() { Err(ViewError::None { folder: folder.to_owned() }) } else { Ok(found) }
 }
 
+/// Whether a folder holds a run in many digits, of which there is no page.
+pub fn is_in_digits(folder: &Path) -> bool {
+    let text = std::fs::read_to_string(folder.join(RECORD)).unwrap_or_default();
+    let record: Value = serde_json::from_str(&text).unwrap_or_default();
+    !record["result"]["settings"]["digits"].is_null()
+}
+
 impl Viewed {
     /// Reads the run in a folder.
     ///

@@ -48,18 +48,23 @@ pub struct Forecast {
 }
 
 /// Measures the growth of errors up to the horizon, and says what it takes to know the path within `within`
-/// \[rad\] there.
+/// \[rad\] there; `None` where `pause` came true before.
 ///
 /// # Errors
 /// As a run in many digits, or more than 2000 digits would be needed (a refusal).
-pub fn forecast(source: &Source, within: f64, has_loops: bool) -> Result<Forecast, LongError> {
+pub fn forecast(
+    source: &Source,
+    within: f64,
+    has_loops: bool,
+    pause: &mut dyn FnMut() -> bool,
+) -> Result<Option<Forecast>, LongError> {
     let mut pilot = Runner::<ROOM>::new(source, Precision::new(PILOT, has_loops))?;
     pilot.motion.ends_nowhere();
     let horizon = pilot.rows.until;
     let until = horizon.value();
-    let growth = measured(&mut pilot.motion, until)? / std::f64::consts::LN_10;
+    let Some(growth) = measured(&mut pilot.motion, until, pause)? else { return Ok(None) };
     let mean = until / pilot.counts()[0].max(1) as f64;
-    planned(source, growth, within, has_loops, mean)
+    planned(source, growth / std::f64::consts::LN_10, within, has_loops, mean).map(Some)
 }
 
 /// What it takes where errors grow by so many digits; `mean` \[s\] is the length of steps.
@@ -100,8 +105,13 @@ pub fn planned(
     Ok(forecast)
 }
 
-/// ln of the largest growth of a small distance between any two times up to `until` \[s\].
-fn measured(motion: &mut Motion<ROOM>, until: f64) -> Result<f64, StepError> {
+/// ln of the largest growth of a small distance between any two times up to `until` \[s\]; `None` where it was
+/// paused.
+fn measured(
+    motion: &mut Motion<ROOM>,
+    until: f64,
+    pause: &mut dyn FnMut() -> bool,
+) -> Result<Option<f64>, StepError> {
     let start = motion.state().clone();
     let mut other = motion.beside();
     let mut shifted = start.clone();
@@ -113,9 +123,9 @@ fn measured(motion: &mut Motion<ROOM>, until: f64) -> Result<f64, StepError> {
     let mut from = distance(motion.state(), other.state());
     for look in 1..=LOOKS {
         let t = Digits::of(until * f64::from(look) / f64::from(LOOKS));
-        let never = &mut || false;
-        motion.reach(t, never)?;
-        other.reach(t, never)?;
+        if !motion.reach(t, pause)? || !other.reach(t, pause)? {
+            return Ok(None);
+        }
         let (here, there) = (motion.state_at(t), other.state_at(t));
         let apart = distance(&here, &there);
         let now = total + libm::log(apart / from);
@@ -138,7 +148,7 @@ fn measured(motion: &mut Motion<ROOM>, until: f64) -> Result<f64, StepError> {
             from = distance(&here, other.state()).max(f64::MIN_POSITIVE);
         }
     }
-    Ok(most)
+    Ok(Some(most))
 }
 
 /// How far two states are apart \[rad, m\], rates counted over one second.

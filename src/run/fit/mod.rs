@@ -73,6 +73,15 @@ pub enum FitError {
     /// The search found no minimum.
     #[error("{0}")]
     Failed(String),
+    /// It was paused.
+    #[error("interrupted")]
+    Interrupted,
+}
+
+impl FitError {
+    fn failed(why: String) -> Self {
+        if why == segment::INTERRUPTED { Self::Interrupted } else { Self::Failed(why) }
+    }
 }
 
 impl From<SceneError> for FitError {
@@ -165,7 +174,7 @@ pub struct Fit {
 /// ```
 ///
 /// # Errors
-/// Data, scene or request make no sense together, or no minimum is found.
+/// Data, scene or request make no sense together, no minimum is found, or `pause` came true.
 pub fn fit(
     template: &Template,
     data: &Data,
@@ -213,23 +222,23 @@ pub fn fit(
         study_request,
         pause,
     );
-    problem.guess_states(&columns).map_err(FitError::Failed)?;
+    problem.guess_states(&columns).map_err(FitError::failed)?;
     let rounds = if columns.iter().all(|column| column.is_given) { 1 } else { ROUNDS };
     let mut ended = String::new();
     for _ in 0..rounds {
         let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
         let weights = if request.segments > 1 { &CONTINUITY[..] } else { &CONTINUITY[..1] };
         for weight in weights {
-            (problem, ended) = problem.minimize(&columns, weight / least).map_err(FitError::Failed)?;
+            (problem, ended) = problem.minimize(&columns, weight / least).map_err(FitError::failed)?;
         }
-        problem.take_model(&mut columns).map_err(FitError::Failed)?;
+        problem.take_model(&mut columns).map_err(FitError::failed)?;
         let share = (count as f64 / (count - guess.len()) as f64).sqrt();
         let found = columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given && rounds > 1);
         for (column, size) in found {
             column.sigma = (share * rms(column)).max(SPREAD[1] * size);
         }
     }
-    let covariance = problem.covariance(&columns).map_err(FitError::Failed)?;
+    let covariance = problem.covariance(&columns).map_err(FitError::failed)?;
     let values = problem.values();
     let scene = template.filled(problem.variables(), &values)?;
     let numbers = first.inputs.iter().enumerate().map(|(k, input)| FittedNumber {
@@ -292,6 +301,10 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
         let own = scene.outputs.iter().find(|output| output.name == *name).cloned();
         let output = own.unwrap_or_else(|| Output { name: name.clone(), formula: name.clone() });
         match names.bind(&output) {
+            Ok(_) if outputs.iter().any(|known| known.name == *name) => {
+                let text = format!("{}: has two columns {name}\nhint: leave one of them out", data.source);
+                return Err(FitError::Data(text));
+            }
             Ok(_) => outputs.push(output),
             Err(error) if request.columns.contains(name) => {
                 let text = format!("{}: column {name}: {}\nhint: {}", data.source, error.problem, error.hint);

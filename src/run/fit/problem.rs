@@ -9,7 +9,7 @@ use super::super::modes::Local;
 use super::super::sensitivity::{SensitivityRequest, Study};
 use super::FittedColumn;
 use super::data::Data;
-use super::segment::{Passed, Place, pass};
+use super::segment::{INTERRUPTED, Passed, Place, pass};
 use crate::run::driver::Pause;
 use crate::scene::{Template, Variable};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
@@ -325,8 +325,10 @@ impl<'a> Problem<'a> {
         self.take(columns);
         self.weight = weight;
         self.found = self.evaluate();
-        if let Err(why) = &self.found {
-            return Err(format!("the motion from the guess has no derivatives: {why}"));
+        match &self.found {
+            Err(why) if why == INTERRUPTED => return Err(why.clone()),
+            Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}")),
+            Ok(_) => {}
         }
         let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
         let (mut problem, report) = search.minimize(self);
@@ -335,6 +337,7 @@ impl<'a> Problem<'a> {
             true => format!("converged after {} evaluations", report.number_of_evaluations),
             false => format!("not converged after {} evaluations", report.number_of_evaluations),
         };
+        problem.found.as_ref().map_err(Clone::clone)?;
         problem.rebase()?;
         Ok((problem, ended))
     }
@@ -417,7 +420,10 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
         let size = self.found.as_ref().map_or(0, |found| found.residuals.len());
         let found = self.evaluate();
         // What cannot be computed is far away: the step is taken back.
-        self.found = found.or_else(|_| {
+        self.found = found.or_else(|why| {
+            if why == INTERRUPTED {
+                return Err(why);
+            }
             let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
             Ok(Evaluated { residuals, jacobian: DMatrix::zeros(size, x.len()), model: Vec::new(), gap })
         });

@@ -13,6 +13,9 @@ use std::sync::Arc;
 /// A state: coordinates and rates.
 pub(super) type Place = [Vec<f64>; 2];
 
+/// Why there is no motion where it was paused.
+pub(super) const INTERRUPTED: &str = "interrupted";
+
 /// What came of a part.
 pub(super) struct Passed {
     /// Outputs at its times, with their slopes by the parameters, then by the directions of its start.
@@ -64,8 +67,10 @@ pub(super) fn pass(
     if sampler.next() == Some(begin.time.hi) {
         sampler.at(&mut variation, &begin, begin.time.hi);
     }
-    if begin.time.hi < until {
-        variation.go(&mut driver, until, &mut outcome, &mut sampler, pause).map_err(|stop| stop.what)?;
+    if begin.time.hi < until
+        && !variation.go(&mut driver, until, &mut outcome, &mut sampler, pause).map_err(|stop| stop.what)?
+    {
+        return Err(INTERRUPTED.into());
     }
     if let Some(lost) = variation.lost {
         return Err(lost);

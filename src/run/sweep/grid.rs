@@ -43,7 +43,7 @@ impl FromStr for Vary {
         let (from, to) = ends.split_once("..").ok_or_else(|| fail("there is no .. between two numbers"))?;
         let end = |text: &str| {
             number(text).ok_or_else(|| {
-                fail(&format!("`{text}` is not a number; write 0.1, 1e-3, 1/64, pi/2 or 0.5pi"))
+                fail(&format!("`{text}` is not a number; write 0.1, 1e-3, 1/64, pi/2 or 1/2*pi"))
             })
         };
         let (from, to) = (end(from)?, end(to)?);

@@ -70,6 +70,8 @@ pub struct Sweep {
     scene: Scene,
     mechanism: Arc<Mechanism>,
     request: Request,
+    /// True where the method was chosen here.
+    is_chosen: bool,
     plan: Plan,
     grid: Grid,
     variables: Vec<Variable>,
@@ -113,8 +115,8 @@ impl Sweep {
     /// Prepares a sweep over the grid of `vary`, the first of which varies slowest.
     ///
     /// Without a method of its own a request gets `taylor` where points can be integrated several at a time,
-    /// else the one a single run would get; without an output interval, drift is looked at eight times on the
-    /// way.
+    /// else the one a single run would get; a point that it does not suit gets its own.  Without an output
+    /// interval, drift is looked at eight times on the way.
     ///
     /// # Errors
     /// A scene that is none as it stands, a value it does not have, a request that makes no sense for it, or
@@ -162,6 +164,7 @@ impl Sweep {
         let mechanism = Arc::new(Mechanism::new(&scene)?);
         let variables = names.iter().map(|name| template.variable(name)).collect::<Result<Vec<_>, _>>()?;
         let grid = grid(&variables)?;
+        let is_chosen = request.method.is_none();
         let mut request = request.clone();
         let in_lanes = request.method.is_none()
             && request.step.is_none()
@@ -180,7 +183,7 @@ impl Sweep {
             };
             plan.why = Some(format!("taylor: {bodies} are integrated several at a time"));
         }
-        // What one point gets unasked, all get.
+        // What one point gets unasked, all get that it suits.
         request.method = Some(plan.method);
         let shares = variables.iter().all(|variable| variable.start.is_some());
         let is_start = |variable: &Variable| variable.path.starts_with("start.");
@@ -192,6 +195,7 @@ impl Sweep {
             scene,
             mechanism,
             request,
+            is_chosen,
             plan,
             grid,
             variables,

@@ -101,11 +101,10 @@ impl Sweep {
         let values = self.grid.values(index);
         let scene = self.template.filled(&self.variables, &values).map_err(|error| error.to_string())?;
         let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
-        let planned =
-            |request: &Request| Plan::new(&scene, &mechanism, request).map_err(|refusal| refusal.to_string());
+        let planned = |request: &Request| self.planned(&scene, &mechanism, request);
         let plan = planned(&timed(&self.request, &scene))?;
-        let every = plan.until / rows;
-        let plan = planned(&Request { every: Some(every), step: plan.step, ..self.request.clone() })?;
+        let (every, method) = (Some(plan.until / rows), Some(plan.method));
+        let plan = planned(&Request { every, method, step: plan.step, ..self.request.clone() })?;
         Ok((scene, mechanism, plan))
     }
 
@@ -185,6 +184,17 @@ impl Sweep {
         }
     }
 
+    /// The plan of a point: where the method chosen for all does not suit it, that of a run alone.
+    fn planned(&self, scene: &Scene, mechanism: &Mechanism, request: &Request) -> Result<Plan, String> {
+        let alone = |refusal| match self.is_chosen {
+            true => {
+                Plan::new(scene, mechanism, &Request { method: None, ..request.clone() }).map_err(|_| refusal)
+            }
+            false => Err(refusal),
+        };
+        Plan::new(scene, mechanism, request).or_else(alone).map_err(|refusal| refusal.to_string())
+    }
+
     /// Mechanism, plan, start and energy scale at these values; else why not.
     fn filled(&self, values: &[f64]) -> Result<(Arc<Mechanism>, Plan, Motion, f64), String> {
         let in_range = |(value, variable): (&f64, &crate::scene::Variable)| match variable.start {
@@ -208,8 +218,7 @@ impl Sweep {
             let plan = if self.plan.method.is_adaptive() {
                 self.plan.clone()
             } else {
-                Plan::new(&scene, &self.mechanism, &timed(&self.request, &scene))
-                    .map_err(|refusal| refusal.to_string())?
+                self.planned(&scene, &self.mechanism, &timed(&self.request, &scene))?
             };
             return Ok((Arc::clone(&self.mechanism), plan, start, scale));
         }
@@ -218,8 +227,7 @@ impl Sweep {
         if let (true, Some(change)) = (self.is_strict, mechanism.assembly.changes.first()) {
             return Err(change.to_string());
         }
-        let plan = Plan::new(&scene, &mechanism, &timed(&self.request, &scene))
-            .map_err(|refusal| refusal.to_string())?;
+        let plan = self.planned(&scene, &mechanism, &timed(&self.request, &scene))?;
         let (start, scale) = (mechanism.start(&scene), mechanism.energy_scale);
         Ok((mechanism, plan, start, scale))
     }
