@@ -45,6 +45,32 @@ pub(super) struct Passage {
     pub jumps: bool,
 }
 
+/// A function in a part of a step.
+struct Part<'a> {
+    begin: Time,
+    /// How long it lasts \[s\].
+    span: f64,
+    /// Its interpolant.
+    curve: &'a Chebyshev,
+    /// Its values at the nodes, from the last to the first, and where these are, in shares of the part.
+    values: &'a [f64],
+    places: &'a [f64],
+    /// True where the interpolant is as good as the function.
+    is_resolved: bool,
+}
+
+impl Part<'_> {
+    /// The values at the first two nodes.
+    fn first(&self) -> [f64; 2] {
+        [self.values[self.values.len() - 1], self.values[self.values.len() - 2]]
+    }
+}
+
+/// The side of zero of a value.
+fn sign(value: f64) -> i8 {
+    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
+}
+
 /// Where a curve has left what it may be `off` by about its zero, from `share` on; `None` where that is not
 /// soon.
 fn clear(curve: &Chebyshev, share: f64, off: f64) -> Option<f64> {
@@ -74,7 +100,8 @@ impl EventDetector {
     ) {
         self.friction.iter().for_each(FrictionWatch::search);
         let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
-        let is_enough = |curve: &Chebyshev| curve.tail() <= self.resolved * curve.most();
+        let resolved = self.resolved;
+        let is_enough = |curve: &Chebyshev| curve.tail() <= resolved * curve.most();
         let Interpolants { curves, values, nodes: Nodes { places, .. }, .. } =
             interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));
         let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
@@ -86,128 +113,142 @@ impl EventDetector {
             if self.memory.resting.contains(&event) {
                 continue;
             }
-            let is_woken = self.memory.woken.contains(&event);
-            let sign = |value: f64| if value > 0.0 { 1 } else { -i8::from(value < 0.0) };
-            // From the last node to the first.
-            let nodes = &values[event];
-            let [first, next] = [nodes[nodes.len() - 1], nodes[nodes.len() - 2]];
+            let is_resolved = is_enough(curve) || !curve.most().is_finite();
+            let part = Part { begin, span, curve, values: &values[event], places, is_resolved };
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),
                 Owner::Friction(..) => Some(true),
                 _ => None,
             };
-            // Within the rounding of time a condition is on both sides.
-            if mode.is_some() && span <= INSTANT * begin.hi.abs() {
-                continue;
-            }
-            let is_condition = matches!(self.owner(event), Owner::Condition(..));
-            let most = curve.most();
-            let stays_at_zero = most <= NO_VALUE * self.memory.largest[event].max(most);
-            if is_condition && stays_at_zero {
-                continue;
-            }
-            if let Some(mode) = mode {
-                // It lies on the side its laws are recorded for, and leaves it at once where it turns away.
-                // An impact may have carried it across.
-                let other = if mode { -1 } else { 1 };
-                let is_there = first.abs() <= NO_VALUE * curve.most() || sign(first) == other;
-                if is_there && sign(soon(curve, first, self.resolved).unwrap_or(next)) == other {
-                    all.push(Passage { t: begin, event, rises: !mode, jumps: false });
-                }
-            }
-            let is_now = |before: &Time| (begin - *before).hi <= SAME * span;
-            let is_corner = mode.is_none() && self.memory.flipped.iter().any(|(_, flip)| is_now(flip));
-            let beyond = is_corner.then(|| self.values(inside.at(begin + AFTER * span))[event]);
-            let EventMemory { sides, largest, last, due, .. } = &mut self.memory;
-            let (side, largest) = (&mut sides[event], &mut largest[event]);
-            *largest = largest.max(curve.most());
-            // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding
-            // alone.
-            if mode.is_none() && curve.most() <= NO_VALUE * *largest {
-                continue;
-            }
-            let is_at_zero = first == 0.0 || mode.is_none() && first.abs() <= NO_VALUE * *largest;
-            if mode.is_none() && is_at_zero && *side != 0 && sign(next) == -*side {
-                all.push(Passage { t: begin, event, rises: *side < 0, jumps: false });
-            }
-            let mut is_behind = due.iter().any(|(due, _)| *due == event)
-                || last.iter().any(|(last, before)| *last == event && is_now(before));
-            // A corner of a formula it asks for, at which the last step ended, may have carried it across.
-            let beyond = beyond.filter(|value| value.abs() > BEYOND * most);
-            if let Some(value) = beyond {
-                if *side != 0 && sign(value) == -*side && !is_behind {
-                    all.push(Passage { t: begin, event, rises: *side < 0, jumps: true });
-                }
-                is_behind = true;
-            }
-            let begins = mode.is_none() && is_at_zero && *side == 0;
-            *side = if is_at_zero || last.contains(&(event, begin)) { sign(next) } else { sign(first) };
-            if mode.is_none() && !is_enough(curve) && most.is_finite() {
-                let off = self.resolved.max(NO_VALUE) * most;
-                let known = (if is_behind { sign(beyond.unwrap_or(next)) } else { *side }, off);
-                let known_nodes = places.iter().copied().zip(nodes.iter().copied()).rev();
-                let known_nodes = known_nodes.skip(usize::from(is_behind));
-                let (found, side) = self.between(inside, (begin, span), event, known, known_nodes);
-                self.memory.sides[event] = side;
-                all.extend(found);
-                continue;
-            }
-            // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
-            let mut share = if is_woken || begins { LEAVES } else { 0.0 };
-            if is_woken || begins {
-                *side = sign(curve.at(share)[0]);
-            }
-            while let Some(zero) = root(curve, 0.0, share, 1.0) {
-                share = if is_condition {
-                    clear(curve, zero + SAME, self.resolved * curve.most()).unwrap_or(zero + SAME)
-                } else {
-                    zero + SAME
-                };
-                let after = sign(curve.at(share.min(1.0))[0]);
-                // At the very end of a step what follows is not known: it is on the other side.
-                *side = if after == 0 || share >= 1.0 { -*side } else { after };
-                all.push(Passage { t: begin + zero * span, event, rises: *side > 0, jumps: false });
-                if share >= 1.0 {
-                    break;
-                }
+            match mode {
+                // Within the rounding of time a condition is on both sides.
+                Some(_) if span <= INSTANT * begin.hi.abs() => {}
+                Some(mode) => self.of_condition(&part, event, mode, all),
+                None => self.of_event(inside, &part, event, all),
             }
         }
     }
 
-    /// Passages of a function between the nodes, each a share of a part of a step that begins at a time and
-    /// lasts so long, and the value there; and the side of zero it is on in the end.  Values that are `off` by
-    /// less than that tell no side.
-    fn between(
-        &self,
-        inside: &mut dyn Inside,
-        (begin, span): (Time, f64),
-        event: usize,
-        (mut side, off): (i8, f64),
-        nodes: impl Iterator<Item = (f64, f64)>,
-    ) -> (Vec<Passage>, i8) {
-        let mut found = Vec::new();
-        let mut before = 0.0;
-        for (node, value) in nodes {
-            if value.abs() <= off || value.is_nan() {
-                continue;
+    /// Passages of a condition that is in this mode.
+    fn of_condition(&mut self, part: &Part, event: usize, mode: bool, all: &mut Vec<Passage>) {
+        let (curve, [first, next], most) = (part.curve, part.first(), part.curve.most());
+        let is_of_laws = matches!(self.owner(event), Owner::Condition(..));
+        if is_of_laws && most <= NO_VALUE * self.memory.largest[event].max(most) {
+            return;
+        }
+        // It lies on the side its laws are recorded for, and leaves it at once where it turns away.  An impact may
+        // have carried it across.
+        let other = if mode { -1 } else { 1 };
+        let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
+        if is_there && sign(soon(curve, first, self.resolved).unwrap_or(next)) == other {
+            all.push(Passage { t: part.begin, event, rises: !mode, jumps: false });
+        }
+        let EventMemory { sides, largest, last, .. } = &mut self.memory;
+        largest[event] = largest[event].max(most);
+        let is_behind = first == 0.0 || last.contains(&(event, part.begin));
+        sides[event] = if is_behind { sign(next) } else { sign(first) };
+        let off = is_of_laws.then_some(self.resolved * most);
+        self.zeros(part, event, (0.0, off), all);
+    }
+
+    /// Passages of the function of an event.
+    fn of_event(&mut self, inside: &mut dyn Inside, part: &Part, event: usize, all: &mut Vec<Passage>) {
+        let (begin, [first, next], most) = (part.begin, part.first(), part.curve.most());
+        let is_woken = self.memory.woken.contains(&event);
+        let is_now = |before: &Time| (begin - *before).hi <= SAME * part.span;
+        let is_corner = self.memory.flipped.iter().any(|(_, flip)| is_now(flip));
+        let beyond = is_corner.then(|| self.values(inside.at(begin + AFTER * part.span))[event]);
+        let EventMemory { sides, largest, last, due, .. } = &mut self.memory;
+        let (side, largest) = (&mut sides[event], &mut largest[event]);
+        *largest = largest.max(most);
+        // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding alone.
+        if most <= NO_VALUE * *largest {
+            return;
+        }
+        let is_at_zero = first.abs() <= NO_VALUE * *largest;
+        if is_at_zero && *side != 0 && sign(next) == -*side {
+            all.push(Passage { t: begin, event, rises: *side < 0, jumps: false });
+        }
+        let mut is_behind = due.iter().any(|(due, _)| *due == event)
+            || last.iter().any(|(last, before)| *last == event && is_now(before));
+        // A corner of a formula it asks for, at which the last step ended, may have carried it across.
+        let beyond = beyond.filter(|value| value.abs() > BEYOND * most);
+        if let Some(value) = beyond {
+            if *side != 0 && sign(value) == -*side && !is_behind {
+                all.push(Passage { t: begin, event, rises: *side < 0, jumps: true });
             }
+            is_behind = true;
+        }
+        let begins = is_at_zero && *side == 0;
+        *side = if is_at_zero || last.contains(&(event, begin)) { sign(next) } else { sign(first) };
+        if !part.is_resolved {
+            if is_behind {
+                *side = sign(beyond.unwrap_or(next));
+            }
+            return self.between(inside, part, (event, is_behind), all);
+        }
+        // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
+        let from = if is_woken || begins { LEAVES } else { 0.0 };
+        if is_woken || begins {
+            *side = sign(part.curve.at(from)[0]);
+        }
+        self.zeros(part, event, (from, None), all);
+    }
+
+    /// Zeros of an interpolant from a share of the part on; where it is `off` by so much about them, the side
+    /// behind one is told where it has left that.
+    fn zeros(
+        &mut self,
+        part: &Part,
+        event: usize,
+        (mut share, off): (f64, Option<f64>),
+        all: &mut Vec<Passage>,
+    ) {
+        let side = &mut self.memory.sides[event];
+        while let Some(zero) = root(part.curve, 0.0, share, 1.0) {
+            let next = zero + SAME;
+            share = off.and_then(|off| clear(part.curve, next, off)).unwrap_or(next);
+            let after = sign(part.curve.at(share.min(1.0))[0]);
+            // At the very end of a step what follows is not known: it is on the other side.
+            *side = if after == 0 || share >= 1.0 { -*side } else { after };
+            all.push(Passage { t: part.begin + zero * part.span, event, rises: *side > 0, jumps: false });
+            if share >= 1.0 {
+                break;
+            }
+        }
+    }
+
+    /// Passages of a function between the nodes, the first of which is left out where what it shows `is_behind`.
+    /// Values that its interpolant may be off by tell no side.
+    fn between(
+        &mut self,
+        inside: &mut dyn Inside,
+        part: &Part,
+        (event, is_behind): (usize, bool),
+        all: &mut Vec<Passage>,
+    ) {
+        let off = self.resolved.max(NO_VALUE) * part.curve.most();
+        let (mut side, mut before) = (self.memory.sides[event], 0.0);
+        let nodes = part.places.iter().zip(part.values).rev().skip(usize::from(is_behind));
+        for (&node, &value) in nodes.filter(|(_, value)| value.abs() > off) {
             let rises = value > 0.0;
             if side != 0 && rises != (side > 0) {
-                let mut at = |share: f64| self.values(inside.at(begin + share * span))[event];
+                let mut at = |share: f64| self.values(inside.at(part.begin + share * part.span))[event];
                 let (mut from, mut to) = (before, node);
                 loop {
                     let middle = 0.5 * (from + to);
-                    if middle <= from || middle >= to || (to - from) * span <= f64::EPSILON * begin.hi.abs() {
+                    let is_instant = (to - from) * part.span <= f64::EPSILON * part.begin.hi.abs();
+                    if middle <= from || middle >= to || is_instant {
                         break;
                     }
                     if (at(middle) > 0.0) == rises { to = middle } else { from = middle }
                 }
                 let jumps = at(from).abs().min(at(to).abs()) > off;
-                found.push(Passage { t: begin + to * span, event, rises, jumps });
+                all.push(Passage { t: part.begin + to * part.span, event, rises, jumps });
             }
-            (side, before) = (if rises { 1 } else { -1 }, node);
+            (side, before) = (sign(value), node);
         }
-        (found, side)
+        self.memory.sides[event] = side;
     }
 
     /// Where a passage near `near` is on the dense output, between the ends of the step.

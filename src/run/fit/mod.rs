@@ -26,6 +26,7 @@ use super::sensitivity::{Measure, SensitivityError, SensitivityRequest, Study};
 use crate::scene::{Output, OutputNames, Scene, SceneError, Template, Variable};
 use nalgebra::DMatrix;
 use problem::Problem;
+use segment::Lost;
 
 /// Share of a column's spread taken for its noise where nobody says, to begin with and at least.
 const SPREAD: [f64; 2] = [1e-2, 1e-10];
@@ -78,9 +79,12 @@ pub enum FitError {
     Interrupted,
 }
 
-impl FitError {
-    fn failed(why: String) -> Self {
-        if why == segment::INTERRUPTED { Self::Interrupted } else { Self::Failed(why) }
+impl From<Lost> for FitError {
+    fn from(lost: Lost) -> Self {
+        match lost {
+            Lost::Interrupted => Self::Interrupted,
+            Lost::Why(why) => Self::Failed(why),
+        }
     }
 }
 
@@ -222,23 +226,23 @@ pub fn fit(
         study_request,
         pause,
     );
-    problem.guess_states(&columns).map_err(FitError::failed)?;
+    problem.guess_states(&columns)?;
     let rounds = if columns.iter().all(|column| column.is_given) { 1 } else { ROUNDS };
     let mut ended = String::new();
     for _ in 0..rounds {
         let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
         let weights = if request.segments > 1 { &CONTINUITY[..] } else { &CONTINUITY[..1] };
         for weight in weights {
-            (problem, ended) = problem.minimize(&columns, weight / least).map_err(FitError::failed)?;
+            (problem, ended) = problem.minimize(&columns, weight / least)?;
         }
-        problem.take_model(&mut columns).map_err(FitError::failed)?;
+        problem.take_model(&mut columns)?;
         let share = (count as f64 / (count - guess.len()) as f64).sqrt();
         let found = columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given && rounds > 1);
         for (column, size) in found {
             column.sigma = (share * rms(column)).max(SPREAD[1] * size);
         }
     }
-    let covariance = problem.covariance(&columns).map_err(FitError::failed)?;
+    let covariance = problem.covariance(&columns)?;
     let values = problem.values();
     let scene = template.filled(problem.variables(), &values)?;
     let numbers = first.inputs.iter().enumerate().map(|(k, input)| FittedNumber {

@@ -9,7 +9,7 @@ use super::super::modes::Local;
 use super::super::sensitivity::{SensitivityRequest, Study};
 use super::FittedColumn;
 use super::data::Data;
-use super::segment::{INTERRUPTED, Passed, Place, pass};
+use super::segment::{Lost, Passed, Place, pass};
 use crate::run::driver::Pause;
 use crate::scene::{Template, Variable};
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
@@ -63,7 +63,7 @@ pub(super) struct Problem<'a> {
     sigma: Vec<f64>,
     weight: f64,
     x: DVector<f64>,
-    found: Result<Evaluated, String>,
+    found: Result<Evaluated, Lost>,
 }
 
 impl<'a> Problem<'a> {
@@ -122,9 +122,9 @@ impl<'a> Problem<'a> {
         self.found.as_ref().map_or(f64::NAN, |found| found.gap)
     }
 
-    fn study(&self) -> Result<Study, String> {
+    fn study(&self) -> Result<Study, Lost> {
         let template = self.template.with_values(&self.variables, &self.values());
-        Study::new(&template, &self.request).map_err(|error| error.to_string())
+        Study::new(&template, &self.request).map_err(|error| Lost::from(error.to_string()))
     }
 
     /// Takes what is measured and how exactly.
@@ -135,7 +135,7 @@ impl<'a> Problem<'a> {
 
     /// States at the beginnings of all parts but the first: each from the end of the part before it, then
     /// fitted to its own rows.
-    pub fn guess_states(&mut self, columns: &[FittedColumn]) -> Result<(), String> {
+    pub fn guess_states(&mut self, columns: &[FittedColumn]) -> Result<(), Lost> {
         self.take(columns);
         if self.parts.len() == 1 {
             return Ok(());
@@ -204,7 +204,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A part of the motion, from a state or as the scene starts.
-    fn pass(&mut self, study: &Study, k: usize, state: Option<&Place>) -> Result<Passed, String> {
+    fn pass(&mut self, study: &Study, k: usize, state: Option<&Place>) -> Result<Passed, Lost> {
         self.runs += 1;
         let part = &self.parts[k];
         let n = study.mechanism.coordinates();
@@ -238,7 +238,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Everything at the present unknowns.
-    fn evaluate(&mut self) -> Result<Evaluated, String> {
+    fn evaluate(&mut self) -> Result<Evaluated, Lost> {
         let study = self.study()?;
         let count = self.variables.len();
         let mut local = Local::new(&study.mechanism);
@@ -321,13 +321,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Looks for the minimum with this weight of continuity, and tells how it ended.
-    pub fn minimize(mut self, columns: &[FittedColumn], weight: f64) -> Result<(Self, String), String> {
+    pub fn minimize(mut self, columns: &[FittedColumn], weight: f64) -> Result<(Self, String), Lost> {
         self.take(columns);
         self.weight = weight;
         self.found = self.evaluate();
         match &self.found {
-            Err(why) if why == INTERRUPTED => return Err(why.clone()),
-            Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}")),
+            Err(Lost::Interrupted) => return Err(Lost::Interrupted),
+            Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}").into()),
             Ok(_) => {}
         }
         let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
@@ -343,7 +343,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Takes the states as they are for new bases.
-    fn rebase(&mut self) -> Result<(), String> {
+    fn rebase(&mut self) -> Result<(), Lost> {
         let study = self.study()?;
         let mut local = Local::new(&study.mechanism);
         let mut first = self.variables.len();
@@ -365,7 +365,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Writes the fitted motion to the columns.
-    pub fn take_model(&self, columns: &mut [FittedColumn]) -> Result<(), String> {
+    pub fn take_model(&self, columns: &mut [FittedColumn]) -> Result<(), Lost> {
         let found = self.found.as_ref().map_err(Clone::clone)?;
         for (k, column) in columns.iter_mut().enumerate() {
             column.model = found.model.iter().map(|row| row[k]).collect();
@@ -380,7 +380,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The covariance of the numbers at the minimum.
-    pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, String> {
+    pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, Lost> {
         self.take(columns);
         let jacobian = self.evaluate()?.jacobian;
         let count = self.variables.len();
@@ -389,7 +389,7 @@ impl<'a> Problem<'a> {
         };
         let size = columns.iter().map(most).fold(0.0, f64::max);
         if let Some(k) = (0..count).find(|&k| jacobian.column(k).amax() < NOTHING * size) {
-            return Err(format!("the data do not depend on {}", self.variables[k].path));
+            return Err(format!("the data do not depend on {}", self.variables[k].path).into());
         }
         let svd = jacobian.svd(false, true);
         let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
@@ -400,7 +400,8 @@ impl<'a> Problem<'a> {
             return Err(format!(
                 "the data do not tell {} apart from the other numbers, or do not depend on it",
                 self.variables[most].path
-            ));
+            )
+            .into());
         }
         Ok(DMatrix::from_fn(count, count, |i, j| {
             let sum =
@@ -421,7 +422,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
         let found = self.evaluate();
         // What cannot be computed is far away: the step is taken back.
         self.found = found.or_else(|why| {
-            if why == INTERRUPTED {
+            if matches!(why, Lost::Interrupted) {
                 return Err(why);
             }
             let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);

@@ -13,8 +13,22 @@ use std::sync::Arc;
 /// A state: coordinates and rates.
 pub(super) type Place = [Vec<f64>; 2];
 
-/// Why there is no motion where it was paused.
-pub(super) const INTERRUPTED: &str = "interrupted";
+/// Why there is no motion over the data, or nothing to be found from it.
+#[derive(Clone, Debug, thiserror::Error)]
+pub(super) enum Lost {
+    /// It was paused.
+    #[error("interrupted")]
+    Interrupted,
+    /// It cannot be computed.
+    #[error("{0}")]
+    Why(String),
+}
+
+impl<T: Into<String>> From<T> for Lost {
+    fn from(why: T) -> Self {
+        Self::Why(why.into())
+    }
+}
 
 /// What came of a part.
 pub(super) struct Passed {
@@ -37,7 +51,7 @@ pub(super) fn pass(
     directions: &[Vec<f64>],
     (times, until): (&[f64], f64),
     pause: &mut Pause,
-) -> Result<Passed, String> {
+) -> Result<Passed, Lost> {
     let mut plan = study.plan.clone();
     (plan.until, plan.every) = (until, until);
     let start = match from {
@@ -70,10 +84,10 @@ pub(super) fn pass(
     if begin.time.hi < until
         && !variation.go(&mut driver, until, &mut outcome, &mut sampler, pause).map_err(|stop| stop.what)?
     {
-        return Err(INTERRUPTED.into());
+        return Err(Lost::Interrupted);
     }
     if let Some(lost) = variation.lost {
-        return Err(lost);
+        return Err(lost.into());
     }
     let is_part = from.is_some() || !directions.is_empty();
     let is_known = variation.mechanism.frictions.is_empty()
