@@ -159,11 +159,13 @@ fn a_function_with_a_corner_passes_zero_in_a_jump() {
         "torques": [{{"name": "none", "body": "rotor", "torque": "{torque}"}}],
         "events": [{{"name": "own", "when": "3*sign(rotor.phi - 0.5) - 1"}}, {{"name": "signal", "when": "side*(2 + t)"}},
                    {{"name": "rising", "when": "if(rotor.phi > 0.5, 1, -t)", "direction": "rising"}},
+                   {{"name": "start", "when": "sign(-rotor.omega)"}},
                    {{"name": "kink", "when": "abs(rotor.phi - 0.5) - 0.5"}}],
         "start": {{"rotor": {{"phi": 1, "omega": 0}}}}, "until": 9, "every": 4.5}}"#
         )
     };
     let passes = [PI / 3.0, 5.0 * PI / 3.0, 7.0 * PI / 3.0];
+    let starts = [PI, 2.0 * PI];
     let kinks = [PI / 2.0, 1.5 * PI, 2.0 * PI, 2.5 * PI];
     for torque in ["0*side", "1e-30*side"] {
         let fixed = [MethodId::Gauss(4), MethodId::Gauss(8)].map(|method| Request {
@@ -174,7 +176,9 @@ fn a_function_with_a_corner_passes_zero_in_a_jump() {
         for request in methods().into_iter().chain([adaptive(MethodId::Dopri5, 1e-11)]).chain(fixed) {
             let outcome = run(&scene(&text(torque)), &request);
             assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
-            for (name, expected) in [("own", &passes[..]), ("signal", &passes), ("rising", &passes[1..2])] {
+            for (name, expected) in
+                [("own", &passes[..]), ("signal", &passes), ("rising", &passes[1..2]), ("start", &starts)]
+            {
                 let found = times(&outcome, name);
                 assert_eq!(found.len(), expected.len(), "{:?}: {name} at {found:?}", request.method);
                 found.iter().zip(expected).for_each(|(t, expected)| assert_near(*t, *expected, 1e-9, name));

@@ -292,7 +292,9 @@ fn the_digits_a_horizon_takes_are_forecast_and_proved() {
 
 #[test]
 fn what_is_not_carried_is_refused_by_name() {
-    for (name, word) in [("pid", "torques.wind"), ("friction_pendulum", "friction"), ("latch", "events")] {
+    for (name, word) in
+        [("friction_pendulum", "friction"), ("stick_slip", "friction"), ("sliding_ball", "friction")]
+    {
         let source = source(&shipped(name), &[], "1", "1");
         let error = long_run(&source, Precision::new(30, false)).err().expect("refused").to_string();
         assert!(error.contains(word) && error.contains("many digits"), "{name}: {error}");

@@ -113,6 +113,25 @@ fn events_pass_zero_at_corners_and_in_jumps() {
     }
 }
 
+/// A disc that is locked has a rate that is rounding, which passes zero in no event; and an event at the corner of a
+/// torque happens once.
+#[test]
+fn what_rests_makes_no_events_and_corners_none_twice() {
+    let text = discs(
+        r#""locks": [{"name": "lock", "body": "a"}], "inactive": ["lock"],
+        "torques": [{"name": "ripple", "body": "a", "torque": "if(a.phi > 2, 0.1, -0.2)*sign(sin(20*t))"}],
+        "events": [{"name": "corner", "when": "a.phi - 2"}, {"name": "grips", "when": "t - 1", "on": ["lock"]},
+                   {"name": "rests", "when": "1*a.omega"}, {"name": "again", "when": "a.phi - b.phi - 1", "on": ["lock"]}]"#,
+    );
+    let text = text.replace(r#""phi": 0.2, "omega": 0"#, r#""phi": 5, "omega": 0"#);
+    let mut run = long_run(&source(&text, &[], "2", "2"), Precision::new(DIGITS, true)).expect("a run");
+    let row = run.row(1, &mut || false).expect("no stop").expect("no pause");
+    assert!(row.drift.abs() < 1e-56 && row.residual[1] < 1e-56, "{:e}, {:?}", row.drift, row.residual);
+    let events = run.events();
+    let names: Vec<&str> = events.iter().map(|event| event.name.as_str()).collect();
+    assert_eq!(names, ["corner", "grips"]);
+}
+
 /// A run that is interrupted after what closed comes to the same bits.
 #[test]
 fn a_run_goes_on_with_what_has_closed() {

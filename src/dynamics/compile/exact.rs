@@ -92,6 +92,10 @@ pub struct ExactEvent {
     pub stop: bool,
     /// True where it switches parts or sets parameters.
     pub changes: bool,
+    /// What its function changes by in a unit of a coordinate or rate, at the start.
+    pub magnitude: f64,
+    /// Joints and locks that it closes.
+    pub joints: Vec<String>,
 }
 
 /// Positions and rates of all coordinates at the start, and which of the angles and rates the scene gives.
@@ -148,6 +152,8 @@ impl<C: Decimal> ExactMechanism<C> {
             direction: event.direction,
             stop: event.stop,
             changes: event.changes(),
+            magnitude: 0.0,
+            joints: event.on.iter().filter(|part| structure.is_joint(part)).cloned().collect(),
         };
         let all = AllParts {
             springs: parts::springs(scene, &forest),

@@ -129,6 +129,12 @@ impl Mechanism {
         }
     }
 
+    /// True for the name of a hinge, a weld or a lock.
+    pub(crate) fn is_joint(&self, part: &str) -> bool {
+        let row = self.constraints.iter().position(|row| row.name == part);
+        self.joints.iter().any(|joint| joint.name == part) || row.is_some_and(|row| !self.is_motor(row))
+    }
+
     /// Parts that do not act, by name.
     pub(crate) fn resting(&self) -> &[String] {
         self.whole.as_ref().map_or(&[], |(_, inactive)| inactive)

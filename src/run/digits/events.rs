@@ -11,12 +11,14 @@ use super::motion::Motion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::dynamics::compile::exact::ExactMechanism;
+use crate::dynamics::compile::exact::{ExactEvent, ExactMechanism};
 use crate::scene::Direction;
 use crate::stepping::search::{Curve, Powers, root};
 
 /// Share of the largest value within a step up to which a formula is at its zero.
 const NO_VALUE: f64 = 1e-12;
+/// Part of the bits carried in which a function that is kept at zero is zero.
+const SURE: f64 = 0.75;
 /// Events kept.
 const KEPT: usize = 100_000;
 
@@ -73,10 +75,10 @@ impl<const W: usize> Watch<W> {
         Self { functions, sides: sides.collect(), happened: self.happened, ..Self::default() }
     }
 
-    /// Looks for what happens in a step of so many seconds; where an event changes what acts, the step is to end
-    /// there, after so many seconds.
-    pub fn look(&mut self, motion: &Motion<W>, step: f64) -> Option<Digits<W>> {
-        (self.ahead, self.ends) = self.passing(motion, step);
+    /// Looks for what happens in a step of so many seconds, of those for which the series is made; where an event
+    /// changes what acts, the step is to end there, after so many seconds.
+    pub fn look(&mut self, motion: &Motion<W>, [step, made]: [f64; 2]) -> Option<Digits<W>> {
+        (self.ahead, self.ends) = self.passing(motion, [step, made]);
         let is_last = |ahead: &Ahead<W>| {
             let event = &motion.mechanism.events[ahead.event];
             event.stop || event.changes
@@ -88,7 +90,7 @@ impl<const W: usize> Watch<W> {
             return None;
         }
         // What happens at this moment as well is left to the next step: it begins on the side before.
-        let (passing, ends) = self.passing(motion, last.after.value());
+        let (passing, ends) = self.passing(motion, [last.after.value(), made]);
         self.ends = ends;
         for (event, side) in self.ends.iter_mut().enumerate() {
             let of_event = |ahead: &&Ahead<W>| ahead.event == event;
@@ -105,20 +107,27 @@ impl<const W: usize> Watch<W> {
 
     /// The passages that count in a step of so many seconds, in the order of their times, and the sides of all
     /// functions at its end.
-    fn passing(&self, motion: &Motion<W>, step: f64) -> (Vec<Ahead<W>>, Vec<i8>) {
+    fn passing(&self, motion: &Motion<W>, [step, made]: [f64; 2]) -> (Vec<Ahead<W>>, Vec<i8>) {
         let (mut ahead, mut ends) = (Vec::new(), Vec::new());
+        let off = &motion.mechanism.acting.off;
         for (event, powers) in self.functions.powers.iter().enumerate() {
-            let shares = in_shares(powers, 1.0, step);
-            let direction = motion.mechanism.events[event].direction;
+            let ExactEvent { direction, joints, magnitude, .. } = &motion.mechanism.events[event];
+            // What closes a joint that is closed rests, as its function does at zero.
+            if joints.iter().any(|joint| !off.contains(joint)) {
+                ends.push(0);
+                continue;
+            }
+            let shares = in_shares(powers, 1.0, made);
             let counts =
-                |rises: bool| direction == Direction::Either || rises == (direction == Direction::Rising);
+                |rises: bool| *direction == Direction::Either || rises == (*direction == Direction::Rising);
             let began = (self.happened.iter().rev())
-                .take_while(|last| (motion.state().t - last.t).value() <= SAME * step)
+                .take_while(|last| (motion.state().t - last.t).value() <= SAME * made)
                 .any(|last| last.event == event);
-            let (passages, end) = passages(&shares, self.sides[event], began);
+            let least = magnitude * libm::exp2(-SURE * motion.precision.bits as f64);
+            let (passages, end) = passages(&shares, step / made, least, (self.sides[event], began));
             ends.push(end);
             for (share, rises) in passages.into_iter().filter(|(_, rises)| counts(*rises)) {
-                let near = Digits::of(share * step);
+                let near = Digits::of(share * made);
                 let after = if share == 0.0 { Digits::ZERO } else { refined(motion, powers, near) };
                 ahead.push(Ahead { event, after, rises });
             }
@@ -166,14 +175,15 @@ impl<const W: usize> Watch<W> {
     }
 }
 
-/// Passages of a formula through zero, in shares of a step and whether it rises, and its side at the end;
-/// `began` says that one of them ended the step before.
-fn passages(shares: &[f64], before: i8, began: bool) -> (Vec<(f64, bool)>, i8) {
+/// Passages of a formula through zero up to `end`, in shares of what its series is made for, and whether it
+/// rises, and its side there; `began` says that one of them ended the step before.  What nowhere is larger than
+/// `least` is rounding, as of a point that is kept at rest.
+fn passages(shares: &[f64], end: f64, least: f64, (before, began): (i8, bool)) -> (Vec<(f64, bool)>, i8) {
     let curve = Powers { powers: shares, end: 1.0 };
     let at = |share: f64| curve.at(share)[0];
     let most = magnitude(shares);
     let mut all = Vec::new();
-    if most == 0.0 || !most.is_finite() {
+    if most <= least || !most.is_finite() {
         return (all, before);
     }
     let is_at_zero = at(0.0).abs() <= NO_VALUE * most;
@@ -183,23 +193,25 @@ fn passages(shares: &[f64], before: i8, began: bool) -> (Vec<(f64, bool)>, i8) {
         all.push((0.0, side > 0));
     }
     let mut share = SAME;
-    while let Some(zero) = root(&curve, 0.0, share, 1.0) {
+    while share < end
+        && let Some(zero) = root(&curve, 0.0, share, end)
+    {
         share = zero + SAME;
-        let after = sign(at(share.min(1.0)));
+        let after = sign(at(share.min(end)));
         // At the very end of a step what follows is not known: it is on the other side.
-        let next = if after == 0 || share >= 1.0 { -side } else { after };
+        let next = if after == 0 || share >= end { -side } else { after };
         if next != side {
             all.push((zero, next > 0));
         }
         side = next;
-        if share >= 1.0 {
+        if share >= end {
             return (all, side);
         }
     }
     // A step may end at a zero, as one that ends on a wall does.
-    let [value, slope] = curve.at(1.0);
+    let [value, slope] = curve.at(end);
     if value.abs() <= NO_VALUE * most && sign(slope) == -side {
-        all.push((1.0, slope > 0.0));
+        all.push((end, slope > 0.0));
         side = -side;
     }
     (all, side)

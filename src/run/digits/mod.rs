@@ -24,11 +24,14 @@ pub use self::precision::{DIGITS, Precision};
 
 use self::events::Happened;
 use self::motion::{LongState, Motion};
+use super::magnitude::changes;
 use super::plan::Refusal;
 use crate::arithmetic::digits::{Digits, MOST};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Mechanism;
+use crate::dynamics::compile::Laws;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
+use crate::dynamics::configuration::Configuration;
 use crate::scene::exact::exact_number;
 use crate::scene::{Scene, SceneError, Template};
 use crate::stepping::StepError;
@@ -253,10 +256,19 @@ impl<const W: usize> Runner<W> {
             Ok(Some(structure)) => Arc::new(structure),
             _ => Arc::clone(&source.mechanism),
         };
-        let mechanism = ExactMechanism::new(&scene, &structure).map_err(|reason| {
+        let mut mechanism = ExactMechanism::new(&scene, &structure).map_err(|reason| {
             let alternative = "run it without --digits".into();
             Refusal { what: "--digits".into(), reason, alternative, is_usage: false }
         })?;
+        if let Some(Laws { formulas, parameters, .. }) = &structure.laws {
+            let functions = 0..formulas.events.len();
+            let magnitudes = changes(&structure, &start, |motion| {
+                let value = |at: &Configuration<f64>, event| formulas.event_value(event, at, parameters);
+                structure.seen(motion, |at| functions.clone().map(|event| value(at, event)).collect())
+            });
+            let events = mechanism.events.iter_mut().zip(magnitudes);
+            events.for_each(|(event, magnitude)| event.magnitude = magnitude);
+        }
         let start = mechanism.start(&scene, &source.scene);
         let motion = Motion::new(mechanism, start, precision, until.value())?;
         let posture = motion.state_posture();

@@ -243,7 +243,7 @@ impl<const W: usize> Motion<W> {
         if let Some((wall, length)) = wall::first(self, end.0.value())? {
             end = (length, Some(wall));
         }
-        if let Some(event) = self.watched(|watch, motion| watch.look(motion, end.0.value())) {
+        if let Some(event) = self.watched(|watch, motion| watch.look(motion, [end.0.value(), step])) {
             end = (event, end.1.filter(|_| event >= end.0));
         }
         self.step = Some(end);

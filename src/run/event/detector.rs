@@ -116,14 +116,11 @@ impl EventDetector {
     /// The events of the scene that close joints and locks, and these.
     fn closing(&self) -> Vec<(usize, Vec<String>)> {
         let mechanism = &self.mechanism;
-        let is_joint = |part: &String| {
-            let row = mechanism.constraints.iter().position(|row| row.name == *part);
-            mechanism.joints.iter().any(|joint| joint.name == *part)
-                || row.is_some_and(|row| !mechanism.is_motor(row))
-        };
         let events = self.laws.iter().flat_map(|laws| laws.formulas.events.iter().enumerate());
         events
-            .map(|(number, event)| (number, event.on.iter().filter(|part| is_joint(part)).cloned().collect()))
+            .map(|(number, event)| {
+                (number, event.on.iter().filter(|part| mechanism.is_joint(part)).cloned().collect())
+            })
             .filter(|(_, joints): &(usize, Vec<String>)| !joints.is_empty())
             .collect()
     }

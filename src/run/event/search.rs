@@ -157,7 +157,10 @@ impl EventDetector {
         let is_woken = self.memory.woken.contains(&event);
         let is_now = |before: &Time| (begin - *before).hi <= SAME * part.span;
         let is_corner = self.memory.flipped.iter().any(|(_, flip)| is_now(flip));
-        let beyond = is_corner.then(|| self.values(inside.at(begin + AFTER * part.span))[event]);
+        // A function that begins the run at a corner has not passed it there.
+        let may_begin = self.memory.sides[event] == 0 && !part.is_resolved;
+        let beyond =
+            (is_corner || may_begin).then(|| self.values(inside.at(begin + AFTER * part.span))[event]);
         let EventMemory { sides, largest, last, due, .. } = &mut self.memory;
         let (side, largest) = (&mut sides[event], &mut largest[event]);
         *largest = largest.max(most);
