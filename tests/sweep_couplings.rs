@@ -2,9 +2,9 @@
 //! beside whom.
 
 use crate::sweep::points;
-use crate::sweep_loops::{by_taylor, planned, shipped};
+use crate::sweep_loops::{by_taylor, planned, same_whoever_is_beside, shipped};
 use driftless::run::trust::Level;
-use driftless::run::{Shard, Status, Sweep, simulate};
+use driftless::run::{Status, simulate};
 use driftless::scene::Template;
 
 /// A shaft under a torque that drives a wheel by a gear and lifts a follower by a cam, with parameters for
@@ -63,22 +63,7 @@ fn neighbours_make_no_difference_to_points_of_gears_and_cams() {
         (shipped("cart_pole"), "bars.cart.mass=0.5..2:29", 1.5),
     ] {
         let request = by_taylor(until, 1e-9);
-        let plan = planned(&template, &[name], &request);
-        let whole = points(&plan, 1);
-        assert!(whole.iter().all(|point| point.status == Status::Done), "{name}");
-        assert_eq!(points(&plan, 3), whole);
-        for point in whole.iter().step_by(5) {
-            assert_eq!(plan.point(point.index).as_ref(), Some(point), "{name}");
-        }
-        let shards =
-            (1..=3).flat_map(|i| points(&planned(&template, &[name], &request).sharded(Shard::new(i, 3)), 1));
-        assert_eq!(shards.collect::<Vec<_>>(), whole);
-        let names = [name.split('=').next().expect("a name").to_owned()];
-        let backwards = whole.iter().rev().flat_map(|point| point.values.clone()).collect();
-        let listed = Sweep::listed(&template, &names, backwards, &request).expect("a list");
-        for (found, point) in points(&listed, 1).iter().rev().zip(&whole) {
-            assert_eq!((found.steps, &found.phi, &found.omega), (point.steps, &point.phi, &point.omega));
-        }
+        let whole = same_whoever_is_beside(&template, name, &request);
         let judged = points(&planned(&template, &[name], &request).trusted(Level::Auto), 1);
         for (mut point, bare) in judged.into_iter().zip(&whole) {
             let error = point.trust.take().and_then(|trust| trust.error).expect("an error");

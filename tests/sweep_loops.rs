@@ -3,7 +3,7 @@
 
 use crate::sweep::points;
 use driftless::run::trust::Level;
-use driftless::run::{Request, Shard, Status, Sweep, Vary, simulate};
+use driftless::run::{Point, Request, Shard, Status, Sweep, Vary, simulate};
 use driftless::scene::Template;
 use driftless::stepping::taylor::batch::Batch;
 
@@ -89,33 +89,37 @@ fn points_of_loops_agree_with_single_runs() {
     }
 }
 
-/// Alone, with others beside, in another order, in parts and on threads.
+/// The points of a sweep, which are the same alone, with others beside, in another order, in parts and on threads.
+pub fn same_whoever_is_beside(template: &Template, vary: &str, request: &Request) -> Vec<Point> {
+    let plan = planned(template, &[vary], request);
+    let whole = points(&plan, 1);
+    assert!(whole.iter().all(|point| point.status == Status::Done), "{vary}");
+    assert_eq!(points(&plan, 3), whole);
+    for point in whole.iter().step_by(5) {
+        assert_eq!(plan.point(point.index).as_ref(), Some(point), "{vary}");
+    }
+    let shards =
+        (1..=3).flat_map(|i| points(&planned(template, &[vary], request).sharded(Shard::new(i, 3)), 1));
+    assert_eq!(shards.collect::<Vec<_>>(), whole);
+    let names = [vary.split('=').next().expect("a name").to_owned()];
+    let backwards = whole.iter().rev().flat_map(|point| point.values.clone()).collect();
+    let listed = Sweep::listed(template, &names, backwards, request).expect("a list");
+    for (point, other) in points(&listed, 1).iter().rev().zip(&whole) {
+        assert_eq!((&point.phi, &point.omega, point.steps), (&other.phi, &other.omega, other.steps));
+    }
+    whole
+}
+
 #[test]
 fn neighbours_make_no_difference_to_points_of_loops() {
-    for (scene, name, until) in [
+    for (scene, vary, until) in [
         ("andrews", "springs.spring.stiffness=4000..5000:29", 0.02),
         ("four_bar_motor", "motors.motor.law.rate=5..7:29", 1.0),
         // Through singular positions, and of one point with another structure.
         ("kite", "bars.coupler.mass=0.5..1.5:29", 2.0),
         ("kite", "gravity[1]=-14..14:29", 1.0),
     ] {
-        let (template, request) = (shipped(scene), by_taylor(until, 1e-9));
-        let plan = planned(&template, &[name], &request);
-        let whole = points(&plan, 1);
-        assert!(whole.iter().all(|point| point.status == Status::Done), "{name}");
-        assert_eq!(points(&plan, 3), whole);
-        for point in whole.iter().step_by(5) {
-            assert_eq!(plan.point(point.index).as_ref(), Some(point), "{name}");
-        }
-        let shards =
-            (1..=3).flat_map(|i| points(&planned(&template, &[name], &request).sharded(Shard::new(i, 3)), 1));
-        assert_eq!(shards.collect::<Vec<_>>(), whole);
-        let names = [name.split('=').next().expect("a name").to_owned()];
-        let backwards = whole.iter().rev().flat_map(|point| point.values.clone()).collect();
-        let listed = Sweep::listed(&template, &names, backwards, &request).expect("a list");
-        for (point, other) in points(&listed, 1).iter().rev().zip(&whole) {
-            assert_eq!((&point.phi, &point.omega, point.steps), (&other.phi, &other.omega, other.steps));
-        }
+        same_whoever_is_beside(&shipped(scene), vary, &by_taylor(until, 1e-9));
     }
 }
 

@@ -33,6 +33,11 @@ const SMALL: f64 = 1.0 / 64.0;
 /// Roundings of its largest terms up to which a value is zero.
 pub const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
+/// The side of zero a value is on: -1, 0 or 1.
+pub fn sign(value: f64) -> i8 {
+    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
+}
+
 /// A function of time, or of the share of a step, with bounds.
 pub trait Curve {
     /// Value and slope at `t`.

@@ -6,12 +6,12 @@
 //! its value a little later.  That there is a zero inside a step is told in doubles
 //! ([`search`](crate::stepping::search)), as it is for events.
 
-use super::functions::{Functions, LEAVES, SAME, magnitude, sign};
+use super::functions::{Functions, LEAVES, SAME, magnitude};
 use super::motion::Motion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::stepping::search::{Curve, Powers, root};
+use crate::stepping::search::{Curve, Powers, root, sign};
 use crate::stepping::{Cause, StepError};
 
 /// Part of the bits carried that a condition has to be zero in.

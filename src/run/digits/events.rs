@@ -6,14 +6,14 @@
 //! for walls: two zeros within 1e-9 of a step are one, or none.  Steps are so short that the series of the
 //! formulas converge in them, too.
 
-use super::functions::{Functions, LEAVES, SAME, magnitude, sign};
+use super::functions::{Functions, LEAVES, SAME, magnitude};
 use super::motion::Motion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::{ExactEvent, ExactMechanism};
 use crate::scene::Direction;
-use crate::stepping::search::{Curve, Powers, root};
+use crate::stepping::search::{Curve, Powers, root, sign};
 
 /// Share of the largest value within a step up to which a formula is at its zero.
 const NO_VALUE: f64 = 1e-12;

@@ -73,11 +73,6 @@ impl<const W: usize> Functions<W> {
     }
 }
 
-/// The side of zero a number is on.
-pub(super) fn sign(value: f64) -> i8 {
-    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
-}
-
 /// About the largest magnitude of a function whose powers are in shares of a step.
 pub(super) fn magnitude(shares: &[f64]) -> f64 {
     let curve = Powers { powers: shares, end: 1.0 };

@@ -7,7 +7,7 @@ use super::detector::{EventDetector, EventMemory, Owner, SAME};
 use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
 use crate::run::inside::Inside;
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root, sign};
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
@@ -64,11 +64,6 @@ impl Part<'_> {
     fn first(&self) -> [f64; 2] {
         [self.values[self.values.len() - 1], self.values[self.values.len() - 2]]
     }
-}
-
-/// The side of zero of a value.
-fn sign(value: f64) -> i8 {
-    if value > 0.0 { 1 } else { -i8::from(value < 0.0) }
 }
 
 /// Where a curve has left what it may be `off` by about its zero, from `share` on; `None` where that is not
