@@ -270,8 +270,21 @@ fn outputs_are_columns_of_runs_and_sweeps_and_moments() {
     }
     program.run("check crank_rocker.json --output crank.phi").exits(0);
 
+    // An output named as one of the scene's takes its place.
+    let own =
+        program.run("run crank_rocker.json --json --no-charts --output O=pen.y --out replaced --trust off");
+    let outputs = own.exits(0).object()["outputs"].clone();
+    assert_eq!(outputs["O"]["unit"], "m", "{outputs:#}");
+
     // What is asked for and does not exist is refused with what there is.
     program.run("run crank_rocker.json --output Q.force").exits(2).says(&["--output Q.force", "O.force"]);
+}
+
+#[test]
+fn what_does_not_suit_a_method_on_the_way_stops_it_there() {
+    let program = Program::with_scenes(&["latch"]);
+    let stopped = program.run("run latch.json --method rattle2 --step 0.005 --no-charts -q").exits(4);
+    stopped.says(&["rattle2 stopped at t = 0.748", "the natural form takes constant ones only"]);
 }
 
 #[test]
@@ -435,6 +448,9 @@ fn parts_of_a_sweep_join_to_its_very_bytes() {
     program.run(&format!("merge {} --out few", named[0])).exits(6).says(&["parts 2, 3, 4, 5 of 5 missing"]);
     program.run("merge one --out few").exits(6).says(&["one holds no part of a sweep", "--shard"]);
     program.run("merge nowhere --out few").exits(6).says(&["nowhere is not there", "hint: "]);
+    // All are found from the folder above that of the scene.
+    program.run("merge parts --out above -q").exits(0);
+    assert!(bytes("above/sweep.csv".into()) == bytes(format!("one/{PLACE}/sweep.csv")));
     // A part of another grid, of another number of parts, a copy, an altered table.
     program.run(&format!("{} --out other --shard 2/5", SWEEP.replace(":13", ":12"))).exits(0);
     let other = format!("other/{PLACE}/shard-2-of-5");

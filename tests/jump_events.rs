@@ -193,3 +193,41 @@ fn a_function_with_a_corner_passes_zero_in_a_jump() {
         }
     }
 }
+
+/// Two discs of 1 kg m² at -10 and 1 rad/s go on at -4.5 rad/s once they are locked to each other, whatever number
+/// the event sets beside that.
+#[test]
+fn a_joint_that_closes_makes_events_where_a_number_is_set_too() {
+    for set in ["", r#", "set": {"k": 2}"#, r#", "set": {"k": 1}"#] {
+        let text = format!(
+            r#"{{"name": "discs", "gravity": [0, 0], "parameters": {{"k": 1}}, "bars": [
+                {{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 1}},
+                {{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+            "hinges": [
+                {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                {{"name": "B", "between": [{{"body": "ground", "point": [3, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "locks": [{{"name": "lock", "body": "b", "relative_to": "a"}}], "inactive": ["lock"],
+            "events": [{{"name": "back", "when": "b.omega + 2"}},
+                {{"name": "late", "when": "b.omega + 2.25*k"}},
+                {{"name": "closes", "when": "t - 0.2", "on": ["lock"]{set}}}],
+            "start": {{"a": {{"phi": 0, "omega": -10}}, "b": {{"phi": 0, "omega": 1}}}}, "until": 1, "every": 1}}"#
+        );
+        for request in methods() {
+            let outcome = run(&scene(&text), &request);
+            assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+            assert_near(outcome.last.omega[1], -4.5, 1e-12, "rate");
+            for name in ["closes", "back"] {
+                let found = times(&outcome, name);
+                assert_eq!(found.len(), 1, "{:?}{set}: {name} at {found:?}", request.method);
+                assert_near(found[0], 0.2, 1e-12, name);
+            }
+            // With k = 2 its function jumps to zero, and stays there.
+            assert_eq!(
+                times(&outcome, "late").len(),
+                usize::from(!set.contains('2')),
+                "{:?}{set}",
+                request.method
+            );
+        }
+    }
+}

@@ -352,3 +352,41 @@ fn a_pair_goes_on_from_the_middle_of_a_row() {
     }
     assert!(found == expected, "{} rows instead of {}", found.len(), expected.len());
 }
+
+/// Two pendulums of which the second follows the first by a gear or a cam, with corners on the way.
+fn followed(law: &str, parts: &str, gravity: f64, omega: f64) -> String {
+    let bar = |name| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.2, 0], "inertia": 0.0133, "length": 0.4}}"#)
+    };
+    format!(
+        r#"{{"name": "followed", "gravity": [0, {gravity}], "bars": [{}, {}], "hinges": [
+            {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "ground", "point": [1, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+        "motors": [{{"name": "m", "body": "b", "law": "{law}"}}], {parts}
+        "start": {{"a": {{"phi": -1, "omega": {omega}}}}}, "until": 9, "every": 9}}"#,
+        bar("a"),
+        bar("b")
+    )
+}
+
+/// Steps keep the digits of the run, however many more its numbers carry: that is what laws of motors have to meet
+/// at their corners, and conditions to be zero in.
+#[test]
+fn what_follows_passes_its_corners_in_any_number_of_digits() {
+    let table = r#""torques": [{"name": "T", "body": "a", "torque": "0.3*tb(a.sin)"}],
+        "tables": {"tb": [[-0.5, 0.3], [0, 0], [0.3, 1], [0.6, 0.2]]},"#;
+    let mut cases = Vec::new();
+    for omega in [10.0, 10.168, 10.5] {
+        cases.push((followed("abs(a.sin)*a.sin", "", -9.81, omega), "1"));
+    }
+    cases.push((followed("-0.5*a.phi", table, -1.0, 9.0), "2"));
+    for (text, until) in &cases {
+        let source = source(text, &[], until, until);
+        let [few, many] = [20, 45].map(|digits| last(&source, digits));
+        for what in 0..2 {
+            let off = number(few.bodies[0][what]) - number(many.bodies[0][what]);
+            assert!(off.magnitude() < fixed("1e-16").magnitude(), "{text}: {off}");
+        }
+        assert!(few.drift.abs() < 1e-17 && many.drift.abs() < 1e-42, "{:e} {:e}", few.drift, many.drift);
+    }
+}

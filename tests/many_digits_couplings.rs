@@ -40,6 +40,24 @@ fn a_gear_turns_in_its_ratio_as_written() {
     holds(&row, 1, &[(0, fixed("2.7")), (1, fixed("1.8"))]);
 }
 
+/// The motors of a scene stand in one list, in any order: each keeps its own law.
+#[test]
+fn motors_and_gears_keep_their_laws_in_any_order() {
+    let time = [
+        r#"{"name": "m", "body": "a", "law": "3*t - 1"}"#,
+        r#"{"name": "m", "body": "a", "law": {"start": -1, "rate": 3}}"#,
+    ];
+    let gear = r#"{"name": "gear", "body": "b", "law": "0.5*a.phi"}"#;
+    for time in time {
+        for [first, second] in [[time, gear], [gear, time]] {
+            let text = discs(&format!(r#""motors": [{first}, {second}]"#), "");
+            let row = last(&source(&text, &[], "1", "1"), DIGITS);
+            holds(&row, 0, &[(0, fixed("2")), (1, fixed("3"))]);
+            holds(&row, 1, &[(0, fixed("1")), (1, fixed("1.5"))]);
+        }
+    }
+}
+
 /// A cam of the square of an angle that a motor drives evenly, and a follower that moves by itself with time.
 #[test]
 fn a_cam_and_a_follower_in_time_take_their_work() {

@@ -99,6 +99,7 @@ mod stiff;
 mod switched_orders;
 mod tables;
 mod taylor;
+mod turns;
 mod walls;
 mod windows;
 mod work;

@@ -409,6 +409,51 @@ fn spectra_add_up_to_what_the_dissipation_says() {
     let damped = Template::read("examples/scenes/spring.json".as_ref(), &set).expect("a scene");
     let found = lyapunov(&damped, Some(20.0), None, &mut || false).expect("a spectrum");
     assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
+    // Both belong to the same span where an event ends the run before its time.
+    let text = std::fs::read_to_string("examples/scenes/spring.json").expect("a scene");
+    let text =
+        text.replacen('{', r#"{"events": [{"name": "low", "when": "bar1.phi - 1", "action": "stop"}],"#, 1);
+    let found = lyapunov(&Template::new(text, "spring".into(), &set), Some(20.0), None, &mut || false);
+    let found = found.expect("a spectrum");
+    assert!(found.lost.as_ref().is_some_and(|lost| lost.contains("`low`")), "{:?}", found.lost);
+    assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
+}
+
+/// Neither a point that comes to rest on its wall nor a joint that opens leaves the directions there were.
+#[test]
+fn a_spectrum_ends_where_directions_come_or_go() {
+    let ended = |more: &str, why: &str| {
+        let text = format!(
+            r#"{{"name": "two", "gravity": [0, -9.81], {more},
+                "bars": [{{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}},
+                    {{"name": "other", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+                "hinges": [
+                    {{"name": "A", "between": [
+                        {{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}},
+                    {{"name": "B", "between": [
+                        {{"body": "bar", "point": [1, 0]}}, {{"body": "other", "point": [0, 0]}}]}}],
+                "torsion_springs": [
+                    {{"name": "t", "body": "bar", "stiffness": 0, "free_angle": 0, "damping": 0.2}}],
+                "start": {{"bar": {{"phi": 0.3, "omega": 0}}, "other": {{"phi": -1, "omega": 0}}}},
+                "until": 5, "every": 1}}"#
+        );
+        let found = lyapunov(&Template::new(text, "two".into(), &[]), None, None, &mut || false);
+        let found = found.expect("a spectrum");
+        assert!(found.lost.as_ref().is_some_and(|lost| lost.contains(why)), "{:?}", found.lost);
+        assert!(found.until > 0.1 && found.expected_sum < -0.1, "{} {}", found.until, found.expected_sum);
+        assert!(found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
+    };
+    let wall = r#""walls": [{"name": "w", "body": "bar", "point": [1, 0], "restitution": 0.1,
+        "line": {"through": [0, -0.5], "normal": [0, 1]}}]"#;
+    ended(wall, "stays on its wall");
+    let lock = r#""locks": [{"name": "lock", "body": "other", "relative_to": "bar"}]"#;
+    ended(&format!(r#"{lock}, "events": [{{"name": "e", "when": "t - 0.5", "off": ["lock"]}}]"#), "opens");
+    ended(
+        &format!(
+            r#"{lock}, "inactive": ["lock"], "events": [{{"name": "e", "when": "t - 0.5", "on": ["lock"]}}]"#
+        ),
+        "closes",
+    );
 }
 
 /// An integral is one unknown, whose exponent is zero where nothing depends on it: angle and rate of the pendulum

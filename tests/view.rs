@@ -64,9 +64,25 @@ fn runs_in_many_digits_have_no_page() {
 }
 
 #[test]
+fn runs_are_found_from_above_the_folder_of_their_scene() {
+    let program = with_run("--method dp5");
+    program.run("view output").exits(0).shows(&["output/motor"]);
+    program.run("run free.json --until 1 --no-charts -q").exits(0);
+    let told = program.run("view output").exits(6);
+    told.says(&["output holds the runs of 2 scenes", "output/free, output/motor"]);
+}
+
+#[test]
 fn what_is_no_run_is_refused() {
     let program = with_run("--method dp5");
     let folder = "output/motor/dp5-1e-9-elimination";
+    // One scene is found from above its folder, two have to be told apart.
+    program.run("view output").exits(0).shows(&["output/motor"]);
+    program.run("run free.json --until 1 --no-charts -q").exits(0);
+    program
+        .run("view output")
+        .exits(6)
+        .says(&["output holds the runs of 2 scenes", "output/free, output/motor"]);
     program.run("view examples").exits(6).says(&["examples holds no run", "hint: `driftless run SCENE`"]);
     program.run(&format!("view {folder} --from 2 --to 1")).exits(2).says(&["--from 2 --to 1", "hint"]);
     program.run(&format!("view {folder} --from nan")).exits(2);
@@ -96,7 +112,7 @@ fn what_is_no_run_is_refused() {
 #[test]
 fn a_run_that_went_on_has_the_page_of_one_that_was_not_interrupted() {
     let program = Program::with_scenes(&["motor"]);
-    let run = "run motor.json --until 200 --every 0.01 --method gauss4 --step 1e-4 --no-charts -q --html --trust off --checkpoint-every 0.05";
+    let run = "run motor.json --until 60 --every 0.003 --method gauss4 --step 1e-4 --no-charts -q --html --trust off --checkpoint-every 0.05";
     let mut child = program.command(run).spawn().expect("the program");
     let is_checkpoint = |file: &String| file.ends_with("/checkpoint.previous");
     let folder = loop {

@@ -180,7 +180,7 @@ def test_the_lock_is_released(free):
     thread = threading.Thread(target=count)
     thread.start()
     begin = time.perf_counter()
-    free.run(until=50, method="gauss8", step=0.001, trust="off")
+    free.run(until=10, method="gauss8", step=0.001, trust="off")
     spent = time.perf_counter() - begin
     done.set()
     thread.join()
@@ -196,7 +196,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 scene = dl.load({str(scenes / "free.json")!r})
 try:
     print("going", flush=True)
-    scene.run(until=20000, method="gauss8", step=0.001, every=10, trust="off")
+    scene.run(until=20000, method="gauss8", step=0.001, every=1, trust="off")
 except KeyboardInterrupt as stop:
     assert isinstance(stop, dl.Interrupted)
     open({str(tmp_path / "saved")!r}, "wb").write(stop.checkpoint)
@@ -210,8 +210,8 @@ except KeyboardInterrupt as stop:
     out, _ = child.communicate(timeout=60)
     assert float(out) - sent < 1.0
     scene = dl.load(scenes / "free.json")
-    run = dl.resume(tmp_path / "saved", callback=lambda t, row: t < 30)
-    whole = scene.run(until=20000, method="gauss8", step=0.001, every=10, trust="off", callback=lambda t, row: t < 30)
+    run = dl.resume(tmp_path / "saved", callback=lambda t, row: t < 3)
+    whole = scene.run(until=20000, method="gauss8", step=0.001, every=1, trust="off", callback=lambda t, row: t < 3)
     count = min(len(run.t), len(whole.t))
     assert count >= 3 and np.array_equal(run.rows[:count], whole.rows[:count])
     with pytest.raises(dl.RequestRefused):
@@ -221,7 +221,7 @@ except KeyboardInterrupt as stop:
 @pytest.mark.parametrize("method", ["dop853", "dopri5"])
 def test_methods_of_one_long_call_are_interrupted_and_go_on(tmp_path, scenes, method):
     # One output interval is integrated in one call, which takes seconds.
-    options = {"method": method, "until": 4000, "every": 2000, "rtol": 1e-10, "trust": "off"}
+    options = {"method": method, "until": 2000, "every": 1000, "rtol": 1e-10, "trust": "off"}
     code = f"""
 import pydriftless as dl, signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -78,7 +78,7 @@ fn refused(text: String) -> Failure {
     Failure::new(Exit::Io, text)
 }
 
-/// The folders given that are parts, and the parts in the others.
+/// The folders given that are parts, and the parts in the others, or in the folders below those.
 fn part_folders(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut folders = Vec::new();
     for folder in given {
@@ -94,12 +94,14 @@ fn part_folders(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
                 folder.display()
             )));
         }
-        for entry in fs::read_dir(folder).map_err(failed)? {
-            let path = entry.map_err(failed)?.path();
-            if is_part(&path) {
-                folders.push(path);
+        let mut inside = inside(folder).map_err(failed)?;
+        // Further down, in a folder of scenes whose folders hold those of sweeps.
+        for _ in 0..2 {
+            if !inside.iter().any(|path| is_part(path)) {
+                inside = inside.iter().filter_map(|path| self::inside(path).ok()).flatten().collect();
             }
         }
+        folders.extend(inside.into_iter().filter(|path| is_part(path)));
         if folders.len() == before {
             return Err(refused(format!(
                 "{} holds no part of a sweep\nhint: `driftless sweep … --shard I/N` runs one",
@@ -114,6 +116,10 @@ fn part_folders(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Whether a folder is one of a part, finished or not.
+fn inside(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
+}
+
 fn is_part(folder: &Path) -> bool {
     let name = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     folder.is_dir()

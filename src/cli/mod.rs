@@ -116,7 +116,7 @@ fn placed(flags: &SceneFlags, text: &str, error: &CompileError) -> Failure {
     Failure::new(Exit::Scene, format!("{place}{error}"))
 }
 
-/// The scene with the outputs of the command line beside its own.
+/// The scene with the outputs of the command line beside its own, or in place of those of the same names.
 fn with_outputs(mut scene: Scene, outputs: &[String]) -> Result<Scene, Failure> {
     let names = scene::OutputNames::of(&scene);
     for text in outputs {
@@ -125,9 +125,7 @@ fn with_outputs(mut scene: Scene, outputs: &[String]) -> Result<Scene, Failure> 
             let text = format!("--output {text}: {}\nhint: {}", error.problem, error.hint);
             return Err(Failure::new(Exit::Usage, text));
         }
-        if scene.outputs.iter().all(|known| known.name != output.name) {
-            scene.outputs.push(output);
-        }
+        output.put(&mut scene.outputs);
     }
     Ok(scene)
 }

@@ -76,6 +76,8 @@ pub struct Mechanism {
     pub(crate) switches: Switches,
     /// True where parts or branches that do not act at the moment do work: it is integrated all along.
     pub(crate) keeps_work: bool,
+    /// True where whole turns matter to such: none are taken off all along.
+    pub(crate) keeps_turns: bool,
     /// The mechanism with the parts that do not act at the start, and their names; where there are any.
     pub(crate) whole: Option<(Arc<Mechanism>, Vec<String>)>,
     /// Constraint equations: given angles, then points that coincide or stay on lines, then one per contact
@@ -229,6 +231,7 @@ impl Mechanism {
             }
         };
         let keeps_work = laws.as_ref().is_some_and(|laws| laws.formulas.applies());
+        let keeps_turns = laws.as_ref().is_some_and(|laws| laws.formulas.may_count_turns());
         let mut rows = given_angles(scene);
         let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;
         let joints = joints(scene, &forest, &mut rows);
@@ -263,6 +266,7 @@ impl Mechanism {
             keeps_work: keeps_work
                 || !frictions.is_empty()
                 || contacts.iter().any(|contact| contact.row.moves_by_time()),
+            keeps_turns,
             whole: None,
             integrals: scene.bars.len() - scene.own_bars(),
             bodies,

@@ -82,7 +82,9 @@ pub(super) fn build(
     plan: &mut Plan,
     start: &Motion,
 ) -> Result<Box<dyn Driver>, StepError> {
-    let mut driver = built(mechanism, plan, start)?;
+    // What cannot begin does not where the motion is.
+    let there = |stop: StepError| StepError { t: start.time.hi.max(stop.t), ..stop };
+    let mut driver = built(mechanism, plan, start).map_err(there)?;
     driver.guard(closed(plan.tolerance.unwrap_or_default().relative));
     Ok(driver)
 }

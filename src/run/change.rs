@@ -159,7 +159,8 @@ impl ContactDriver {
         let modes = latch::modes(&free, &self.mechanism.modes, &held);
         self.mechanism = in_modes(&free, &held, &modes);
         if let Some(events) = &mut self.events {
-            if keeps_motion && keeps_parameters {
+            // What joints do that close here, by the parameters that hold from here on.
+            if keeps_motion {
                 events.jump([&before, &after]);
             }
             events.watch_friction(&self.mechanism);

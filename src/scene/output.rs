@@ -47,6 +47,14 @@ impl Output {
             _ => Self { name: text.trim().to_owned(), formula: text.trim().to_owned() },
         }
     }
+
+    /// Puts it into a list: in place of the one of the same name, where there is one.
+    pub(crate) fn put(self, into: &mut Vec<Self>) {
+        match into.iter_mut().find(|known| known.name == self.name) {
+            Some(known) => *known = self,
+            None => into.push(self),
+        }
+    }
 }
 
 /// A component of a vector.

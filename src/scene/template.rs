@@ -80,7 +80,7 @@ impl Template {
         Self { text, source, overrides: overrides.to_vec(), outputs: Vec::new() }
     }
 
-    /// The same with outputs beside those of the scene.
+    /// The same with outputs beside those of the scene, or in place of those of the same names.
     #[must_use]
     pub fn with_outputs(self, outputs: Vec<Output>) -> Self {
         Self { outputs, ..self }
@@ -96,10 +96,7 @@ impl Template {
 
     fn parsed(&self, overrides: &[Override]) -> Result<Scene, SceneError> {
         let mut scene = parse_scene(&self.text, &self.source, overrides)?;
-        let more =
-            self.outputs.iter().filter(|output| scene.outputs.iter().all(|known| known.name != output.name));
-        let more: Vec<Output> = more.cloned().collect();
-        scene.outputs.extend(more);
+        self.outputs.iter().cloned().for_each(|output| output.put(&mut scene.outputs));
         Ok(scene)
     }
 

@@ -169,7 +169,8 @@ impl Mechanism {
 
     /// True where whole turns matter, so that angles are not wrapped.
     pub fn is_winding(&self) -> bool {
-        !self.torsions.is_empty()
+        self.keeps_turns
+            || !self.torsions.is_empty()
             || self.forces.iter().any(UserForce::counts_turns)
             || self.aims().any(|aim| aim.counted_angles().next().is_some())
     }

@@ -28,6 +28,7 @@ impl Mechanism {
         }
         let mut mechanism = self.clone();
         mechanism.keeps_work |= self.is_worked_on();
+        mechanism.keeps_turns |= self.is_winding();
         mechanism.springs.retain(|part| !parts.contains(&part.name));
         mechanism.torsions.retain(|part| !parts.contains(&part.name));
         mechanism.actions.retain(|part| !parts.contains(&part.name));

@@ -3,6 +3,8 @@
 use super::Mechanism;
 use crate::dynamics::constraint::Measure;
 use crate::dynamics::force::UserForce;
+use crate::dynamics::force::formula::Formulas;
+use crate::scene::Meaning;
 use std::f64::consts::{PI, TAU};
 
 /// For every body the first of those with which it may make whole turns and all is as before; `None` where a
@@ -60,6 +62,24 @@ impl WholeTurns {
     pub fn is_of_row(&self, measure: &Measure) -> bool {
         let Measure::Angle { body, base } = *measure else { return false };
         self.with[body] != base.and_then(|base| self.with[base])
+    }
+}
+
+impl Formulas {
+    /// The bodies whose whole turns matter to them, on whichever branches.
+    pub fn counted_angles(&self) -> impl Iterator<Item = usize> {
+        self.meanings()
+            .flat_map(|meaning| match *meaning {
+                Meaning::Angle(body) => [Some(body), None],
+                Meaning::RelativeAngle(body, base) => [Some(body), base],
+                _ => [None; 2],
+            })
+            .flatten()
+    }
+
+    /// True where whole turns may matter to them on other branches or with other parameters than those that hold.
+    pub fn may_count_turns(&self) -> bool {
+        self.switches() && self.counted_angles().next().is_some()
     }
 }
 

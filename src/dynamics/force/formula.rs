@@ -412,16 +412,9 @@ impl Formulas {
         modes
     }
 
-    /// The bodies whose whole turns matter to them, on whichever branches.
-    pub fn counted_angles(&self) -> impl Iterator<Item = usize> {
-        let meanings = self.switched().flat_map(|expression| &expression.meanings);
-        meanings
-            .flat_map(|meaning| match *meaning {
-                Meaning::Angle(body) => [Some(body), None],
-                Meaning::RelativeAngle(body, base) => [Some(body), base],
-                _ => [None; 2],
-            })
-            .flatten()
+    /// What the names in them mean, on whichever branches.
+    pub fn meanings(&self) -> impl Iterator<Item = &Meaning<Site>> {
+        self.switched().flat_map(|expression| &expression.meanings)
     }
 
     /// The signals on the branches that hold at a configuration.

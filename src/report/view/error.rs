@@ -13,6 +13,14 @@ pub enum ViewError {
         /// The folder.
         folder: PathBuf,
     },
+    /// There are runs of several scenes.
+    #[error("{} holds the runs of {} scenes\nhint: name the folder of one: {}", folder.display(), scenes.len(), listed(scenes))]
+    Several {
+        /// The folder.
+        folder: PathBuf,
+        /// Those of the scenes.
+        scenes: Vec<PathBuf>,
+    },
     /// The run is in many digits.
     #[error("{} holds a run in many digits, which has no page\nhint: without --digits and --trusted-until a run has one", folder.display())]
     Digits {
@@ -76,4 +84,11 @@ pub enum ViewError {
         /// How many there are.
         found: usize,
     },
+}
+
+/// Some folders, as a list.
+fn listed(folders: &[PathBuf]) -> String {
+    const MOST: usize = 8;
+    let names: Vec<String> = folders.iter().take(MOST).map(|folder| folder.display().to_string()).collect();
+    names.join(", ") + if folders.len() > MOST { ", …" } else { "" }
 }

@@ -114,19 +114,34 @@ fn kept(
     }
 }
 
-/// The folders of runs meant by a folder: itself, or those in it, in the order of their names.
+/// The folders of runs meant by a folder: itself, or those in it, in the order of their names; or those of the
+/// only folder in it that holds any.
 ///
 /// # Errors
-/// It holds none.
+/// It holds none, or those of several scenes.
 pub fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     let is_run = |path: &Path| path.join(RECORD).is_file() && path.join(TRAJECTORY).is_file();
     if is_run(folder) {
         return Ok(vec![folder.to_owned()]);
     }
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut found: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| is_run(path)).collect();
-    found.sort();
-    if found.is_empty() { Err(ViewError::None { folder: folder.to_owned() }) } else { Ok(found) }
+    let inside = |folder: &Path| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        let mut inside: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+        inside.sort();
+        inside
+    };
+    let runs = |folder: &Path| inside(folder).into_iter().filter(|path| is_run(path)).collect::<Vec<_>>();
+    let found = runs(folder);
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let mut scenes = inside(folder);
+    scenes.retain(|scene| !runs(scene).is_empty());
+    match &scenes[..] {
+        [] => Err(ViewError::None { folder: folder.to_owned() }),
+        [scene] => Ok(runs(scene)),
+        _ => Err(ViewError::Several { folder: folder.to_owned(), scenes }),
+    }
 }
 
 /// Whether a folder holds a run in many digits, of which there is no page.

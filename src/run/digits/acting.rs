@@ -19,7 +19,7 @@ use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
 
-/// Part of the bits carried in which the laws of motors agree on both sides of a corner.
+/// Part of the digits in which the laws of motors agree on both sides of a corner.
 const SAME: f64 = 0.5;
 /// How far apart what closes may be: angles \[rad\], and points over the size of the mechanism.
 const MEETS: f64 = 1e-6;
@@ -105,7 +105,7 @@ impl<const W: usize> Motion<W> {
         let moved = |a: &[Digits<W>], b: &[Digits<W>]| a.iter().zip(b).map(apart).fold(f64::MIN, f64::max);
         let turned = moved(&before.0.phi, &after.phi).max(moved(&before.0.omega, &after.omega));
         let jump = if closing.is_empty() { kept.max(turned) } else { kept };
-        if jump > -SAME * self.precision.bits as f64 {
+        if jump > self.precision.rounding(SAME) {
             let what = format!("the law of a motor jumps by {:.1e}", libm::exp2(jump));
             return Err(unsuited(self, &what, "it must keep its value and its rate through its corners"));
         }

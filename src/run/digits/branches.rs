@@ -14,7 +14,7 @@ use crate::arithmetic::{Real, Scalar};
 use crate::stepping::search::{Curve, Powers, root, sign};
 use crate::stepping::{Cause, StepError};
 
-/// Part of the bits carried that a condition has to be zero in.
+/// Part of the digits that a condition has to be zero in.
 const SURE: f64 = 0.75;
 /// Changes at one moment beyond as many as there are conditions.
 const CHANGES: usize = 8;
@@ -36,10 +36,10 @@ struct Condition {
 }
 
 impl Condition {
-    fn new<const W: usize>(powers: &[Digits<W>], step: f64, bits: usize) -> Self {
+    fn new<const W: usize>(powers: &[Digits<W>], step: f64, rounding: f64) -> Self {
         let shares = in_shares(powers, 1.0, step);
         let first = powers.first().map_or(f64::NEG_INFINITY, Digits::log2);
-        let is_at_zero = first <= libm::log2(magnitude(&shares)) - SURE * bits as f64;
+        let is_at_zero = first <= libm::log2(magnitude(&shares)) + rounding;
         let begin = || powers.first().map_or(0, |first| sign(first.value()));
         let left = || sign(Powers { powers: &shares, end: 1.0 }.at(LEAVES)[0]);
         let side = if is_at_zero { left() } else { begin() };
@@ -79,9 +79,9 @@ impl<const W: usize> Branches<W> {
     /// The branches as a step of so many seconds begins, where they are others than the motion is on.
     pub fn others(&self, motion: &Motion<W>, step: f64) -> Option<Vec<bool>> {
         let known = &motion.mechanism.acting.modes;
-        let bits = motion.precision.bits;
+        let rounding = motion.precision.rounding(SURE);
         let mode = |(powers, &mode): (&Vec<Digits<W>>, &bool)| {
-            let side = Condition::new(powers, step, bits).side;
+            let side = Condition::new(powers, step, rounding).side;
             if side == 0 { mode } else { side > 0 }
         };
         let modes: Vec<bool> = self.functions.powers.iter().zip(known).map(mode).collect();
@@ -90,9 +90,9 @@ impl<const W: usize> Branches<W> {
 
     /// The time after which a condition first changes its side within a step of so many seconds \[s\].
     pub fn change(&self, motion: &Motion<W>, step: f64) -> Option<Digits<W>> {
-        let bits = motion.precision.bits;
+        let rounding = motion.precision.rounding(SURE);
         let change = |powers: &Vec<Digits<W>>| {
-            let share = Condition::new(powers, step, bits).change()?;
+            let share = Condition::new(powers, step, rounding).change()?;
             Some(refined(motion, powers, Digits::of(share * step)))
         };
         self.functions.powers.iter().filter_map(change).reduce(|a, b| if b < a { b } else { a })

@@ -17,7 +17,7 @@ use crate::stepping::search::{Curve, Powers, root, sign};
 
 /// Share of the largest value within a step up to which a formula is at its zero.
 const NO_VALUE: f64 = 1e-12;
-/// Part of the bits carried in which a function that is kept at zero is zero.
+/// Part of the digits in which a function that is kept at zero is zero.
 const SURE: f64 = 0.75;
 /// Events kept.
 const KEPT: usize = 100_000;
@@ -123,7 +123,7 @@ impl<const W: usize> Watch<W> {
             let began = (self.happened.iter().rev())
                 .take_while(|last| (motion.state().t - last.t).value() <= SAME * made)
                 .any(|last| last.event == event);
-            let least = magnitude * libm::exp2(-SURE * motion.precision.bits as f64);
+            let least = magnitude * libm::exp2(motion.precision.rounding(SURE));
             let (passages, end) = passages(&shares, step / made, least, (self.sides[event], began));
             ends.push(end);
             for (share, rises) in passages.into_iter().filter(|(_, rises)| counts(*rises)) {

@@ -19,7 +19,7 @@ use crate::stepping::{Cause, StepError};
 
 /// Walls that are taken at once.
 const MOST: usize = 12;
-/// Part of the bits carried that a gap has to be zero in, of what touches; and velocities and impulses, of
+/// Part of the digits that a gap has to be zero in, of what touches; and velocities and impulses, of
 /// what does not move or press.
 const SURE: f64 = 0.75;
 
@@ -44,7 +44,7 @@ impl<const W: usize> Meeting<W> {
         if motion.mechanism.walls.len() < 2 {
             return None;
         }
-        let rounding = -SURE * motion.precision.bits as f64;
+        let rounding = motion.precision.rounding(SURE);
         let touches = |&other: &usize| {
             let row = &motion.mechanism.walls[other].0;
             let gap = distance(motion, row).abs();

@@ -20,7 +20,7 @@ use crate::stepping::search::{Crossing, Powers, crossing};
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
 
-/// Part of the bits carried in which an impact leaves nothing of an approach.
+/// Part of the digits in which an impact leaves nothing of an approach.
 const SURE: f64 = 0.5;
 /// Newton iterations at most; each doubles the digits, at a zero of higher order it adds a part of one.
 const MOST: usize = 1000;
@@ -166,7 +166,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     jumped(motion, &jump);
     // What motors drive there no impulse turns back.
     let after = gap_rate(motion, wall).rate;
-    let is_left = after < Digits::ZERO && (after / approach).log2() > -SURE * motion.precision.bits as f64;
+    let is_left = after < Digits::ZERO && (after / approach).log2() > motion.precision.rounding(SURE);
     if is_left || !after.is_finite() {
         let name = &motion.mechanism.walls[wall].0.name;
         let what = format!("the constraints leave a point that meets wall {name} no way back");

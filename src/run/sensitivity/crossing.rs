@@ -62,6 +62,10 @@ impl Variation {
         let passed = self.passed(jumps)?;
         let before = Arc::clone(&self.mechanism);
         self.met_several |= passed.walls.len() > 1;
+        if let Some(dissipation) = &mut self.dissipation {
+            let restitutions = passed.walls.iter().map(|(wall, _)| before.contacts[*wall].restitution);
+            dissipation.total += restitutions.map(|e| 2.0 * libm::log(e)).sum::<f64>();
+        }
         let t = last.before.time.hi;
         if jumps[0].before.omega != last.after.omega && !passed.late.is_empty() {
             self.jumped.push((t, passed.late));

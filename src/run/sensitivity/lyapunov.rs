@@ -100,7 +100,7 @@ pub fn lyapunov(
         let why = "the constraints leave no freedom: neighbouring motions are the same";
         return Err(SensitivityError::Unsuited(why.into()));
     }
-    variation.dissipation = mechanism.is_damped().then(|| Dissipation::new(&mechanism));
+    variation.dissipation = Some(Dissipation::new(&mechanism));
     // An integral is one unknown: nothing depends on the angle of the rotor that carries it.
     let count = 2 * freedom - mechanism.integrals().count();
     variation.keep_columns(count);
@@ -113,21 +113,18 @@ pub fn lyapunov(
     if !is_through {
         return Err(SensitivityError::Stopped("interrupted".into()));
     }
-    let impacts = variation.impacts.iter().map(|impact| {
-        let wall = mechanism.contacts.iter().find(|contact| contact.row.name == impact.wall);
-        wall.map_or(0.0, |wall| 2.0 * libm::log(wall.restitution))
-    });
-    let logs = impacts.sum::<f64>() + variation.dissipation.as_ref().map_or(0.0, |lost| lost.total);
     let lost = variation.lost.clone().or(orthonormal.lost.take()).or_else(|| {
         let ended = driver.ended_by.as_ref().filter(|name| *name != "observer");
         ended.map(|name| format!("event `{name}` ended the run"))
     });
-    Ok(orthonormal.spectrum(study.scene, logs, lost))
+    Ok(orthonormal.spectrum(study.scene, lost))
 }
 
-/// What dampers and other forces that depend on rates take off volumes in phase space.
+/// What dampers and other forces that depend on rates, and impacts, take off volumes in phase space, as a
+/// logarithm.
 pub(in crate::run) struct Dissipation {
-    kernel: Kernel<f64>,
+    /// Where such forces act.
+    kernel: Option<Kernel<f64>>,
     /// At the nodes of a step \[1/s\].
     pub nodes: Vec<f64>,
     /// Integrated so far.
@@ -136,27 +133,34 @@ pub(in crate::run) struct Dissipation {
 
 impl Dissipation {
     fn new(mechanism: &Mechanism) -> Self {
-        Self { kernel: Kernel::dense(mechanism), nodes: Vec::new(), total: 0.0 }
+        let mut none = Self { kernel: None, nodes: Vec::new(), total: 0.0 };
+        none.hold(mechanism);
+        none
+    }
+
+    /// Goes on beside this mechanism.
+    pub fn hold(&mut self, mechanism: &Mechanism) {
+        self.kernel = mechanism.is_damped().then(|| Kernel::dense(mechanism));
     }
 
     /// Adds tr(W dQ/dw) at a motion to the nodes.
     pub fn look(&mut self, mechanism: &Mechanism, motion: &Motion) {
+        let Some(kernel) = &mut self.kernel else { return self.nodes.push(0.0) };
         let (t, phi, omega) = plain(motion);
         let n = phi.len();
-        self.kernel.linearise_at::<0>(mechanism, t, &phi, &omega);
+        kernel.linearise_at::<0>(mechanism, t, &phi, &omega);
         let columns = mechanism.drag(t, &phi, &omega);
         let mut trace = 0.0;
         for (k, mut column) in columns.into_iter().enumerate() {
-            crate::dynamics::tree::solve::<f64, 0>(n, &self.kernel.mass, &self.kernel.pivot, &mut column);
+            crate::dynamics::tree::solve::<f64, 0>(n, &kernel.mass, &kernel.pivot, &mut column);
             let rows = mechanism.constraints.len();
             for r in 0..rows {
-                self.kernel.multiplier[r] =
-                    self.kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
+                kernel.multiplier[r] = kernel.fold_gradient(r, 0.0, |sum, k, g| sum + g * column[k]);
             }
             if rows > 0 {
-                self.kernel.solve_rows();
-                self.kernel.multiplier_accelerations();
-                column[k] -= self.kernel.load[k];
+                kernel.solve_rows();
+                kernel.multiplier_accelerations();
+                column[k] -= kernel.load[k];
             }
             trace += column[k];
         }
@@ -167,6 +171,8 @@ impl Dissipation {
 /// Keeps columns orthonormal, and adds up how they grow.
 struct Orthonormal {
     kernel: Kernel<f64>,
+    /// The names of the rows that the directions keep.
+    kept: Vec<String>,
     /// ν² \[1/s²\].
     rate: f64,
     count: usize,
@@ -174,7 +180,9 @@ struct Orthonormal {
     logs: Vec<f64>,
     rows: Vec<(f64, Vec<f64>)>,
     next: usize,
+    /// Until when the columns have been followed \[s\], and what has been taken off volumes until then.
     now: f64,
+    dissipated: f64,
     lost: Option<String>,
 }
 
@@ -182,6 +190,7 @@ impl Orthonormal {
     fn new(mechanism: &Mechanism, until: f64, count: usize) -> Self {
         Self {
             kernel: Kernel::dense_without_rows(mechanism),
+            kept: in_force(mechanism).cloned().collect(),
             rate: mechanism.units.time.powi(-2),
             count,
             until,
@@ -189,6 +198,7 @@ impl Orthonormal {
             rows: Vec::new(),
             next: 1,
             now: 0.0,
+            dissipated: 0.0,
             lost: None,
         }
     }
@@ -245,7 +255,7 @@ impl Orthonormal {
         }
     }
 
-    fn spectrum(self, scene: Scene, lost_volume: f64, lost: Option<String>) -> Spectrum {
+    fn spectrum(self, scene: Scene, lost: Option<String>) -> Spectrum {
         let t = self.now.max(f64::MIN_POSITIVE);
         let mean: Vec<f64> = self.logs.iter().map(|log| log / t).collect();
         let mut order: Vec<usize> = (0..mean.len()).collect();
@@ -266,7 +276,7 @@ impl Orthonormal {
             exponents: sorted(&mean),
             errors: sorted(&errors),
             sum: mean.iter().sum(),
-            expected_sum: lost_volume / t,
+            expected_sum: self.dissipated / t,
             regime,
             rows: (rows.iter())
                 .map(|(time, logs)| (*time, sorted(logs).iter().map(|log| log / time).collect()))
@@ -296,6 +306,12 @@ impl Orthonormal {
     }
 }
 
+/// The names of the rows that constrain directions.
+fn in_force(mechanism: &Mechanism) -> impl Iterator<Item = &String> {
+    let redundant = &mechanism.assembly.redundant;
+    mechanism.constraints.iter().map(|row| &row.name).filter(|name| !redundant.contains(name))
+}
+
 fn subtract(columns: &mut [Vec<f64>], from: usize, what: usize, share: f64) {
     let (before, rest) = columns.split_at_mut(from);
     rest[0].iter_mut().zip(&before[what]).for_each(|(entry, other)| *entry -= share * other);
@@ -319,11 +335,15 @@ impl Look for Orthonormal {
         if !variation.mechanism.held.is_empty() {
             return variation.lose("a point stays on its wall, and directions are lost");
         }
+        if !in_force(&variation.mechanism).eq(&self.kept) {
+            return variation.lose("a joint closes or opens, and there are fewer or more directions");
+        }
         if variation.met_several || variation.set.differ() {
             let why = "several walls are met at once, or an event sets a number otherwise beside it, and volumes are not followed";
             return variation.lose(why);
         }
         self.renew(variation, motion);
         self.now = time;
+        self.dissipated = variation.dissipation.as_ref().map_or(0.0, |lost| lost.total);
     }
 }

@@ -79,7 +79,7 @@ pub(in crate::run) struct Variation {
     pub steps: u64,
     /// Why they go no further.
     pub lost: Option<String>,
-    /// What forces that depend on rates take off volumes, where somebody asks.
+    /// What forces that depend on rates, and impacts, take off volumes, where somebody asks.
     pub dissipation: Option<Dissipation>,
 }
 
@@ -200,6 +200,9 @@ impl Variation {
     /// Goes on beside this mechanism.
     pub fn hold(&mut self, mechanism: &Arc<Mechanism>) {
         self.jacobian = Jacobian::new(mechanism);
+        if let Some(dissipation) = &mut self.dissipation {
+            dissipation.hold(mechanism);
+        }
         self.ground = (!mechanism.constraints.is_empty()).then(|| Ground::new(mechanism));
         if let Some(ground) = &mut self.ground {
             ground.engaged.clone_from(&self.engaged);

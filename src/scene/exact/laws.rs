@@ -99,11 +99,9 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// Motors whose aim is a formula of the state.
     pub(super) fn couplings(&self, plain: &Scene) -> Result<Vec<Coupling>, SceneError> {
-        let items = self.root.items("motors");
         let coupling = |plain: &Coupling| {
-            let named = |at: &&Cursor| crate::scene::set::name(at.node) == Some(&plain.name);
-            let at = items.iter().find(named).unwrap_or(&self.root);
-            Ok(Coupling { aim: self.formula(at, "law", &plain.aim)?, ..plain.clone() })
+            let aim = self.formula(&self.motor(&plain.name)?, "law", &plain.aim)?;
+            Ok(Coupling { aim, ..plain.clone() })
         };
         plain.couplings.iter().map(coupling).collect()
     }

@@ -53,6 +53,15 @@ impl<'a, C: Decimal> Reader<'a, C> {
         self.plain_items(list).iter().zip(plain).map(|(at, plain)| part(at, plain)).collect()
     }
 
+    /// The motor of a name: on an angle, on a slider or a gear, which stand in one list.
+    pub(super) fn motor(&self, name: &str) -> Result<Cursor<'a>, SceneError> {
+        let found =
+            self.root.items("motors").into_iter().find(|at| crate::scene::set::name(at.node) == Some(name));
+        found.ok_or_else(|| {
+            self.refuse(&self.root, &format!("has no motor {name}"), "compare with the scene's text")
+        })
+    }
+
     fn bar(&self, at: &Cursor, plain: &Bar) -> Result<Bar<C>, SceneError> {
         let name = plain.name.clone();
         if at.child("mass").is_some() {
@@ -111,10 +120,6 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     pub(super) fn scene(&self, plain: &Scene) -> Result<Scene<C>, SceneError> {
         let bars = 0..plain.own_bars();
-        let motors: Vec<Cursor> =
-            self.root.items("motors").into_iter().filter(|at| at.child("slider").is_none()).collect();
-        let drives: Vec<Cursor> =
-            self.root.items("motors").into_iter().filter(|at| at.child("slider").is_some()).collect();
         let slider = |at: &Cursor, plain: &Slider| {
             let missing = || self.refuse(at, "has no rail", "compare with the scene's text");
             let rail = at.child("rail").ok_or_else(missing)?;
@@ -129,12 +134,13 @@ impl<'a, C: Decimal> Reader<'a, C> {
                 locked: plain.locked,
             })
         };
-        let motor = |(at, plain): (&Cursor, &Motor)| {
-            let law = self.law(at, &plain.law)?;
+        let motor = |plain: &Motor| {
+            let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
             Ok(Motor { name: plain.name.clone(), bar: plain.bar, relative_to: plain.relative_to, law })
         };
-        let drive = |(at, plain): (&Cursor, &Drive)| {
-            Ok(Drive { name: plain.name.clone(), slider: plain.slider, law: self.law(at, &plain.law)? })
+        let drive = |plain: &Drive| {
+            let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
+            Ok(Drive { name: plain.name.clone(), slider: plain.slider, law })
         };
         let wall = |at: &Cursor, plain: &Wall| {
             let line = at.child("line").unwrap_or_else(|| at.clone());
@@ -186,8 +192,8 @@ impl<'a, C: Decimal> Reader<'a, C> {
                     law: torque.law.as_ref().map(|law| self.law(at, law)).transpose()?,
                 })
             })?,
-            motors: motors.iter().zip(&plain.motors).map(motor).collect::<Result<_, SceneError>>()?,
-            drives: drives.iter().zip(&plain.drives).map(drive).collect::<Result<_, SceneError>>()?,
+            motors: plain.motors.iter().map(motor).collect::<Result<_, SceneError>>()?,
+            drives: plain.drives.iter().map(drive).collect::<Result<_, SceneError>>()?,
             couplings: self.couplings(plain)?,
             walls: self.each("walls", &plain.walls, wall)?,
             start: bars.clone().map(|bar| self.start(plain, bar)).collect::<Result<_, _>>()?,
