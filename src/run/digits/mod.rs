@@ -15,7 +15,9 @@ mod motion;
 mod pair;
 mod posture;
 mod precision;
+mod resting;
 mod several;
+mod touch;
 mod wall;
 
 pub use self::growth::{Forecast, forecast, planned};
@@ -24,6 +26,7 @@ pub use self::precision::{DIGITS, Precision};
 
 use self::events::Happened;
 use self::motion::{LongState, Motion};
+use self::resting::Hold;
 use super::magnitude::changes;
 use super::plan::Refusal;
 use crate::arithmetic::digits::{Digits, MOST};
@@ -110,6 +113,17 @@ pub struct LongEvent {
     pub omega: Vec<Wide>,
 }
 
+/// A time a point stayed on its wall, in many digits.
+#[derive(Clone, Debug)]
+pub struct LongHold {
+    /// Name of the wall.
+    pub wall: String,
+    /// Beginning \[s\]: where bounces died out, the time at which infinitely many of them have ended.
+    pub t: Wide,
+    /// End \[s\]; `None`: held to the end of the run.
+    pub until: Option<Wide>,
+}
+
 /// Where a run in many digits is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
@@ -126,6 +140,9 @@ pub struct Saved {
     modes: Vec<bool>,
     off: Vec<String>,
     shifts: Vec<Vec<u64>>,
+    /// Walls that hold a point, and all holds.
+    held: Vec<usize>,
+    holds: Vec<(usize, Vec<Vec<u64>>)>,
 }
 
 impl Saved {
@@ -167,6 +184,9 @@ pub trait LongRun: Send {
 
     /// The events up to the last row that was asked for.
     fn events(&self) -> Vec<LongEvent>;
+
+    /// The times that points stayed on their walls, up to the last row that was asked for.
+    fn holds(&self) -> Vec<LongHold>;
 
     /// The event that has ended the run.
     fn ended_by(&self) -> Option<&str>;
@@ -319,7 +339,8 @@ impl<const W: usize> LongRun for Runner<W> {
     }
 
     fn save(&self) -> Saved {
-        let LongState { t, u, rate, work, jump_energy, steps, impacts, radius, acting } = self.motion.state();
+        let LongState { t, u, rate, work, jump_energy, steps, impacts, radius, acting, holds } =
+            self.motion.state();
         let numbers = [t, work, jump_energy].into_iter().chain(u).chain(rate);
         let words = numbers.map(Digits::to_words).collect();
         let happened = self.motion.watch.happened.iter().map(|Happened { event, t, phi, omega }| {
@@ -337,6 +358,8 @@ impl<const W: usize> LongRun for Runner<W> {
             modes: acting.modes.clone(),
             off: acting.off.clone(),
             shifts: acting.shifts.iter().map(Digits::to_words).collect(),
+            held: acting.held.clone(),
+            holds: holds.iter().map(Hold::to_words).collect(),
         }
     }
 
@@ -358,16 +381,19 @@ impl<const W: usize> LongRun for Runner<W> {
         if saved.sides.len() != self.motion.watch.sides.len() {
             return false;
         }
-        let f = self.motion.state().u.len();
         let (Some(parameters), Some(shifts)) = (numbers_of(&saved.parameters), numbers_of(&saved.shifts))
         else {
             return false;
         };
+        let Some(holds) = saved.holds.iter().map(Hold::from_words).collect::<Option<Vec<_>>>() else {
+            return false;
+        };
         let (&[t, work, jump_energy], rest) = match numbers.split_first_chunk::<3>() {
-            Some(split) if split.1.len() == 2 * f && saved.precision == self.precision() => split,
+            Some(split) if split.1.len() % 2 == 0 && saved.precision == self.precision() => split,
             _ => return false,
         };
-        let (u, rate) = rest.split_at(f);
+        // While points stay on walls there are more coordinates: whether they fit is known of what acts.
+        let (u, rate) = rest.split_at(rest.len() / 2);
         let is_known = self.motion.resume(LongState {
             t,
             u: u.to_vec(),
@@ -377,7 +403,14 @@ impl<const W: usize> LongRun for Runner<W> {
             steps: saved.steps,
             impacts: saved.impacts,
             radius: saved.radius,
-            acting: Acting { parameters, modes: saved.modes.clone(), off: saved.off.clone(), shifts },
+            acting: Acting {
+                parameters,
+                modes: saved.modes.clone(),
+                off: saved.off.clone(),
+                shifts,
+                held: saved.held.clone(),
+            },
+            holds,
         });
         (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
         is_known
@@ -405,6 +438,15 @@ impl<const W: usize> LongRun for Runner<W> {
             omega: resized(&omega),
         };
         motion.watch.until(motion, self.seen).into_iter().map(event).collect()
+    }
+
+    fn holds(&self) -> Vec<LongHold> {
+        let hold = |hold: &Hold<W>| LongHold {
+            wall: self.motion.mechanism.walls[hold.wall].0.name.clone(),
+            t: hold.since.resized(),
+            until: hold.until.map(Digits::resized),
+        };
+        self.motion.state().holds.iter().map(hold).collect()
     }
 
     fn ended_by(&self) -> Option<&str> {

@@ -1,6 +1,6 @@
 //! Runs side by side, from row to row: one, or two with other digits and orders that prove each other.
 
-use super::{LongError, LongEvent, LongRun, Row, Saved, Source, Wide, long_run};
+use super::{LongError, LongEvent, LongHold, LongRun, Row, Saved, Source, Wide, long_run};
 use crate::arithmetic::Real;
 use crate::stepping::StepError;
 use std::time::{Duration, Instant};
@@ -87,6 +87,25 @@ impl Pair {
             };
             let least = found.iter().map(digits).reduce(f64::min);
             (event, least)
+        };
+        best.into_iter().enumerate().map(with_agreement).collect()
+    }
+
+    /// The times that points stayed on walls of the run with the most digits, with the digits to which all agree.
+    pub fn holds(&self) -> Vec<(LongHold, Option<f64>)> {
+        let mut found: Vec<Vec<LongHold>> = self.runs.iter().map(|run| run.holds()).collect();
+        let best = found.pop().unwrap_or_default();
+        let most = self.most();
+        let times = |hold: &LongHold| -> Vec<Wide> { std::iter::once(hold.t).chain(hold.until).collect() };
+        let with_agreement = |(i, hold): (usize, LongHold)| {
+            let digits = |other: &Vec<LongHold>| match other.get(i) {
+                Some(other) if other.wall == hold.wall && other.until.is_some() == hold.until.is_some() => {
+                    agreed(&times(other), &times(&hold)).min(most)
+                }
+                _ => 0.0,
+            };
+            let least = found.iter().map(digits).reduce(f64::min);
+            (hold, least)
         };
         best.into_iter().enumerate().map(with_agreement).collect()
     }
