@@ -86,7 +86,8 @@ impl<const W: usize> Motion<W> {
         // The next series is another one.
         self.state.radius = None;
         let mut gone = Vec::new();
-        for (wall, ((was_off, law, aim), (row, _))) in walls.into_iter().zip(&self.mechanism.walls).enumerate()
+        for (wall, ((was_off, law, aim), (row, _))) in
+            walls.into_iter().zip(&self.mechanism.walls).enumerate()
         {
             let gap = wall::distance(self, row);
             let has_changed = was_off || law != row.law || aim != row.aim;

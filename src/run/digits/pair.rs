@@ -97,17 +97,19 @@ impl Pair {
         let best = found.pop().unwrap_or_default();
         let most = self.most();
         let times = |hold: &LongHold| -> Vec<Wide> { std::iter::once(hold.t).chain(hold.until).collect() };
-        let with_agreement = |(i, hold): (usize, LongHold)| {
-            let digits = |other: &Vec<LongHold>| match other.get(i) {
-                Some(other) if other.wall == hold.wall && other.until.is_some() == hold.until.is_some() => {
-                    agreed(&times(other), &times(&hold)).min(most)
-                }
-                _ => 0.0,
+        let with_agreement = |hold: LongHold| {
+            // More digits follow stays that become ever shorter further.
+            let digits = |other: &Vec<LongHold>| {
+                let is_alike = |other: &&LongHold| {
+                    other.wall == hold.wall && other.until.is_some() == hold.until.is_some()
+                };
+                let alike = other.iter().filter(is_alike).map(|other| agreed(&times(other), &times(&hold)));
+                alike.fold(0.0, f64::max).min(most)
             };
             let least = found.iter().map(digits).reduce(f64::min);
             (hold, least)
         };
-        best.into_iter().enumerate().map(with_agreement).collect()
+        best.into_iter().map(with_agreement).collect()
     }
 
     /// Where all digits are the same, there are no more than the runs have.

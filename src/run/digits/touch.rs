@@ -33,12 +33,7 @@ pub(super) enum Passage<const W: usize> {
 
 /// The first passage of a function within a step of so many seconds, from its powers; values are divided by
 /// `unit`, and of these 2^`least` is near zero.
-pub(super) fn passage<const W: usize>(
-    powers: &[Digits<W>],
-    unit: f64,
-    step: f64,
-    least: f64,
-) -> Passage<W> {
+pub(super) fn passage<const W: usize>(powers: &[Digits<W>], unit: f64, step: f64, least: f64) -> Passage<W> {
     let (mut scale, length) = (Digits::of(1.0 / unit), Digits::of(step));
     let in_shares = |power: &Digits<W>| {
         let share = *power * scale;

@@ -41,10 +41,7 @@ pub enum Ends {
 }
 
 /// What ends a step of so many seconds, and the exact time up to it.
-pub fn first<const W: usize>(
-    motion: &Motion<W>,
-    step: f64,
-) -> Result<Option<(Ends, Digits<W>)>, StepError> {
+pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(Ends, Digits<W>)>, StepError> {
     let (mut found, mut rests): (Option<(Ends, Digits<W>)>, _) = (None, None);
     let mut comes = |ends: Ends, time: Digits<W>| {
         if found.as_ref().is_none_or(|(_, first)| time < *first) {
