@@ -423,3 +423,32 @@ fn a_horizon_beyond_a_hold_is_forecast_and_proved() {
         !pair.holds().is_empty() && pair.holds().iter().all(|(_, digits)| digits.expect("two runs") > 15.0)
     );
 }
+
+/// An arm that lies on a stop is coupled to a disc that turns: upwards it is taken along, as the stop cannot pull, and
+/// downwards the disc is stopped at once.
+#[test]
+fn a_clutch_that_closes_takes_an_arm_off_its_stop_or_is_stopped() {
+    let text = |speed: &str| {
+        format!(
+            r#"{{"name": "clutch", "gravity": [0, -9.81], "bars": [
+                {{"name": "arm", "mass": 1.3, "centre": [0.25, 0], "inertia": 0.04, "length": 0.5}},
+                {{"name": "disc", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}}],
+            "hinges": [
+                {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "arm", "point": [0, 0]}}]}},
+                {{"name": "B", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "disc", "point": [0, 0]}}]}}],
+            "walls": [{{"name": "stop", "body": "arm", "point": [0.5, 0], "restitution": 0, "line": {{"through": [0, 0], "normal": [0, 1]}}}}],
+            "locks": [{{"name": "clutch", "body": "arm", "relative_to": "disc"}}], "inactive": ["clutch"],
+            "events": [{{"name": "grips", "when": "t - 1", "on": ["clutch"]}}],
+            "start": {{"arm": {{"phi": 0, "omega": 0}}, "disc": {{"phi": 0, "omega": {speed}}}}}, "until": 9, "every": 9}}"#
+        )
+    };
+    let down = ran(&text("-2"), "1.25", 40);
+    down.held(&[("stop", BigInt::ZERO, None)], 38);
+    near(&number(down.row.bodies[1][0]), &fixed("-2"), 37);
+    near(&number(down.row.bodies[1][1]), &BigInt::ZERO, 37);
+    let up = ran(&text("2"), "1.25", 40);
+    up.held(&[("stop", BigInt::ZERO, Some(one()))], 37);
+    // I_b ω = (I_a + I_b) ω⁺, I_a = 0.04 + 1.3/16.
+    let energy = over(&fixed("0.5"), &fixed("0.62125"));
+    near(&(number(up.row.energy[0]) + number(up.row.energy[1])), &energy, 37);
+}

@@ -91,7 +91,8 @@ impl Pair {
         best.into_iter().enumerate().map(with_agreement).collect()
     }
 
-    /// The times that points stayed on walls of the run with the most digits, with the digits to which all agree.
+    /// The times that points stayed on walls, of the run with the most digits, with the digits to which all
+    /// agree.
     pub fn holds(&self) -> Vec<(LongHold, Option<f64>)> {
         let mut found: Vec<Vec<LongHold>> = self.runs.iter().map(|run| run.holds()).collect();
         let best = found.pop().unwrap_or_default();

@@ -2,17 +2,17 @@
 //!
 //! ```text
 //! of all points that touch and do not move along their normals, in all digits:
-//! a_c >= 0,  f_c >= 0,  a_c f_c = 0          a = a0 + S f,  S = G M⁻¹ Gᵀ,  a0 = 2 g_2 of the gaps' series without holds
+//! a_c >= 0,  f_c >= 0,  a_c f_c = 0      a = a0 + S f,  S = G M⁻¹ Gᵀ,  a0 = 2 g_2 of the gaps without holds
 //! stays      v²/2a < δ L:  its rebound is lower than the digits carried, δ = 10^(-D-1.5) ((1-e)/2)²
 //! since      t + 2 v/(a (1-e)), when infinitely many bounces would have ended
 //! let go     f_c = -lambda_c(t) = 0, by Newton's iteration on the series of the multiplier
 //! ```
 //!
-//! The laws are those of doubles (`dynamics::contact`, `run::contact`).  A point that stays is held by a row,
-//! the gap of its wall, after all others; all coordinates are integrated then, and the motion goes back to the
-//! independent ones when the last point is let go.  What is left of its normal velocity is taken off it
-//! plastically and booked as that of impacts.  Bounces that are left out last `τ = 2 v/(a (1-e))`; what they
-//! would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
+//! The laws are those of doubles (`dynamics::contact`, `run::contact`).  A point that stays is held by a
+//! row, the gap of its wall, after all others; all coordinates are integrated then, and the motion goes back
+//! to the independent ones when the last point is let go.  What is left of its normal velocity is taken off
+//! it plastically and booked as that of impacts.  Bounces that are left out last `τ = 2 v/(a (1-e))`; what
+//! they would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
 
 use super::keep::Keeper;
 use super::motion::{LongState, Motion};
@@ -130,7 +130,7 @@ pub fn passage<const W: usize>(
     Passage::At(refined(motion, if is_open { powers } else { &powers[1..] }, near))
 }
 
-/// True where a point comes from its wall, or goes there, so slowly that it stays: from the powers of its gap.
+/// True where a point comes from its wall, or goes there, so slowly that it stays: by the powers of its gap.
 fn is_slow<const W: usize>(motion: &Motion<W>, wall: usize, powers: &[Digits<W>]) -> bool {
     let length = libm::log2(motion.mechanism.structure.contacts[wall].length);
     let still = sure(motion) + length - libm::log2(motion.mechanism.structure.units.time);
@@ -164,8 +164,8 @@ pub fn pressure_ends<const W: usize>(motion: &Motion<W>, place: usize, step: f64
     }
 }
 
-/// The wall that would have to pull its point most, of impulses by row; beside one of 2^`most` smaller ones are
-/// rounding.
+/// The wall that would have to pull its point most, of impulses by row; beside one of 2^`most` smaller ones
+/// are rounding.
 pub fn pulled<const W: usize>(motion: &Motion<W>, impulses: &[Digits<W>], most: f64) -> Option<usize> {
     let held = motion.state().acting.held.iter().zip(&impulses[standing(motion)..]);
     let pulled = held.filter(|(_, pull)| **pull > Digits::ZERO && pull.log2() - most > sure(motion));
@@ -258,8 +258,8 @@ impl<const W: usize> Touching<W> {
 }
 
 impl<const W: usize> Motion<W> {
-    /// Finds which of the points that touch stay, where one of them, at `wall`, is pressed or pulled otherwise
-    /// than before.
+    /// Finds which of the points that touch stay, where one of them, at `wall`, is pressed or pulled
+    /// otherwise than before.
     pub(super) fn rest(&mut self, wall: usize) -> Result<(), StepError> {
         let touching = Touching::at(self, wall)?;
         let Some(forces) = touching.forces() else {
@@ -300,11 +300,10 @@ impl<const W: usize> Motion<W> {
             .filter(|(wall, _)| is_new(wall))
             .map(|(&wall, &since)| Hold { wall, since, until: None })
             .collect();
-        for hold in self.state.holds.iter_mut().filter(|hold| hold.until.is_none()) {
-            if !set.contains(&hold.wall) {
-                hold.until = Some(if t < hold.since { hold.since } else { t });
-            }
-        }
+        let goes = |hold: &Hold<W>| hold.until.is_none() && !set.contains(&hold.wall);
+        // What ends before its bounces would have ended has not begun.
+        self.state.holds.retain(|hold| !(goes(hold) && t <= hold.since));
+        self.state.holds.iter_mut().filter(|hold| goes(hold)).for_each(|hold| hold.until = Some(t));
         let has_new = !new.is_empty();
         let room = KEPT.saturating_sub(self.state.holds.len());
         self.state.holds.extend(new.into_iter().take(room));

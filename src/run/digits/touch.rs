@@ -1,8 +1,8 @@
 //! What a function does that begins near zero: its first passage on all scales of time.
 //!
 //! ```text
-//! f(t) = Σ_m f_m t^m,  |f_0| <= δ:   the first of  f = δ (opens, and may pass zero later)  and  f = -δ (sinks)
-//! windows [E/64, E], E = step/64^j, from the one that holds  r = min_m (δ 2^-m / |f_m|)^(1/m):   |f - f_0| < δ up to r
+//! f(t) = Σ_m f_m t^m,  |f_0| <= δ:   the first of  f = δ (opens, may pass zero later)  and  f = -δ (sinks)
+//! windows [E/64, E],  E = step/64^j,  from  r = min_m (δ 2^-m / |f_m|)^(1/m)  on:   |f - f_0| < δ up to r
 //! ```
 //!
 //! In shares of a window the powers are doubles of ordinary size, however small the window is, so that bounds
