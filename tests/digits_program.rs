@@ -91,13 +91,32 @@ fn events_are_written_with_their_agreement() {
     program.run("run events.json --digits 30 --until 1 --every 0.5").exits(0).shows(&["level: at t = "]);
 }
 
-/// What is found out on the way stops the run there: the scene itself is not refused.
+/// A ball that falls on a floor without restitution stays there: when is in the report, with the agreement of both
+/// runs.
 #[test]
-fn a_point_that_stays_on_its_wall_stops_the_run() {
+fn a_point_that_stays_on_its_wall_is_reported() {
     let program = Program::with_scenes(&[]);
     let text = r#"{"name": "ball", "gravity": [0, -10], "bars": [{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 1}],
         "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [0, 1]}}],
         "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 1, "every": 0.1}"#;
     program.write("ball.json", text);
-    program.run("run ball.json --digits 30").exits(4).says(&["t = 0.4472135954999", "stays on wall `floor`"]);
+    program.run("run ball.json --digits 30").exits(0).shows(&["1 impact, 1 stay on"]);
+    let object = program.run("run ball.json --trusted-until 1 --json").exits(0).object();
+    let hold = &object["holds"]["first"][0];
+    assert_eq!((&hold["wall"], &hold["until"]), (&"floor".into(), &serde_json::Value::Null));
+    assert!(hold["t"].as_str().is_some_and(|t| t.starts_with("0.44721359549995793")), "{hold}");
+    assert!(hold["agreement_digits"].as_f64().is_some_and(|digits| digits > 20.0), "{hold}");
+}
+
+/// What is found out on the way stops the run there: the scene itself is not refused.
+#[test]
+fn a_point_that_is_squeezed_by_a_motor_stops_the_run() {
+    let program = Program::with_scenes(&[]);
+    let text = r#"{"name": "arm", "gravity": [0, -10], "bars": [{"name": "arm", "mass": 2, "centre": [0.5, 0], "inertia": 1, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]}],
+        "motors": [{"name": "drive", "body": "arm", "law": {"start": 0.5, "rate": -1}}],
+        "walls": [{"name": "floor", "body": "arm", "point": [1, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "start": {}, "until": 1, "every": 0.1}"#;
+    program.write("arm.json", text);
+    program.run("run arm.json --digits 30").exits(4).says(&["t = 0.5", "no way back"]);
 }

@@ -242,6 +242,11 @@ impl<T: SeriesNumber> Series<T> {
         self.order = order.min(self.omega.len() / self.elements - 1);
     }
 
+    /// Number of elements n.
+    pub fn elements(&self) -> usize {
+        self.elements
+    }
+
     /// Number of coordinates f.
     pub fn coordinates(&self) -> usize {
         self.partition.count()

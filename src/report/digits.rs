@@ -4,7 +4,7 @@ use super::page::{Page, counted, figure, magnitude};
 use crate::arithmetic::Real;
 use crate::arithmetic::digits::Layout as Decimals;
 use crate::dynamics::Mechanism;
-use crate::run::digits::{Forecast, LongEvent, Pair, Row, Source, Wide};
+use crate::run::digits::{Forecast, LongEvent, LongHold, Pair, Row, Source, Wide};
 use crate::run::files::sha256;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -269,7 +269,22 @@ pub fn object(shown: &Shown) -> Value {
     if super::events::has_any(&source.mechanism) {
         object["events"] = json!({"count": events.len(), "ended_by": shown.ended_by(), "first": first});
     }
+    if let Some(holds) = holds(pair, layout) {
+        object["holds"] = holds;
+    }
     object
+}
+
+/// The times that points stayed on their walls, where any did.
+fn holds(pair: &Pair, layout: &Layout) -> Option<Value> {
+    let holds = Some(pair.holds()).filter(|holds| !holds.is_empty())?;
+    let first: Vec<Value> = (holds.iter().take(super::events::NAMED))
+        .map(|(LongHold { wall, t, until }, agreement)| {
+            let text = |t: &Wide| decimal(t, layout.digits(*agreement));
+            json!({"wall": wall, "t": text(t), "until": until.as_ref().map(text), "agreement_digits": agreement})
+        })
+        .collect();
+    Some(json!({"count": holds.len(), "first": first}))
 }
 
 /// The record of a run: the report, the scene, versions; what depends on the clock stands apart.
@@ -301,6 +316,10 @@ pub fn text(shown: &Shown) -> String {
         );
         if !source.mechanism.contacts.is_empty() {
             words += &format!(", {}", counted(impacts, "impact", "impacts"));
+            let holds = run.holds().len() as u64;
+            if holds > 0 {
+                words += &format!(", {} on walls", counted(holds, "stay", "stays"));
+            }
         }
         page.entry("method", &words);
     }

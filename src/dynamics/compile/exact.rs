@@ -79,6 +79,8 @@ pub struct Acting<C> {
     pub off: Vec<String>,
     /// How far motors, and locks without an angle, go on from what they said, row by row \[rad, m\].
     pub shifts: Vec<C>,
+    /// Walls on which a point stays, in the order of their rows, which are the last.
+    pub held: Vec<usize>,
 }
 
 /// An event.
@@ -146,6 +148,7 @@ impl<C: Decimal> ExactMechanism<C> {
             },
             off: structure.resting().to_vec(),
             shifts: vec![C::ZERO; constraints.len()],
+            held: Vec::new(),
         };
         let event = |event: &SceneEvent| ExactEvent {
             name: event.name.clone(),
@@ -199,8 +202,12 @@ impl<C: Decimal> ExactMechanism<C> {
         let mut next = self.clone();
         let acts = |name: &String| !acting.off.contains(name);
         if acting.off != self.structure.resting() {
-            let whole = self.structure.with_all_parts().clone();
+            let whole = self.structure.with_all_parts();
+            let whole = if whole.held.is_empty() { whole.clone() } else { whole.holding(&[]) };
             next.structure = Arc::new(whole.acting(&acting.off)?);
+        }
+        if acting.held != next.structure.held {
+            next.structure = Arc::new(next.structure.holding(&acting.held));
         }
         let AllParts { springs, torsions, actions, constraints } = &*self.all;
         next.springs = springs.iter().filter(|spring| acts(&spring.name)).cloned().collect();
@@ -239,6 +246,7 @@ impl<C: Decimal> ExactMechanism<C> {
                 row.release(next.bodies.len());
             }
         }
+        next.constraints.extend(acting.held.iter().map(|&wall| next.walls[wall].0.clone()));
         next.acting = acting;
         Ok(next)
     }

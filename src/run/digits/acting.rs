@@ -9,8 +9,9 @@ use super::confirm::Probe;
 use super::events::Watch;
 use super::functions::Functions;
 use super::keep::Keeper;
-use super::motion::{LongState, Motion};
+use super::motion::{LongState, Motion, coordinates_of};
 use super::posture::Posture;
+use super::resting;
 use super::wall;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -84,9 +85,15 @@ impl<const W: usize> Motion<W> {
         self.state.acting = acting;
         // The next series is another one.
         self.state.radius = None;
-        for ((was_off, law, aim), (row, _)) in walls.into_iter().zip(&self.mechanism.walls) {
+        let mut gone = Vec::new();
+        for (wall, ((was_off, law, aim), (row, _))) in
+            walls.into_iter().zip(&self.mechanism.walls).enumerate()
+        {
             let gap = wall::distance(self, row);
             let has_changed = was_off || law != row.law || aim != row.aim;
+            if self.is_off(row) || has_changed && !self.follows(wall, gap) {
+                gone.push(wall);
+            }
             if has_changed
                 && !self.is_off(row)
                 && gap < Digits::of(-BEHIND * self.mechanism.structure.size_of_parts())
@@ -98,6 +105,7 @@ impl<const W: usize> Motion<W> {
                 return Err(unsuited(self, &what, hint));
             }
         }
+        self.let_go(&gone)?;
         let kept = self.kept(&closing);
         self.close(&closing)?;
         let after = self.state_posture();
@@ -117,6 +125,15 @@ impl<const W: usize> Motion<W> {
     pub(super) fn exchange(&mut self, acting: &Acting<Digits<W>>) -> Result<(), CompileError> {
         let mechanism = self.mechanism.with(acting.clone())?;
         let order = self.precision.order;
+        let coordinates = coordinates_of(&mechanism);
+        if coordinates != self.coordinates {
+            // A point that stays on its wall needs all coordinates.
+            let Posture { phi, omega, .. } = self.state_posture();
+            self.coordinates = coordinates;
+            let none = [vec![false; phi.len()], vec![false; phi.len()]];
+            (self.state.u, self.state.rate) = self.independent(&phi, &omega, &none);
+            self.zeros = vec![Digits::ZERO; self.state.u.len()];
+        }
         self.series = Series::of_terms(&mechanism.terms(), self.coordinates, order);
         self.series.keep(self.kept.clone());
         self.probe = Probe::of(&mechanism, self.coordinates);
@@ -174,15 +191,27 @@ impl<const W: usize> Motion<W> {
                 return Err(self.stop(Cause::Unsuited, 0.0, &what, "let the event be where it meets"));
             }
         }
-        let LongState { t, u, rate, .. } = &mut self.state;
-        let work = self.keeper.close(&self.mechanism, *t, u, rate);
+        let work = loop {
+            let LongState { t, u, rate, .. } = &self.state;
+            let mut after = rate.clone();
+            let (work, impulses) = self.keeper.close(&self.mechanism, *t, u, &mut after);
+            let most = impulses.iter().map(Digits::log2).fold(f64::NEG_INFINITY, f64::max);
+            // A point that its wall would have to pull is let go.
+            match resting::pulled(self, &impulses, most) {
+                Some(pulled) => self.let_go(&[pulled])?,
+                None => {
+                    self.state.rate = after;
+                    break work;
+                }
+            }
+        };
         self.state.work += work;
         self.state.jump_energy -= work;
         self.settle()
     }
 
     /// Kinetic and potential energy of the state \[J\].
-    fn energy(&self) -> Digits<W> {
+    pub(super) fn energy(&self) -> Digits<W> {
         let Posture { phi, omega, .. } = self.state_posture();
         let z = self.mechanism.elements(&phi);
         let [kinetic, potential] = self.mechanism.energy(&phi, &omega, &z);

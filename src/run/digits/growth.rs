@@ -112,6 +112,10 @@ fn measured(
     until: f64,
     pause: &mut dyn FnMut() -> bool,
 ) -> Result<Option<f64>, StepError> {
+    // What rests on a wall from the start on is held before the two part.
+    if !motion.reach(Digits::ZERO, pause)? {
+        return Ok(None);
+    }
     let start = motion.state().clone();
     let mut other = motion.beside();
     let mut shifted = start.clone();
@@ -127,6 +131,10 @@ fn measured(
             return Ok(None);
         }
         let (here, there) = (motion.state_at(t), other.state_at(t));
+        // Where a point stays on its wall in one of them only, they are no neighbours for that time.
+        if here.acting.held != there.acting.held {
+            continue;
+        }
         let apart = distance(&here, &there);
         let now = total + libm::log(apart / from);
         if now.is_finite() {

@@ -215,7 +215,7 @@ impl<const W: usize> Keeper<W> {
     }
 
     /// Lets rows take hold at a posture: changes the rates to the nearest in kinetic energy that all of them
-    /// allow, and returns the work of motors \[J\].
+    /// allow, and returns the work of motors \[J\] and the impulses sigma.
     ///
     /// ```text
     /// M (w⁺ - w⁻) + Gᵀ sigma = 0,   G w⁺ = s'(t)         work = -sigma · s'
@@ -226,25 +226,28 @@ impl<const W: usize> Keeper<W> {
         t: Digits<W>,
         phi: &[Digits<W>],
         omega: &mut [Digits<W>],
-    ) -> Digits<W> {
+    ) -> (Digits<W>, Vec<Digits<W>>) {
         let residuals = self.residuals(mechanism, t, phi, omega);
         self.factor(mechanism, phi);
         let mut impulses: Vec<_> = residuals.iter().map(|residual| residual[1]).collect();
         self.take_off(&mut impulses, omega);
         let z = mechanism.elements(phi);
         let at = Posture { phi, z: &z, omega };
-        let driven = mechanism.constraints.iter().zip(impulses);
-        driven.fold(Digits::ZERO, |work, (row, impulse)| work - impulse * travel_rate(row, t, at))
+        let driven = mechanism.constraints.iter().zip(&impulses);
+        let work =
+            driven.fold(Digits::ZERO, |work, (row, &impulse)| work - impulse * travel_rate(row, t, at));
+        (work, impulses)
     }
 
-    /// The change of the rates by an impulse of one along `gradient`, the constraints kept; all at a posture.
+    /// The change of the rates by an impulse of one along `gradient`, the constraints kept, and the impulses
+    /// sigma of these; all at a posture.
     pub(super) fn response(
         &mut self,
         mechanism: &ExactMechanism<Digits<W>>,
         t: Digits<W>,
         [phi, omega]: [&[Digits<W>]; 2],
         gradient: &[Digits<W>],
-    ) -> Vec<Digits<W>> {
+    ) -> (Vec<Digits<W>>, Vec<Digits<W>>) {
         self.residuals(mechanism, t, phi, omega);
         self.factor(mechanism, phi);
         let n = phi.len();
@@ -256,7 +259,7 @@ impl<const W: usize> Keeper<W> {
             .map(|row| row.iter().zip(&response).fold(Digits::ZERO, |sum, (&a, &b)| sum + a * b))
             .collect();
         self.take_off(&mut along, &mut response);
-        response
+        (response, along)
     }
 }
 

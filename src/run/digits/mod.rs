@@ -15,15 +15,20 @@ mod motion;
 mod pair;
 mod posture;
 mod precision;
+mod resting;
 mod several;
+mod shown;
+mod touch;
 mod wall;
 
 pub use self::growth::{Forecast, forecast, planned};
 pub use self::pair::{Pair, Progress};
 pub use self::precision::{DIGITS, Precision};
+pub use self::shown::{LongEvent, LongHold, Row};
 
 use self::events::Happened;
 use self::motion::{LongState, Motion};
+use self::resting::Hold;
 use super::magnitude::changes;
 use super::plan::Refusal;
 use crate::arithmetic::digits::{Digits, MOST};
@@ -72,44 +77,6 @@ pub enum LongError {
     Step(#[from] StepError),
 }
 
-/// What there is to know at an output time.
-#[derive(Clone, Debug)]
-pub struct Row {
-    /// Its number, from 0.
-    pub number: u64,
-    /// Time \[s\].
-    pub t: Wide,
-    /// Of every body: angle \[rad\], not wrapped, and rate \[rad/s\], position of the centre of mass \[m\]
-    /// and its velocity \[m/s\].
-    pub bodies: Vec<[Wide; 6]>,
-    /// Kinetic and potential energy, and the work of motors, dampers and applied forces \[J\].
-    pub energy: [Wide; 3],
-    /// Energy less work and what impacts took, less that at the start, over the energy scale.
-    pub drift: f64,
-    /// Largest residual of the constraints \[rad or m\] and of its rate.
-    pub residual: [f64; 2],
-}
-
-impl Row {
-    /// Time \[s\], as a double.
-    pub fn time(&self) -> f64 {
-        self.t.value()
-    }
-}
-
-/// An event of a run in many digits.
-#[derive(Clone, Debug)]
-pub struct LongEvent {
-    /// Its name.
-    pub name: String,
-    /// Time \[s\].
-    pub t: Wide,
-    /// Angles of all bodies, not wrapped, then positions of origins \[rad, m\].
-    pub phi: Vec<Wide>,
-    /// Their rates \[rad/s, m/s\].
-    pub omega: Vec<Wide>,
-}
-
 /// Where a run in many digits is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Saved {
@@ -126,6 +93,9 @@ pub struct Saved {
     modes: Vec<bool>,
     off: Vec<String>,
     shifts: Vec<Vec<u64>>,
+    /// Walls that hold a point, and all holds.
+    held: Vec<usize>,
+    holds: Vec<(usize, Vec<Vec<u64>>)>,
 }
 
 impl Saved {
@@ -167,6 +137,9 @@ pub trait LongRun: Send {
 
     /// The events up to the last row that was asked for.
     fn events(&self) -> Vec<LongEvent>;
+
+    /// The times that points stayed on their walls, up to the last row that was asked for.
+    fn holds(&self) -> Vec<LongHold>;
 
     /// The event that has ended the run.
     fn ended_by(&self) -> Option<&str>;
@@ -319,7 +292,8 @@ impl<const W: usize> LongRun for Runner<W> {
     }
 
     fn save(&self) -> Saved {
-        let LongState { t, u, rate, work, jump_energy, steps, impacts, radius, acting } = self.motion.state();
+        let LongState { t, u, rate, work, jump_energy, steps, impacts, radius, acting, holds } =
+            self.motion.state();
         let numbers = [t, work, jump_energy].into_iter().chain(u).chain(rate);
         let words = numbers.map(Digits::to_words).collect();
         let happened = self.motion.watch.happened.iter().map(|Happened { event, t, phi, omega }| {
@@ -337,6 +311,8 @@ impl<const W: usize> LongRun for Runner<W> {
             modes: acting.modes.clone(),
             off: acting.off.clone(),
             shifts: acting.shifts.iter().map(Digits::to_words).collect(),
+            held: acting.held.clone(),
+            holds: holds.iter().map(Hold::to_words).collect(),
         }
     }
 
@@ -358,16 +334,19 @@ impl<const W: usize> LongRun for Runner<W> {
         if saved.sides.len() != self.motion.watch.sides.len() {
             return false;
         }
-        let f = self.motion.state().u.len();
         let (Some(parameters), Some(shifts)) = (numbers_of(&saved.parameters), numbers_of(&saved.shifts))
         else {
             return false;
         };
+        let Some(holds) = saved.holds.iter().map(Hold::from_words).collect::<Option<Vec<_>>>() else {
+            return false;
+        };
         let (&[t, work, jump_energy], rest) = match numbers.split_first_chunk::<3>() {
-            Some(split) if split.1.len() == 2 * f && saved.precision == self.precision() => split,
+            Some(split) if split.1.len() % 2 == 0 && saved.precision == self.precision() => split,
             _ => return false,
         };
-        let (u, rate) = rest.split_at(f);
+        // While points stay on walls there are more coordinates: whether they fit is known of what acts.
+        let (u, rate) = rest.split_at(rest.len() / 2);
         let is_known = self.motion.resume(LongState {
             t,
             u: u.to_vec(),
@@ -377,7 +356,14 @@ impl<const W: usize> LongRun for Runner<W> {
             steps: saved.steps,
             impacts: saved.impacts,
             radius: saved.radius,
-            acting: Acting { parameters, modes: saved.modes.clone(), off: saved.off.clone(), shifts },
+            acting: Acting {
+                parameters,
+                modes: saved.modes.clone(),
+                off: saved.off.clone(),
+                shifts,
+                held: saved.held.clone(),
+            },
+            holds,
         });
         (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
         is_known
@@ -405,6 +391,15 @@ impl<const W: usize> LongRun for Runner<W> {
             omega: resized(&omega),
         };
         motion.watch.until(motion, self.seen).into_iter().map(event).collect()
+    }
+
+    fn holds(&self) -> Vec<LongHold> {
+        let hold = |hold: &Hold<W>| LongHold {
+            wall: self.motion.mechanism.walls[hold.wall].0.name.clone(),
+            t: hold.since.resized(),
+            until: hold.until.map(Digits::resized),
+        };
+        self.motion.state().holds.iter().map(hold).collect()
     }
 
     fn ended_by(&self) -> Option<&str> {

@@ -17,7 +17,8 @@ use super::events::Watch;
 use super::functions::Functions;
 use super::keep::Keeper;
 use super::precision::Precision;
-use super::wall;
+use super::resting::Hold;
+use super::wall::{self, Ends};
 use crate::arithmetic::digits::{Digits, Scale};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
@@ -30,6 +31,8 @@ use crate::stepping::{Cause, StepError};
 const SLACK: f64 = 0.25;
 /// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
 const WORK: f64 = 10.0;
+/// Changes of what is held at one moment, beyond four a wall.
+const ROUNDS: usize = 16;
 /// Powers the step is taken from: by symmetry some of them may vanish.
 pub(super) const JUDGES: usize = 5;
 
@@ -55,6 +58,8 @@ pub struct LongState<const W: usize> {
     pub radius: Option<f64>,
     /// What acts.
     pub acting: Acting<Digits<W>>,
+    /// Times that points stayed on their walls.
+    pub holds: Vec<Hold<W>>,
 }
 
 /// A mechanism in motion.
@@ -71,16 +76,16 @@ pub struct Motion<const W: usize> {
     pub(super) watch: Watch<W>,
     /// The branches of formulas.
     pub(super) branches: Branches<W>,
-    /// The step the series is to make, where it is that of the state: its length \[s\], and the wall it ends
-    /// on.
-    step: Option<(Digits<W>, Option<usize>)>,
+    /// The step the series is to make, where it is that of the state: its length \[s\], and what it ends with
+    /// at a wall.
+    step: Option<(Digits<W>, Option<Ends>)>,
     /// The radius its series has: see [`LongState`].
     radius: Option<f64>,
     /// Limbs that each power is kept to.
     pub(super) kept: Vec<usize>,
     /// Steps may be as long at most \[s\].
     longest: f64,
-    zeros: Vec<Digits<W>>,
+    pub(super) zeros: Vec<Digits<W>>,
 }
 
 impl<const W: usize> Motion<W> {
@@ -94,9 +99,7 @@ impl<const W: usize> Motion<W> {
         precision: Precision,
         until: f64,
     ) -> Result<Self, StepError> {
-        let structure = &mechanism.structure;
-        let coordinates =
-            if structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent };
+        let coordinates = coordinates_of(&mechanism);
         let mut series = Series::of_terms(&mechanism.terms(), coordinates, precision.order);
         let kept = precision.kept();
         series.keep(kept.clone());
@@ -126,6 +129,7 @@ impl<const W: usize> Motion<W> {
                 impacts: 0,
                 radius: None,
                 acting: mechanism.acting.clone(),
+                holds: Vec::new(),
             },
             mechanism,
         };
@@ -177,8 +181,13 @@ impl<const W: usize> Motion<W> {
             let fits = |acting: &Acting<Digits<W>>| {
                 (acting.parameters.len(), acting.modes.len(), acting.shifts.len())
             };
-            fits(&state.acting) == fits(&self.mechanism.acting) && self.exchange(&state.acting).is_ok()
+            let walls = self.mechanism.walls.len();
+            fits(&state.acting) == fits(&self.mechanism.acting)
+                && state.acting.held.iter().all(|&wall| wall < walls)
+                && state.acting.held.is_sorted_by(|a, b| a < b)
+                && self.exchange(&state.acting).is_ok()
         };
+        let is_known = is_known && state.u.len() == self.zeros.len();
         self.state = state;
         self.step = None;
         is_known
@@ -198,17 +207,21 @@ impl<const W: usize> Motion<W> {
     /// step where `pause` is true.  True where it is there.
     ///
     /// # Errors
-    /// The series is not finite, steps become too small, or a point stays on its wall.
+    /// The series is not finite, or steps become too small.
     pub fn reach(&mut self, until: Digits<W>, pause: &mut dyn FnMut() -> bool) -> Result<bool, StepError> {
         loop {
-            let (step, wall) = self.ready()?;
+            let (step, ends) = self.ready()?;
             if until <= self.state.t + step || self.end().is_some() {
                 return Ok(true);
             }
             let change = self.watch.change(&self.mechanism);
             self.watched(Watch::pass);
             self.advance(step)?;
-            wall.map_or(Ok(()), |wall| wall::impact(self, wall))?;
+            match ends {
+                Some(Ends::Met(wall)) => wall::impact(self, wall)?,
+                Some(Ends::Let(wall)) => self.let_go(&[wall])?,
+                _ => {}
+            }
             change.map_or(Ok(()), |event| self.change(event))?;
             if pause() {
                 return Ok(false);
@@ -229,25 +242,39 @@ impl<const W: usize> Motion<W> {
         self.watch.stop(&self.mechanism).map(|(event, after)| (event, self.state.t + after))
     }
 
-    /// The series of the state, and the length of the step it makes, which ends where a wall is met, a formula
-    /// has a corner, or an event changes what acts.
-    fn ready(&mut self) -> Result<(Digits<W>, Option<usize>), StepError> {
+    /// The series of the state, and the length of the step it makes, which ends where a wall is met or lets its
+    /// point go, a formula has a corner, or an event changes what acts.
+    fn ready(&mut self) -> Result<(Digits<W>, Option<Ends>), StepError> {
         if let Some(step) = self.step {
             return Ok(step);
         }
-        let step = self.on_its_branches()?;
-        let mut end = match self.branches.change(self, step) {
-            Some(corner) => (corner, None),
-            None => (Digits::of(step), None),
-        };
-        if let Some((wall, length)) = wall::first(self, end.0.value())? {
-            end = (length, Some(wall));
+        for _ in 0..ROUNDS + 4 * self.mechanism.walls.len() {
+            let step = self.on_its_branches()?;
+            let mut end = match self.branches.change(self, step) {
+                Some(corner) => (corner, None),
+                None => (Digits::of(step), None),
+            };
+            match wall::first(self, end.0.value())? {
+                // What acts is another thing then.
+                Some((Ends::Rests(wall), _)) => {
+                    self.rest(wall)?;
+                    continue;
+                }
+                Some((Ends::Let(wall), length)) if length <= Digits::ZERO => {
+                    self.let_go(&[wall])?;
+                    continue;
+                }
+                Some((ends, length)) => end = (length, Some(ends)),
+                None => {}
+            }
+            if let Some(event) = self.watched(|watch, motion| watch.look(motion, [end.0.value(), step])) {
+                end = (event, end.1.filter(|_| event >= end.0));
+            }
+            self.step = Some(end);
+            return Ok(end);
         }
-        if let Some(event) = self.watched(|watch, motion| watch.look(motion, [end.0.value(), step])) {
-            end = (event, end.1.filter(|_| event >= end.0));
-        }
-        self.step = Some(end);
-        Ok(end)
+        let what = "points at walls are held and let go without end";
+        Err(self.stop(Cause::RestingContact, 0.0, what, "move one of the walls, or end the run before"))
     }
 
     /// Expands the state and all functions, and tells how long a step the series makes \[s\].
@@ -399,6 +426,11 @@ impl<const W: usize> Motion<W> {
         }
         sum.shortened(self.precision.limbs)
     }
+}
+
+/// The coordinates that a mechanism is integrated in.
+pub(super) fn coordinates_of<const W: usize>(mechanism: &ExactMechanism<Digits<W>>) -> Coordinates {
+    if mechanism.structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent }
 }
 
 /// A step with few bits, so that times have few: 2⁻²⁰ of its size is cut off.

@@ -1,6 +1,6 @@
 //! Runs side by side, from row to row: one, or two with other digits and orders that prove each other.
 
-use super::{LongError, LongEvent, LongRun, Row, Saved, Source, Wide, long_run};
+use super::{LongError, LongEvent, LongHold, LongRun, Row, Saved, Source, Wide, long_run};
 use crate::arithmetic::Real;
 use crate::stepping::StepError;
 use std::time::{Duration, Instant};
@@ -89,6 +89,28 @@ impl Pair {
             (event, least)
         };
         best.into_iter().enumerate().map(with_agreement).collect()
+    }
+
+    /// The times that points stayed on walls, of the run with the most digits, with the digits to which all
+    /// agree.
+    pub fn holds(&self) -> Vec<(LongHold, Option<f64>)> {
+        let mut found: Vec<Vec<LongHold>> = self.runs.iter().map(|run| run.holds()).collect();
+        let best = found.pop().unwrap_or_default();
+        let most = self.most();
+        let times = |hold: &LongHold| -> Vec<Wide> { std::iter::once(hold.t).chain(hold.until).collect() };
+        let with_agreement = |hold: LongHold| {
+            // More digits follow stays that become ever shorter further.
+            let digits = |other: &Vec<LongHold>| {
+                let is_alike = |other: &&LongHold| {
+                    other.wall == hold.wall && other.until.is_some() == hold.until.is_some()
+                };
+                let alike = other.iter().filter(is_alike).map(|other| agreed(&times(other), &times(&hold)));
+                alike.fold(0.0, f64::max).min(most)
+            };
+            let least = found.iter().map(digits).reduce(f64::min);
+            (hold, least)
+        };
+        best.into_iter().map(with_agreement).collect()
     }
 
     /// Where all digits are the same, there are no more than the runs have.

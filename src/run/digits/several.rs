@@ -11,6 +11,7 @@
 //! digits.  Walls whose point does not approach have no restitution.
 
 use super::motion::Motion;
+use super::resting::Unheld;
 use super::wall::{Jump, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -18,7 +19,7 @@ use crate::dynamics::kernel::dot;
 use crate::stepping::{Cause, StepError};
 
 /// Walls that are taken at once.
-const MOST: usize = 12;
+pub(super) const MOST: usize = 12;
 /// Part of the digits that a gap has to be zero in, of what touches; and velocities and impulses, of
 /// what does not move or press.
 const SURE: f64 = 0.75;
@@ -76,10 +77,12 @@ impl<const W: usize> Meeting<W> {
             return Err(motion.stop(Cause::Unsuited, 0.0, &what, "leave out walls that others imply"));
         }
         let (t, posture) = (motion.state().t, motion.state_posture());
+        // Points that stay on walls take part as all others that touch.
+        let Unheld { mechanism, mut keeper } = Unheld::of(motion)?;
         let responses: Vec<Vec<Digits<W>>> = (self.gradients.iter())
             .map(|gradient| {
                 let at = [&posture.phi[..], &posture.omega[..]];
-                motion.keeper.response(&motion.mechanism, t, at, gradient)
+                keeper.response(&mechanism, t, at, gradient).0
             })
             .collect();
         let matrix: Vec<Vec<Digits<W>>> = (self.gradients.iter())
@@ -107,17 +110,18 @@ impl<const W: usize> Meeting<W> {
 }
 
 /// log2 of the largest of numbers.
-fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
+pub(super) fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
     numbers.iter().fold(f64::NEG_INFINITY, |most, number| most.max(number.log2()))
 }
 
-/// The complementarity problem.
-struct Problem<const W: usize> {
+/// The complementarity problem, of impulses and velocities, or of forces and accelerations.
+pub(super) struct Problem<const W: usize> {
     /// A \[1/kg\].
-    matrix: Vec<Vec<Digits<W>>>,
+    pub matrix: Vec<Vec<Digits<W>>>,
     /// log2 of a velocity that is rounding.
-    still: f64,
-    rounding: f64,
+    pub still: f64,
+    /// log2 of the part of a number that is rounding.
+    pub rounding: f64,
 }
 
 impl<const W: usize> Problem<W> {
@@ -133,12 +137,12 @@ impl<const W: usize> Problem<W> {
     }
 
     /// Velocities after impulses.
-    fn after(&self, velocity: &[Digits<W>], impulse: &[Digits<W>]) -> Vec<Digits<W>> {
+    pub fn after(&self, velocity: &[Digits<W>], impulse: &[Digits<W>]) -> Vec<Digits<W>> {
         self.matrix.iter().zip(velocity).map(|(row, &v)| v + dot(row, impulse)).collect()
     }
 
     /// The impulses of a phase from these velocities on, none below the least.
-    fn phase(&self, from: &[Digits<W>], least: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
+    pub fn phase(&self, from: &[Digits<W>], least: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
         (0..1_usize << from.len()).find_map(|free| {
             let pressed: Vec<usize> = (0..from.len()).filter(|i| free >> i & 1 == 0).collect();
             let impulse = self.pressed(from, least, &pressed)?;
@@ -155,7 +159,12 @@ impl<const W: usize> Problem<W> {
 
     /// The impulses after which the points of these walls stand still, the others with the least; `None`
     /// where there are none.
-    fn pressed(&self, from: &[Digits<W>], least: &[Digits<W>], pressed: &[usize]) -> Option<Vec<Digits<W>>> {
+    pub fn pressed(
+        &self,
+        from: &[Digits<W>],
+        least: &[Digits<W>],
+        pressed: &[usize],
+    ) -> Option<Vec<Digits<W>>> {
         let mut impulse = least.to_vec();
         pressed.iter().for_each(|&i| impulse[i] = Digits::ZERO);
         let known = self.after(from, &impulse);

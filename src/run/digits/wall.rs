@@ -7,57 +7,99 @@
 //! ```
 //!
 //! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12
-//! of the length of a contact are not told from touching.
+//! of the length of a contact are not told from touching, but for those that begin so: see module `touch`.
 
 use super::motion::Motion;
+use super::resting::{self, Released};
 use super::several::Meeting;
+use super::touch::Passage;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::constraint::{Aim, ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::dot;
-use crate::dynamics::series::Constants;
-use crate::stepping::search::{Crossing, Powers, crossing};
+use crate::dynamics::series::{Constants, Series};
+use crate::stepping::search::{Crossing, Powers, TOUCH, crossing};
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
 
 /// Part of the digits in which an impact leaves nothing of an approach.
 const SURE: f64 = 0.5;
+/// Height of a rebound over the length of the contact from which on it is looked for in doubles.
+const LEAST_REBOUND: f64 = 1e-9;
 /// Newton iterations at most; each doubles the digits, at a zero of higher order it adds a part of one.
 const MOST: usize = 1000;
 
-/// The first wall within a step of so many seconds, and the exact time up to it.
-pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(usize, Digits<W>)>, StepError> {
-    let mut found: Option<(usize, Digits<W>)> = None;
+/// What a step ends with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Ends {
+    /// A point meets this wall.
+    Met(usize),
+    /// This wall lets its point go, which has stayed on it.
+    Let(usize),
+    /// It cannot begin: a point that touches this wall, or stays on it, is pressed or pulled otherwise now.
+    Rests(usize),
+}
+
+/// What ends a step of so many seconds, and the exact time up to it.
+pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(Ends, Digits<W>)>, StepError> {
+    let (mut found, mut rests): (Option<(Ends, Digits<W>)>, _) = (None, None);
+    let mut comes = |ends: Ends, time: Digits<W>| {
+        if found.as_ref().is_none_or(|(_, first)| time < *first) {
+            found = Some((ends, time));
+        }
+    };
     for (wall, (row, _)) in motion.mechanism.walls.iter().enumerate() {
-        if motion.is_off(row) {
+        if motion.is_off(row) || motion.state().acting.held.contains(&wall) {
             continue;
         }
-        let powers = gap(motion, row);
+        let powers = gap(&motion.series, motion.state.t, row);
         let length = motion.mechanism.structure.contacts[wall].length;
         let shares = in_shares(&powers, 1.0 / length, step);
+        if is_near(&shares) {
+            match resting::passage(motion, wall, &powers, step) {
+                Passage::Nothing => {}
+                Passage::At(time) => comes(Ends::Met(wall), time),
+                Passage::Sinks if resting::is_struck(motion, wall, &powers) => {
+                    comes(Ends::Met(wall), Digits::ZERO);
+                }
+                Passage::Sinks => rests = rests.or(Some(wall)),
+            }
+            continue;
+        }
         let from = match crossing(&Powers { powers: &shares, end: 1.0 }, 1.0) {
             Crossing::Nothing => continue,
             Crossing::At(share) => share * step,
             Crossing::Inside(_) if shares.get(1).is_some_and(|&slope| slope < 0.0) => 0.0,
             Crossing::Inside(_) => {
-                let name = &row.name;
-                let what = format!(
-                    "a point stays on wall `{name}`, and lasting contacts are not carried in many digits"
-                );
-                return Err(motion.stop(
-                    Cause::Unsuited,
-                    0.0,
-                    &what,
-                    "end the run before, or run it without --digits",
-                ));
+                let what = format!("a point is behind wall `{}`", row.name);
+                let hint = "state the walls and the start so that no point is behind its wall";
+                return Err(motion.stop(Cause::Unsuited, 0.0, &what, hint));
             }
         };
-        let time = refined(motion, &powers, Digits::of(from));
-        if found.as_ref().is_none_or(|(_, first)| time < *first) {
-            found = Some((wall, time));
+        comes(Ends::Met(wall), refined(motion, &powers, Digits::of(from)));
+    }
+    for (place, &wall) in motion.state().acting.held.iter().enumerate() {
+        match resting::pressure_ends(motion, place, step) {
+            Released::Not => {}
+            Released::After(time) => comes(Ends::Let(wall), time),
+            Released::Pulled => rests = rests.or(Some(wall)),
         }
     }
-    Ok(found)
+    Ok(match rests {
+        // What strikes does so first.
+        Some(wall) if found.is_none_or(|(_, time)| time > Digits::ZERO) => {
+            Some((Ends::Rests(wall), Digits::ZERO))
+        }
+        _ => found,
+    })
+}
+
+/// True where a gap, in lengths of its contact and shares of a step, begins at zero and may not leave the
+/// neighbourhood of zero at once.
+fn is_near(shares: &[f64]) -> bool {
+    let of = |m: usize| shares.get(m).copied().unwrap_or(0.0);
+    let bounces = of(1) > 0.0 && of(1) * of(1) > 4.0 * LEAST_REBOUND * of(2).abs();
+    of(0).abs() <= TOUCH && !bounces
 }
 
 /// A power series in seconds, times a factor, as one in shares of a step in doubles.
@@ -71,11 +113,14 @@ pub(super) fn in_shares<const W: usize>(powers: &[Digits<W>], factor: f64, step:
     powers.iter().map(share).collect()
 }
 
-/// Powers of the gap of a wall \[m/s^m\].
-fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) -> Vec<Digits<W>> {
+/// Powers of the gap of a wall \[m/s^m\] in a motion from this time on.
+pub(super) fn gap<const W: usize>(
+    series: &Series<Digits<W>>,
+    t: Digits<W>,
+    row: &ConstraintEquation<Digits<W>>,
+) -> Vec<Digits<W>> {
     let Measure::Place(place) = &row.measure else { return Vec::new() };
-    let n = motion.mechanism.structure.coordinates();
-    let elements: Vec<&[Complex<Digits<W>>]> = motion.series.z.chunks_exact(n).collect();
+    let elements: Vec<&[Complex<Digits<W>>]> = series.z.chunks_exact(series.elements()).collect();
     let linear =
         |z: &&[Complex<Digits<W>>]| place.linear.iter().fold(Digits::ZERO, |sum, &(k, g)| sum + g.dot(z[k]));
     let mut powers: Vec<_> = elements.iter().map(linear).collect();
@@ -90,16 +135,16 @@ fn gap<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) 
     }
     if let Some(law) = &row.law {
         let mut rates = vec![Digits::ZERO; powers.len()];
-        Digits::add_law(law, 1.0, motion.state.t, &mut rates, 0, 1);
+        Digits::add_law(law, 1.0, t, &mut rates, 0, 1);
         for (m, power) in powers.iter_mut().enumerate() {
             *power -= match m.checked_sub(1) {
-                None => Digits::law_value(law, motion.state.t),
+                None => Digits::law_value(law, t),
                 Some(before) => rates[before].over_whole(m as u64),
             };
         }
     }
     if let Some(aim) = &row.aim {
-        let moved = motion.series.aim(aim);
+        let moved = series.aim(aim);
         powers.iter_mut().zip(moved).for_each(|(power, moved)| *power -= moved);
     }
     powers
@@ -161,9 +206,17 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     }
     let jump = match several {
         Some(meeting) => meeting.jump(motion)?,
-        None => alone(motion, wall, &gap),
+        None => loop {
+            let (jump, pulls) = alone(motion, wall, &gap);
+            // A point that its wall would have to pull is let go.
+            match resting::pulled(motion, &pulls, 0.0) {
+                Some(held) => motion.let_go(&[held])?,
+                None => break jump,
+            }
+        },
     };
     jumped(motion, &jump);
+    motion.let_leaving_go()?;
     // What motors drive there no impulse turns back.
     let after = gap_rate(motion, wall).rate;
     let is_left = after < Digits::ZERO && (after / approach).log2() > motion.precision.rounding(SURE);
@@ -205,19 +258,19 @@ pub(super) struct GapRate<const W: usize> {
     pub rate: Digits<W>,
 }
 
-/// What the impulse of one wall does.
+/// What the impulse of one wall does, and the impulses of the constraints for one of it.
 fn alone<const W: usize>(
     motion: &mut Motion<W>,
     wall: usize,
     GapRate { gradient, travel, rate }: &GapRate<W>,
-) -> Jump<W> {
+) -> (Jump<W>, Vec<Digits<W>>) {
     let (t, posture) = (motion.state.t, motion.state_posture());
     let at = [&posture.phi[..], &posture.omega[..]];
-    let response = motion.keeper.response(&motion.mechanism, t, at, gradient);
+    let (response, pulls) = motion.keeper.response(&motion.mechanism, t, at, gradient);
     let restitution = motion.mechanism.walls[wall].1;
     let impulse = -(Digits::ONE + restitution) * *rate / dot(gradient, &response);
     let change = response.iter().map(|&a| a * impulse).collect();
-    Jump { change, work: impulse * *travel, walls: 1 }
+    (Jump { change, work: impulse * *travel, walls: 1 }, pulls)
 }
 
 /// What impulses do at one moment.

@@ -1,0 +1,53 @@
+//! What a run in many digits shows of itself.
+
+use super::Wide;
+use crate::arithmetic::Real;
+
+/// What there is to know at an output time.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// Its number, from 0.
+    pub number: u64,
+    /// Time \[s\].
+    pub t: Wide,
+    /// Of every body: angle \[rad\], not wrapped, and rate \[rad/s\], position of the centre of mass \[m\]
+    /// and its velocity \[m/s\].
+    pub bodies: Vec<[Wide; 6]>,
+    /// Kinetic and potential energy, and the work of motors, dampers and applied forces \[J\].
+    pub energy: [Wide; 3],
+    /// Energy less work and what impacts took, less that at the start, over the energy scale.
+    pub drift: f64,
+    /// Largest residual of the constraints \[rad or m\] and of its rate.
+    pub residual: [f64; 2],
+}
+
+impl Row {
+    /// Time \[s\], as a double.
+    pub fn time(&self) -> f64 {
+        self.t.value()
+    }
+}
+
+/// An event of a run in many digits.
+#[derive(Clone, Debug)]
+pub struct LongEvent {
+    /// Its name.
+    pub name: String,
+    /// Time \[s\].
+    pub t: Wide,
+    /// Angles of all bodies, not wrapped, then positions of origins \[rad, m\].
+    pub phi: Vec<Wide>,
+    /// Their rates \[rad/s, m/s\].
+    pub omega: Vec<Wide>,
+}
+
+/// A time a point stayed on its wall, in many digits.
+#[derive(Clone, Debug)]
+pub struct LongHold {
+    /// Name of the wall.
+    pub wall: String,
+    /// Beginning \[s\]: where bounces died out, the time at which infinitely many of them have ended.
+    pub t: Wide,
+    /// End \[s\]; `None`: held to the end of the run.
+    pub until: Option<Wide>,
+}
