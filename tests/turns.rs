@@ -115,3 +115,52 @@ fn a_spring_gets_hold_of_what_has_turned() {
         }
     }
 }
+
+/// A chain that whirls, and a spring that would count the turns of its last body but is never switched on.
+#[test]
+fn what_never_acts_changes_nothing() {
+    for bodies in 1..=5_usize {
+        let text = |spring: &str| {
+            let bars: Vec<String> = (0..bodies)
+                .map(|k| {
+                    format!(
+                        r#"{{"name": "b{k}", "mass": 1, "centre": [0.15, 0], "inertia": 0.01, "length": 0.3}}"#
+                    )
+                })
+                .collect();
+            let on = |k: usize| match k.checked_sub(1) {
+                None => r#"{"body": "ground", "point": [0, 0]}"#.to_owned(),
+                Some(before) => format!(r#"{{"body": "b{before}", "point": [0.3, 0]}}"#),
+            };
+            let hinges: Vec<String> = (0..bodies)
+                .map(|k| {
+                    format!(
+                        r#"{{"name": "h{k}", "between": [{}, {{"body": "b{k}", "point": [0, 0]}}]}}"#,
+                        on(k)
+                    )
+                })
+                .collect();
+            let start: Vec<String> =
+                (0..bodies).map(|k| format!(r#""b{k}": {{"phi": {k}, "omega": 20}}"#)).collect();
+            format!(
+                r#"{{"name": "chain", "gravity": [0, -9.81], "bars": [{}], "hinges": [{}], {spring}
+                "start": {{{}}}, "until": 1, "every": 1}}"#,
+                bars.join(", "),
+                hinges.join(", "),
+                start.join(", ")
+            )
+        };
+        let never = format!(
+            r#""torsion_springs": [{{"name": "k", "body": "b{}", "stiffness": 6, "free_angle": 0}}],
+            "inactive": ["k"], "events": [{{"name": "on", "when": "t - 9", "on": ["k"]}}],"#,
+            bodies - 1
+        );
+        for request in methods() {
+            let [with, without] = [&never[..], ""].map(|spring| run(&scene(&text(spring)), &request));
+            assert!(with.stop.is_none() && with.drift.energy.max < 1e-7, "{bodies} {:?}", request.method);
+            for (a, b) in with.last.phi.iter().zip(&without.last.phi) {
+                assert!((a - b).abs() < 1e-5, "{bodies} bodies by {:?}: {a} and {b}", request.method);
+            }
+        }
+    }
+}

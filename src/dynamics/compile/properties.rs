@@ -162,9 +162,9 @@ impl Mechanism {
         !self.constraints.is_empty() || self.is_worked_on()
     }
 
-    /// True where only gravity and rows act on bodies that hang on the ground.
+    /// True where only gravity and rows act on bodies that hang on the ground, and whole turns do not matter.
     pub fn is_plain(&self) -> bool {
-        self.coordinates() == self.bodies.len() && !self.is_forced()
+        self.coordinates() == self.bodies.len() && !self.is_forced() && !self.is_winding()
     }
 
     /// True where whole turns matter, so that angles are not wrapped.

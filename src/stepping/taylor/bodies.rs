@@ -99,7 +99,7 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
         let tree = &mechanism.tree;
         let n = tree.coordinates;
         let is_sprung_only =
-            mechanism.torsions.is_empty() && mechanism.actions.is_empty() && mechanism.constraints.is_empty();
+            !mechanism.is_winding() && mechanism.actions.is_empty() && mechanism.constraints.is_empty();
         if n == 0 || n > room(B) || tree.off_axis || !is_sprung_only || order > MOST || order % 2 == 1 {
             return None;
         }

@@ -73,7 +73,7 @@ impl<const B: usize> Looped<B> {
     /// forces, springs without dampers.
     pub fn new(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize) -> Option<Self> {
         let n = mechanism.bodies.len();
-        let is_plain = mechanism.torsions.is_empty()
+        let is_plain = !mechanism.is_winding()
             && mechanism.forces.is_empty()
             && !mechanism.is_damped()
             && mechanism.actions.iter().all(|action| action.law.is_none());

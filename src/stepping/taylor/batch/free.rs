@@ -42,7 +42,7 @@ pub(super) struct Power<const N: usize> {
 pub(super) fn fits(mechanism: &Mechanism) -> bool {
     !mechanism.tree.off_axis
         && mechanism.coordinates() == mechanism.bodies.len()
-        && mechanism.torsions.is_empty()
+        && !mechanism.is_winding()
         && mechanism.actions.is_empty()
         && mechanism.forces.is_empty()
         && mechanism.constraints.is_empty()

@@ -85,7 +85,7 @@ fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.has_closed_loops()
         && mechanism.forces.is_empty()
         && mechanism.contacts.is_empty()
-        && mechanism.torsions.is_empty()
+        && !mechanism.is_winding()
         && !mechanism.is_damped()
         && mechanism.actions.iter().all(is_constant)
 }
