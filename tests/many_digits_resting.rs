@@ -326,7 +326,7 @@ fn scenes() -> Vec<(String, &'static str)> {
     vec![
         (scene(&[&floor], [r#""one": {"phi": -0.5, "omega": 0},"#, "-0.9"], ""), "2.5"),
         (scene(&[&soft, &end], [r#""one": {"phi": -0.3, "omega": 0},"#, "-0.2"], ""), "1.5"),
-        (scene(&[&soft, &knee, &end], [r#""one": {"phi": -0.2, "omega": 0},"#, "-0.7"], spring), "1.6"),
+        (scene(&[&soft, knee, &end], [r#""one": {"phi": -0.2, "omega": 0},"#, "-0.7"], spring), "1.6"),
         (scene(&[&floor, &end], ["", "-0.8"], motor), "2"),
         (scene(&[&soft], ["", "-0.1"], motor), "2.2"),
         (
