@@ -240,7 +240,11 @@ impl<const W: usize> Touching<W> {
         if speed <= Digits::ZERO || restitution >= Digits::ONE {
             return Digits::ZERO;
         }
-        let is_other = |&other: &usize| other != place && set.contains(&self.walls[other]);
+        // Those that bounce as well do not press.
+        let still = speed.log2() + 0.5 * self.problem.rounding;
+        let is_other = |&other: &usize| {
+            other != place && set.contains(&self.walls[other]) && self.rates[other].log2() < still
+        };
         let others: Vec<usize> = (0..self.walls.len()).filter(is_other).collect();
         let none = vec![Digits::ZERO; self.walls.len()];
         let inward = self

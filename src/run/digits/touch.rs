@@ -100,7 +100,7 @@ mod tests {
 
     #[test]
     fn a_rebound_of_any_height_above_the_least_comes_down_where_it_should() {
-        for v in [1.0, 1e-8, 1e-16, 1e-30] {
+        for v in [0.5, 1e-8, 1e-16, 1e-30] {
             let Passage::At(t) = passage(&powers(&[0.0, v, -5.0, 1e-3]), 1.0, 0.125, -400.0) else {
                 panic!("no passage");
             };
