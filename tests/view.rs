@@ -66,6 +66,7 @@ fn runs_in_many_digits_have_no_page() {
 #[test]
 fn runs_are_found_from_above_the_folder_of_their_scene() {
     let program = with_run("--method dp5");
+    // One scene is found from above its folder, two have to be told apart.
     program.run("view output").exits(0).shows(&["output/motor"]);
     program.run("run free.json --until 1 --no-charts -q").exits(0);
     let told = program.run("view output").exits(6);
@@ -76,13 +77,6 @@ fn runs_are_found_from_above_the_folder_of_their_scene() {
 fn what_is_no_run_is_refused() {
     let program = with_run("--method dp5");
     let folder = "output/motor/dp5-1e-9-elimination";
-    // One scene is found from above its folder, two have to be told apart.
-    program.run("view output").exits(0).shows(&["output/motor"]);
-    program.run("run free.json --until 1 --no-charts -q").exits(0);
-    program
-        .run("view output")
-        .exits(6)
-        .says(&["output holds the runs of 2 scenes", "output/free, output/motor"]);
     program.run("view examples").exits(6).says(&["examples holds no run", "hint: `driftless run SCENE`"]);
     program.run(&format!("view {folder} --from 2 --to 1")).exits(2).says(&["--from 2 --to 1", "hint"]);
     program.run(&format!("view {folder} --from nan")).exits(2);
