@@ -118,6 +118,15 @@ impl Mechanism {
     }
 }
 
+impl Contact {
+    /// True where its wall has no hold on the point, as the gradient of the gap by all coordinates has this square
+    /// \[m²\].
+    pub(crate) fn is_dead(&self, gradient_squared: f64) -> bool {
+        let levers: f64 = self.point.terms.iter().map(|term| term.1.norm_squared()).sum();
+        self.point.shifts.is_empty() && gradient_squared < DEAD_CENTRE * DEAD_CENTRE * levers
+    }
+}
+
 /// A contact that touches, as the set of those that stay is found.
 struct Met<'a> {
     contact: &'a Contact,
@@ -143,15 +152,13 @@ impl<'a> Met<'a> {
     ) -> Self {
         let Gradient { row, along } = gradient;
         let column = metric.column(&along);
-        let levers: f64 = contact.point.terms.iter().map(|term| term.1.norm_squared()).sum();
         let parts = column.component_mul(acceleration);
         Self {
             contact,
             speed: dot(&along, omega) + row.drive,
             acceleration: parts.sum() + row.convective,
             size: parts.iter().map(|part| part.abs()).sum::<f64>() + row.convective.abs(),
-            is_dead: contact.point.shifts.is_empty()
-                && dot(&along, &along) < DEAD_CENTRE * DEAD_CENTRE * levers,
+            is_dead: contact.is_dead(dot(&along, &along)),
             free: metric.free(&column),
             norm: column.norm(),
         }

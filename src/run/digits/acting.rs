@@ -72,15 +72,11 @@ impl<const W: usize> Motion<W> {
             .collect();
         let unsuited = |motion: &Self, what: &str, hint: &str| motion.stop(Cause::Unsuited, 0.0, what, hint);
         let mechanism = self.mechanism.clone();
-        if let Err(error) = self.exchange(&acting) {
-            return Err(unsuited(self, &format!("the run cannot go on: {error}"), "look at that formula"));
-        }
+        self.exchange(&acting).map_err(|error| self.cannot_go_on(&error, "look at that formula"))?;
         let closing = self.mechanism.closing(&mechanism);
         if let Some(shifts) = self.engaged(&closing, &acting.shifts) {
             acting.shifts = shifts;
-            if let Err(error) = self.exchange(&acting) {
-                return Err(unsuited(self, &format!("the run cannot go on: {error}"), "look at its law"));
-            }
+            self.exchange(&acting).map_err(|error| self.cannot_go_on(&error, "look at its law"))?;
         }
         self.state.acting = acting;
         // The next series is another one.
@@ -119,6 +115,11 @@ impl<const W: usize> Motion<W> {
         }
         self.state.jump_energy += self.energy() - before.1;
         Ok(())
+    }
+
+    /// An error where the mechanism has no equations with what acts next.
+    pub(super) fn cannot_go_on(&self, error: &CompileError, hint: &str) -> StepError {
+        self.stop(Cause::Unsuited, 0.0, &format!("the run cannot go on: {error}"), hint)
     }
 
     /// The mechanism where other parts act, or on other branches.

@@ -36,8 +36,6 @@ const SURE: f64 = 0.75;
 const ABOVE: f64 = 12.0;
 /// Powers of the rates that accelerations of gaps are taken from.
 const POWERS: usize = 2;
-/// |G| over the levers of a point below which its wall has no hold on it, as in doubles.
-const DEAD_CENTRE: f64 = 1e-5;
 /// Holds that are kept with their times.
 const KEPT: usize = 100_000;
 
@@ -93,10 +91,8 @@ impl<const W: usize> Unheld<W> {
             return Ok(Self { mechanism: motion.mechanism.clone(), keeper: motion.keeper.clone() });
         }
         let acting = Acting { held: Vec::new(), ..motion.state().acting.clone() };
-        let mechanism = motion.mechanism.with(acting).map_err(|error| {
-            let what = format!("the run cannot go on: {error}");
-            motion.stop(Cause::Unsuited, 0.0, &what, "look at that formula")
-        })?;
+        let mechanism = motion.mechanism.with(acting);
+        let mechanism = mechanism.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
         let keeper = Keeper::new(&mechanism, motion.precision);
         Ok(Self { mechanism, keeper })
     }
@@ -203,10 +199,7 @@ impl<const W: usize> Touching<W> {
                 continue;
             }
             let gradient = gap_rate(motion, other).gradient;
-            let levers: f64 = contact.point.terms.iter().map(|term| term.1.norm_squared()).sum();
-            let has_hold = !contact.point.shifts.is_empty()
-                || dot(&gradient, &gradient).value() >= DEAD_CENTRE * DEAD_CENTRE * levers;
-            if !has_hold {
+            if contact.is_dead(dot(&gradient, &gradient).value()) {
                 if other == wall {
                     let what = format!("a point stays on wall {} at a dead centre", row.name);
                     let hint = "there the wall has no hold on it: end the run before";
@@ -220,11 +213,9 @@ impl<const W: usize> Touching<W> {
             responses.push(keeper.response(&mechanism, *t, [&phi, &omega], &gradient).0);
             gradients.push(gradient);
         }
-        let of = |gradient: &Vec<Digits<W>>| responses.iter().map(|a| dot(gradient, a)).collect();
-        let matrix = gradients.iter().map(of).collect();
         let rounding = sure(motion);
-        let still = largest(&accelerations) + rounding;
-        Ok(Self { walls, rates, accelerations, problem: Problem { matrix, still, rounding } })
+        let problem = Problem::new(&gradients, &responses, largest(&accelerations) + rounding, rounding);
+        Ok(Self { walls, rates, accelerations, problem })
     }
 
     /// The forces of all walls \[N\]; `None` where there are none that keep the points out of them.
@@ -311,10 +302,7 @@ impl<const W: usize> Motion<W> {
         let room = KEPT.saturating_sub(self.state.holds.len());
         self.state.holds.extend(new.into_iter().take(room));
         let acting = Acting { held: set, ..self.state.acting.clone() };
-        if let Err(error) = self.exchange(&acting) {
-            let what = format!("the run cannot go on: {error}");
-            return Err(self.stop(Cause::Unsuited, 0.0, &what, "look at that formula"));
-        }
+        self.exchange(&acting).map_err(|error| self.cannot_go_on(&error, "look at that formula"))?;
         self.state.acting = acting;
         // The next series is another one.
         self.state.radius = None;

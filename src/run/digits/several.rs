@@ -85,16 +85,13 @@ impl<const W: usize> Meeting<W> {
                 keeper.response(&mechanism, t, at, gradient).0
             })
             .collect();
-        let matrix: Vec<Vec<Digits<W>>> = (self.gradients.iter())
-            .map(|row| responses.iter().map(|response| dot(row, response)).collect())
-            .collect();
         let still = largest(&self.velocity) + self.rounding;
         let restitution = |(i, &wall): (usize, &usize)| {
             let is_met = self.velocity[i] < Digits::ZERO && self.velocity[i].log2() > still;
             if is_met { motion.mechanism.walls[wall].1 } else { Digits::ZERO }
         };
         let restitution: Vec<_> = self.walls.iter().enumerate().map(restitution).collect();
-        let problem = Problem { matrix, still, rounding: self.rounding };
+        let problem = Problem::new(&self.gradients, &responses, still, self.rounding);
         let Some(impulses) = problem.impulses(&self.velocity, &restitution) else {
             let what = format!("no impulses fit the law of impact at walls {names}");
             return Err(motion.stop(Cause::Unsuited, 0.0, &what, "move one of the walls"));
@@ -117,14 +114,25 @@ pub(super) fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
 /// The complementarity problem, of impulses and velocities, or of forces and accelerations.
 pub(super) struct Problem<const W: usize> {
     /// A \[1/kg\].
-    pub matrix: Vec<Vec<Digits<W>>>,
+    matrix: Vec<Vec<Digits<W>>>,
     /// log2 of a velocity that is rounding.
-    pub still: f64,
+    still: f64,
     /// log2 of the part of a number that is rounding.
     pub rounding: f64,
 }
 
 impl<const W: usize> Problem<W> {
+    /// Of walls with these gradients of their gaps, and these responses to an impulse of one along each.
+    pub fn new(
+        gradients: &[Vec<Digits<W>>],
+        responses: &[Vec<Digits<W>>],
+        still: f64,
+        rounding: f64,
+    ) -> Self {
+        let row = |gradient: &Vec<_>| responses.iter().map(|response| dot(gradient, response)).collect();
+        Self { matrix: gradients.iter().map(row).collect(), still, rounding }
+    }
+
     /// The impulses \[N·s\] of both phases.
     fn impulses(&self, velocity: &[Digits<W>], restitution: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
         let mut all = self.phase(velocity, &vec![Digits::ZERO; velocity.len()])?;
