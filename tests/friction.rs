@@ -202,7 +202,6 @@ fn a_force_across_a_rail_that_changes_its_sign_brakes_by_its_size() {
     }
 }
 
-/// Slope of the least-squares line.
 /// A hinge at a bar's centre of mass carries nothing, and has no friction.
 #[test]
 fn a_hinge_without_a_load_has_no_friction() {
@@ -214,6 +213,32 @@ fn a_hinge_without_a_load_has_no_friction() {
     for outcome in runs(text) {
         near(outcome.last.phi[0], 2.0, "angle");
         near(outcome.last.omega[0], 1.0, "rate");
+    }
+}
+
+/// A bar that turns without weight is slowed as -k omega², wherever on it the hinge and the origin of its frame are:
+/// N = m d sqrt(omega⁴ + alpha²), J alpha = -mu r N.
+#[test]
+fn a_hinge_anywhere_on_a_bar_slows_it_as_the_square_of_its_rate() {
+    let (mass, inertia, lever, rate, until) = (2.0, 0.2, 0.05 * 0.4, 3.0, 2.0);
+    // Of masses only what they are of one another counts, of however large forces friction is.
+    for ([x, y], times) in [([0.0, 0.0], 1.0), ([0.2, 0.1], 1.0), ([-0.3, 0.25], 1.0), ([0.2, 0.1], 1e12)] {
+        let text = format!(
+            r#"{{"name": "turning", "gravity": [0, 0],
+            "bars": [{{"name": "b", "mass": {}, "centre": [0.5, 0.1], "inertia": {}, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0.3, -1]}}, {{"body": "b", "point": [{x}, {y}]}}],
+                "friction": {{"radius": 0.05, "kinetic": 0.4}}}}],
+            "start": {{"b": {{"phi": 0.3, "omega": {rate}}}}}, "until": {until}, "every": 0.5}}"#,
+            times * mass,
+            times * inertia
+        );
+        let arm = f64::hypot(0.5 - x, 0.1 - y);
+        let q = lever * mass * arm / (inertia + mass * arm * arm);
+        let k = q / (1.0 - q * q).sqrt();
+        for outcome in runs(&text) {
+            near(outcome.last.omega[0], rate / (1.0 + k * rate * until), "rate");
+            near(outcome.last.phi[0], 0.3 + (1.0 + k * rate * until).ln() / k, "angle");
+        }
     }
 }
 
@@ -252,6 +277,7 @@ fn a_force_in_a_hinge_may_begin_at_zero() {
     }
 }
 
+/// Slope of the least-squares line.
 fn slope(points: &[[f64; 2]]) -> f64 {
     let n = points.len() as f64;
     let mean = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);

@@ -1,6 +1,6 @@
 //! Whole runs of random scenes of every kind against runs of scenes that describe the same motion otherwise:
-//! other order, names and ends of joints, mirrored, turned, shifted, in other units, back in time, a body cut
-//! in two and welded.
+//! other order, names and ends of joints, mirrored, turned, shifted, in other units, other frames of bodies,
+//! back in time, a body cut in two and welded; a part of them with dry friction in hinges.
 //!
 //! `METAMORPHIC=2000 cargo test --test physics -- metamorphic:: --nocapture` runs more scenes per relation;
 //! `SEED` is the first, and `FOUND` names a folder for the scenes of faults.
@@ -386,8 +386,12 @@ fn on_random_scenes(
     for index in 0..count {
         let seed = seed.wrapping_mul(1_000_003).wrapping_add(relation * 100_000_007).wrapping_add(index);
         let made = mechanisms::scene(seed);
-        let scene = parse_scene(&made.text, "random.json", &[])
+        let mut scene = parse_scene(&made.text, "random.json", &[])
             .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+        let mut frictions = Dice::new(seed ^ 0x00f1_1c00);
+        if frictions.chance(0.25) {
+            relations::with_friction(&mut scene, &mut frictions, made.scales.length);
+        }
         let mut dice = Dice::new(seed ^ 0x00d1_ce00);
         let walls: Vec<MethodId> = METHODS.iter().map(|info| info.id).filter(|id| takes_walls(*id)).collect();
         let all: Vec<MethodId> = METHODS.iter().map(|info| info.id).collect();
@@ -395,7 +399,7 @@ fn on_random_scenes(
             || scene.torsion_springs.iter().any(|coil| coil.damping > 0.0);
         let undamped: Vec<MethodId> =
             all.iter().copied().filter(|id| !matches!(id, MethodId::Rattle(_))).collect();
-        let of = if !scene.walls.is_empty() {
+        let of = if !scene.walls.is_empty() || !scene.frictions.is_empty() {
             &walls
         } else if damped {
             &undamped
@@ -479,6 +483,13 @@ fn a_shifted_scene_has_the_shifted_motion() {
     on_random_scenes("shifted", 6, |made, scene, dice, method, account| {
         let shift = [0, 1].map(|_| made.scales.length * dice.signed(0.5, 20.0));
         once(made, scene, &relations::shifted(scene, shift), method, account);
+    });
+}
+
+#[test]
+fn the_frames_of_bodies_do_not_matter() {
+    on_random_scenes("reframed", 10, |made, scene, dice, method, account| {
+        once(made, scene, &relations::reframed(scene, dice, made.scales.length), method, account);
     });
 }
 

@@ -3,7 +3,7 @@
 
 use crate::mechanisms::Dice;
 use driftless::run::Sample;
-use driftless::scene::{Bar, FrictionPlace, Given, Law, Place, Scene, Sine, Start, Weld};
+use driftless::scene::{Bar, Friction, FrictionPlace, Given, Law, Place, Scene, Sine, Start, Weld};
 use std::f64::consts::PI;
 
 /// A scene that has the same motion as another, seen otherwise.
@@ -141,6 +141,12 @@ pub fn reordered(scene: &Scene, dice: &mut Dice) -> Related {
     scene.given = order.iter().map(|&old| scene.given[old]).collect();
     let last = scene.sliders.len().wrapping_sub(1);
     scene.drives.iter_mut().for_each(|drive| drive.slider = last - drive.slider);
+    let last_hinge = scene.hinges.len().wrapping_sub(1);
+    for friction in &mut scene.frictions {
+        if let FrictionPlace::Hinge { hinge, .. } = &mut friction.at {
+            *hinge = last_hinge - *hinge;
+        }
+    }
     scene.hinges.reverse();
     scene.sliders.reverse();
     scene.welds.reverse();
@@ -269,6 +275,39 @@ pub fn turned(scene: &Scene, turn: f64) -> Related {
         given.velocity.iter_mut().for_each(rotate);
     }
     Related { scene, back }
+}
+
+/// The frames of bodies with other origins.
+pub fn reframed(scene: &Scene, dice: &mut Dice, length: f64) -> Related {
+    let mut scene = with_all_given(scene);
+    let shifts: Vec<[f64; 2]> =
+        scene.bars.iter().map(|_| [0, 1].map(|_| length * dice.within(-0.5, 0.5))).collect();
+    let move_by = |point: &mut [f64; 2], shift: [f64; 2]| *point = [point[0] + shift[0], point[1] + shift[1]];
+    for place in places(&mut scene) {
+        if let Some(bar) = place.bar {
+            move_by(&mut place.point, shifts[bar]);
+        }
+    }
+    scene.bars.iter_mut().zip(&shifts).for_each(|(bar, &shift)| move_by(&mut bar.centre, shift));
+    scene.forces.iter_mut().for_each(|force| move_by(&mut force.point, shifts[force.bar]));
+    scene.walls.iter_mut().for_each(|wall| move_by(&mut wall.point, shifts[wall.bar]));
+    for ((given, start), &shift) in scene.given.iter_mut().zip(&scene.start).zip(&shifts) {
+        let arm = rotated(shift, start.phi);
+        given.origin.iter_mut().for_each(|origin| move_by(origin, arm.map(|x| -x)));
+        let turning = [start.omega * arm[1], -start.omega * arm[0]];
+        given.velocity.iter_mut().for_each(|velocity| move_by(velocity, turning));
+    }
+    Related { back: Back::same(&scene), scene }
+}
+
+/// Dry friction in some of the hinges.
+pub fn with_friction(scene: &mut Scene, dice: &mut Dice, length: f64) {
+    for hinge in 0..scene.hinges.len() {
+        if dice.chance(0.5) {
+            let at = FrictionPlace::Hinge { hinge, radius: length * dice.within(0.02, 0.1) };
+            scene.frictions.push(Friction { at, kinetic: 0.2, stiction: 0.3 });
+        }
+    }
 }
 
 /// Everything elsewhere.
@@ -446,7 +485,8 @@ pub fn backwards(scene: &Scene, end: &Sample) -> Scene {
 
 /// True where nothing tells the direction of time.
 pub fn is_reversible(scene: &Scene) -> bool {
-    scene.springs.iter().all(|spring| spring.damping == 0.0)
+    scene.frictions.is_empty()
+        && scene.springs.iter().all(|spring| spring.damping == 0.0)
         && scene.torsion_springs.iter().all(|coil| coil.damping == 0.0)
         && scene.walls.iter().all(|wall| wall.restitution == 1.0)
 }

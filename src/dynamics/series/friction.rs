@@ -30,7 +30,6 @@ use crate::dynamics::Mechanism;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Push, Way};
 use crate::dynamics::friction::{self, Friction, Normal};
 use crate::dynamics::point::Point;
-use crate::scene::Place;
 
 /// Share of the time in which a normal force changes by itself below which a zero ahead counts as passed.
 const PASSED: f64 = 1e-9;
@@ -105,14 +104,10 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             is_turned: false,
         };
         let places: Vec<Sliding<T>> = mechanism.sliding().map(place).collect();
-        let centre = |bar: usize| {
-            let point = [mechanism.bodies[bar].centre.re, mechanism.bodies[bar].centre.im];
-            mechanism.forest.site(&Place { bar: Some(bar), point }).point
-        };
         let (n, f) = (mechanism.coordinates(), places.len());
         (f > 0).then(|| Self {
             places,
-            centres: (0..mechanism.bodies.len()).map(centre).collect(),
+            centres: (0..mechanism.bodies.len()).map(|body| mechanism.centre(body)).collect(),
             applied: vec![Complex::ZERO; mechanism.bodies.len()],
             response: vec![Complex::ZERO; f * f],
             rest: vec![Complex::ZERO; n],
@@ -188,6 +183,17 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         let normal =
             |place: &Sliding<T>| mechanism.normal_force(&place.friction, rows.multipliers(m), &carried);
         self.places.iter().map(normal).collect()
+    }
+
+    /// A tau of about the size of those at these normal forces, a power of two: what normal forces have of one
+    /// is a difference, and is told to as many digits as they are.
+    fn test_load(&self, start: &[Complex<T>]) -> f64 {
+        let size = |(place, normal): (&Sliding<T>, &Complex<T>)| {
+            place.coefficient.value().abs() * libm::hypot(normal.re.value(), normal.im.value())
+        };
+        let most = self.places.iter().zip(start).map(size).fold(0.0, f64::max);
+        let load = libm::exp2(libm::log2(most).floor());
+        if load.is_normal() { load } else { 1.0 }
     }
 
     /// tau_0 of all places, from the normal forces without them.
@@ -308,13 +314,14 @@ impl<T: SeriesNumber> Series<T> {
         self.solve::<0>(terms, m);
         let start = friction.normals(mechanism, m, &self.z, &self.rows);
         if m == 0 {
+            let load = friction.test_load(&start);
             for k in 0..f {
-                friction.places[k].force[0] = T::ONE;
+                friction.places[k].force[0] = T::of(load);
                 self.solve_again(terms, 0, &friction);
                 let normals = friction.normals(mechanism, 0, &self.z, &self.rows);
                 friction.places[k].force[0] = T::ZERO;
                 for (j, normal) in normals.into_iter().enumerate() {
-                    friction.response[j * f + k] = normal - start[j];
+                    friction.response[j * f + k] = (normal - start[j]).times(T::of(load.recip()));
                 }
             }
             friction.begin(&start);
