@@ -231,3 +231,28 @@ fn a_joint_that_closes_makes_events_where_a_number_is_set_too() {
         }
     }
 }
+
+/// A rotor at rest on a torque with a corner at the very start: its rate, 3 t² - 2 t, is zero there, which is no
+/// event, and passes zero once, at 2/3.
+#[test]
+fn a_corner_at_the_start_makes_no_event_of_what_is_zero_there() {
+    for torque in ["6*max(t, 0) - 2", "3*(t + abs(t)) - 2"] {
+        for phi in [0.0, 0.1, -0.5, 0.3, 1.1] {
+            let text = format!(
+                r#"{{"name": "rotor", "gravity": [0, 0], "until": 1, "every": 1,
+                "bars": [{{"name": "r", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+                "hinges": [{{"name": "A", "between": [
+                    {{"body": "ground", "point": [0, 0]}}, {{"body": "r", "point": [0, 0]}}]}}],
+                "torques": [{{"name": "drive", "body": "r", "torque": "{torque}"}}],
+                "events": [{{"name": "turn", "when": "r.omega"}}],
+                "start": {{"r": {{"phi": {phi}, "omega": 0}}}}}}"#
+            );
+            for request in methods() {
+                let outcome = run(&scene(&text), &request);
+                let found = times(&outcome, "turn");
+                assert_eq!(found.len(), 1, "{torque}, {phi}, {:?}: {found:?}", request.method);
+                assert_near(found[0], 2.0 / 3.0, 1e-9, torque);
+            }
+        }
+    }
+}

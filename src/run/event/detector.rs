@@ -356,7 +356,7 @@ impl StepWatcher for EventDetector {
         if self.memory.largest[..self.before_friction()].contains(&0.0) {
             self.measure(inside.at(begin));
         }
-        let mut passages = Vec::new();
+        let (mut passages, before) = (Vec::new(), self.memory.sides.clone());
         self.passages(inside, begin, span, 0, &mut passages);
         self.memory.woken.clear();
         // In the order of their times for each function.
@@ -390,7 +390,7 @@ impl StepWatcher for EventDetector {
                 }
                 self.memory.pending = Some((event, self.action(event, &motion)));
                 self.put_off(&passages[number + 1..], t, span);
-                self.cut(&all, t);
+                self.cut(&all, t, (t - begin).hi <= SAME * span, &before);
                 return Some(t);
             }
             self.count += 1;
@@ -406,7 +406,7 @@ impl StepWatcher for EventDetector {
                 self.memory.flipped.clear();
                 self.memory.pending = Some((event, action));
                 self.put_off(&passages[number + 1..], t, span);
-                self.cut(&all, t);
+                self.cut(&all, t, (t - begin).hi <= SAME * span, &before);
                 return Some(t);
             }
         }
@@ -415,10 +415,17 @@ impl StepWatcher for EventDetector {
 }
 
 impl EventDetector {
-    /// Takes back what passes zero later than the step is cut short.
-    fn cut(&mut self, passages: &[Passage], t: Time) {
+    /// Takes back what passes zero later than the step is cut short; where that `is_begin` of it, functions are on
+    /// the sides `before`, but those of events that happened: what the step shows is not what follows.
+    fn cut(&mut self, passages: &[Passage], t: Time, is_begin: bool, before: &[i8]) {
         for Passage { event, rises, .. } in passages.iter().rev().filter(|passage| passage.t > t) {
             self.memory.sides[*event] = if *rises { -1 } else { 1 };
+        }
+        let events = self.of_the_scene() + self.events.len();
+        for (event, &side) in before.iter().enumerate().take(events).filter(|_| is_begin) {
+            if !self.memory.last.iter().any(|(last, _)| *last == event) {
+                self.memory.sides[event] = side;
+            }
         }
     }
 
