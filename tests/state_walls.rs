@@ -236,6 +236,23 @@ fn a_table_that_starts_to_rise_strikes_what_lies_on_it() {
     }
 }
 
+/// A table of the place of its ball, which a number makes rise at u from 0.2 s on; until then it does no work.
+#[test]
+fn a_table_that_an_event_makes_rise_works_from_then_on() {
+    let (g, h, u, e, until) = (G, 1.0, 0.5, 0.5, 0.6);
+    let more =
+        r#", "parameters": {"u": 0}, "events": [{"name": "go", "when": "t - 0.2", "set": {"u": 0.5}}]"#;
+    let scene = ball("u*t*cos(ball.phi)", e, [0.0, h], [0.0, 0.0], until, more);
+    let met = ((u * u + 2.0 * g * h).sqrt() - u) / g;
+    let (leaves, s) = (u + e * (u + g * met), until - met);
+    for request in methods() {
+        let outcome = finished(&scene, &request);
+        near(outcome.last.phi[2], u * met + s * (leaves - 0.5 * g * s), 1e-8, "height");
+        let lost = 0.5 * (1.0 - e * e) * (u + g * met) * (u + g * met);
+        near(outcome.impacts[0].energy_lost, lost, 1e-8, "energy");
+    }
+}
+
 /// A follower of 1 kg on a rail along y, over a cam on a shaft, whose lift is `law`; more of the shaft.
 fn follower(law: &str, e: f64, until: f64, more: &str) -> Scene {
     scene(&format!(

@@ -1,6 +1,7 @@
 //! Whole turns of angles that matter only once a part acts that does not at the start; against closed forms.
 
 use super::formulas::{adaptive, rotor, run, scene};
+use super::sensitivity::{assert_near, derived, template};
 use driftless::run::{MethodId, Request};
 
 fn methods() -> [Request; 6] {
@@ -162,5 +163,29 @@ fn what_never_acts_changes_nothing() {
                 assert!((a - b).abs() < 1e-5, "{bodies} bodies by {:?}: {a} and {b}", request.method);
             }
         }
+    }
+}
+
+/// A rotor of 2 kg m² that turns by itself, and a part whose number is zero: d phi/dk = -∫∫ phi/I, whole turns
+/// counted.
+#[test]
+fn a_law_that_is_zero_is_derived_by_its_number_after_whole_turns() {
+    let (phi, omega, inertia, t) = (0.4, 9.0, 2.0, 2.0);
+    let expected = -(0.5 * phi * t * t + omega * t * t * t / 6.0) / inertia;
+    for part in [
+        r#""torques": [{"name": "t", "body": "r", "torque": "-k*r.phi"}]"#,
+        r#""signals": {"far": "k*r.phi"}, "torques": [{"name": "t", "body": "r", "torque": "-far"}]"#,
+        r#""torsion_springs": [{"name": "t", "body": "r", "potential": "0.5*k*angle^2"}]"#,
+        r#""torsion_springs": [{"name": "t", "body": "r", "torque": "k*angle"}]"#,
+    ] {
+        let scene = format!(
+            r#"{{"name": "rotor", "gravity": [0, 0], "parameters": {{"k": 0}}, {part},
+            "bars": [{{"name": "r", "mass": 1, "centre": [0, 0], "inertia": {inertia}, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [
+                {{"body": "ground", "point": [0, 0]}}, {{"body": "r", "point": [0, 0]}}]}}],
+            "start": {{"r": {{"phi": {phi}, "omega": {omega}}}}}, "until": {t}, "every": 0.5}}"#
+        );
+        let found = derived(&template(&scene), &["r.phi"], &["k"], t);
+        assert_near(found.measures[0].slopes[0], expected, 1e-9, part);
     }
 }

@@ -230,7 +230,8 @@ impl Mechanism {
                 Some(Laws { formulas: Arc::new(formulas), parameters, modes })
             }
         };
-        let keeps_work = laws.as_ref().is_some_and(|laws| laws.formulas.applies());
+        let keeps_work = (laws.iter().map(|laws| &laws.formulas))
+            .any(|formulas| formulas.applies() || formulas.may_move_walls());
         let keeps_turns = laws.as_ref().is_some_and(|laws| laws.formulas.may_count_turns());
         let mut rows = given_angles(scene);
         let partition = CoordinatePartition::new(bodies.len(), n, &rows)?;

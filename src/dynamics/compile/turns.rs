@@ -1,7 +1,7 @@
 //! Of which bodies whole turns matter, and between which.
 
 use super::Mechanism;
-use crate::dynamics::constraint::Measure;
+use crate::dynamics::constraint::{Measure, Site};
 use crate::dynamics::force::UserForce;
 use crate::dynamics::force::formula::Formulas;
 use crate::scene::Meaning;
@@ -68,19 +68,25 @@ impl WholeTurns {
 impl Formulas {
     /// The bodies whose whole turns matter to them, on whichever branches.
     pub fn counted_angles(&self) -> impl Iterator<Item = usize> {
-        self.meanings()
-            .flat_map(|meaning| match *meaning {
-                Meaning::Angle(body) => [Some(body), None],
-                Meaning::RelativeAngle(body, base) => [Some(body), base],
-                _ => [None; 2],
-            })
-            .flatten()
+        self.meanings().flat_map(counted)
     }
 
-    /// True where whole turns may matter to them on other branches or with other parameters than those that hold.
+    /// True where whole turns may matter to them: on other branches, to events that change what acts, and to what
+    /// acts with other parameters than those that hold, beside which derivatives are taken.
     pub fn may_count_turns(&self) -> bool {
         self.switches() && self.counted_angles().next().is_some()
+            || self.acting_meanings().flat_map(counted).next().is_some()
     }
+}
+
+/// The bodies of which a number of a formula is the angle.
+fn counted(meaning: &Meaning<Site>) -> impl Iterator<Item = usize> {
+    let bodies = match *meaning {
+        Meaning::Angle(body) => [Some(body), None],
+        Meaning::RelativeAngle(body, base) => [Some(body), base],
+        _ => [None; 2],
+    };
+    bodies.into_iter().flatten()
 }
 
 #[cfg(test)]

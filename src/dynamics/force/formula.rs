@@ -4,6 +4,8 @@
 //! choose, the *modes*; a run that meets a zero of a condition ends its step there and records the laws anew
 //! on the other branch, so that no method ever steps across a corner.
 
+mod dependence;
+
 use super::law::{Acts, Law};
 use crate::arithmetic::Scalar;
 use crate::arithmetic::tape::Symbol;
@@ -370,33 +372,21 @@ impl<C: Decimal> Formulas<C> {
         self.aims.iter().map(|of| Ok((&of.0, aim(of)?))).collect()
     }
 
-    /// Every formula whose conditions count, in the order in which they are numbered.
-    fn switched(&self) -> impl Iterator<Item = &Expression<C>> {
+    /// The formulas that act: of forces, motors, walls.
+    fn acting(&self) -> impl Iterator<Item = &Expression<C>> {
         let laws = self.laws.iter().flat_map(Law::expressions);
         let profiles = self.profiles.iter().map(|profile| &profile.1);
-        let laws = self.signals.iter().chain(laws).chain(profiles).chain(self.aims.iter().map(|aim| &aim.2));
+        laws.chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
+    }
+
+    /// Every formula whose conditions count, in the order in which they are numbered.
+    fn switched(&self) -> impl Iterator<Item = &Expression<C>> {
+        let laws = self.signals.iter().chain(self.acting());
         laws.chain(self.events.iter().filter(|_| C::HAS_CONSTANTS).map(|event| &event.when))
     }
 }
 
 impl Formulas {
-    /// True where a law applies forces beside potentials, on whatever branch.
-    pub fn applies(&self) -> bool {
-        self.laws.iter().any(|law| law.place.applies())
-    }
-
-    /// True where it has conditions, or events that change something.
-    pub fn switches(&self) -> bool {
-        let changes =
-            |event: &FormulaEvent| !(event.on.is_empty() && event.off.is_empty() && event.set.is_empty());
-        !self.conditions.is_empty() || self.events.iter().any(changes)
-    }
-
-    /// True where laws of motors or walls are formulas.
-    pub fn drives(&self) -> bool {
-        !self.profiles.is_empty() || !self.aims.is_empty()
-    }
-
     /// The modes at a configuration, by the signs of the conditions there.
     pub fn modes(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<bool> {
         let mut modes = Vec::with_capacity(self.conditions.len());
@@ -410,11 +400,6 @@ impl Formulas {
             }
         }
         modes
-    }
-
-    /// What the names in them mean, on whichever branches.
-    pub fn meanings(&self) -> impl Iterator<Item = &Meaning<Site>> {
-        self.switched().flat_map(|expression| &expression.meanings)
     }
 
     /// The signals on the branches that hold at a configuration.
