@@ -133,7 +133,8 @@ pub(crate) fn most_off(compared: &Compared) -> f64 {
     compared.ratios.iter().map(|ratio| ratio[0].max(1.0 / ratio[0])).fold(1.0, f64::max)
 }
 
-fn trust(scene: &Scene, until: f64) -> Trust {
+/// What a run says of itself.
+pub(crate) fn trust(scene: &Scene, until: f64) -> Trust {
     let mechanism = compile(scene);
     let start = mechanism.start(scene);
     let plan = Plan::new(scene, &mechanism, &request(until, until / 64.0)).expect("a plan");

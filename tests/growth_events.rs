@@ -5,7 +5,7 @@
 //! the first.
 
 use crate::common::{compile, shipped};
-use crate::growth::{Tally, compared, most_off, number, request, text};
+use crate::growth::{Tally, compared, most_off, number, request, text, trust};
 use crate::switched::{scene, scene_of_numbers};
 use driftless::run::Plan;
 use driftless::run::trust::flow;
@@ -185,4 +185,27 @@ fn growth_is_right_on_shipped_scenes_with_events() {
         println!("{name}: {} points, {most:.4}, {} steps, {:?}", found.ratios.len(), found.steps, found.lost);
         assert!(most < 1.2 && !found.ratios.is_empty(), "{name}: {most}");
     }
+}
+
+/// Two bars that lie still until an event pulls at them: differences go on with the pull, as in a scene that is
+/// pulled from the start.
+#[test]
+fn a_motion_that_begins_at_rest_grows_as_one_that_begins_with_its_event() {
+    let scene = |pull: &str, event: &str, until: f64| {
+        text(&format!(
+            r#"{{"name": "pulled", "gravity": [0, 0], "until": {until}, "every": 0.5, "bars": [
+            {{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.08, "length": 1}},
+            {{"name": "c", "mass": 2, "centre": [0.35, 0], "inertia": 0.08, "length": 0.7}}], "hinges": [
+            {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "b", "point": [1, 0]}}, {{"body": "c", "point": [0, 0]}}]}}],
+            "parameters": {{"k": {pull}}}, "forces": [{{"name": "F", "body": "c", "point": [0.7, 0], "force": [0, "k"]}}],
+            "events": [{event}],
+            "start": {{"b": {{"phi": 0.5, "omega": 0}}, "c": {{"phi": 1, "omega": 0}}}}}}"#
+        ))
+    };
+    let late = trust(&scene("0", r#"{"name": "pull", "when": "t - 1", "set": {"k": -10}}"#, 3.0), 3.0);
+    let early = trust(&scene("-10", "", 2.0), 2.0);
+    assert_eq!((&late.no_growth, &early.no_growth), (&None, &None));
+    let [late, early] = [late, early].map(|trust| trust.input_error.expect("a figure"));
+    assert!(late < 5.0 * early && early < 5.0 * late, "{late:e} and {early:e}");
 }

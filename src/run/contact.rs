@@ -314,6 +314,11 @@ impl ContactDriver {
         self.driver.read(motion);
     }
 
+    /// Where the step began in which motions can be read.
+    pub(super) fn step_begin(&self) -> Time {
+        self.driver.place().from.time
+    }
+
     /// Why the present moment cannot be the first one of a run with walls: its coordinates are not those of
     /// the start, or its rates are others without impacts.
     pub(super) fn begun_elsewhere(&mut self, start: &Motion, outcome: &Outcome) -> Option<StepError> {

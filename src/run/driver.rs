@@ -80,7 +80,7 @@ pub(super) struct DriverState {
     state: State,
     statistics: Statistics,
     /// Where a dense method began its last step; without unknowns where it made none.
-    from: State,
+    pub(super) from: State,
     ahead: Option<usize>,
     /// True where it was cut short.
     is_cut: bool,

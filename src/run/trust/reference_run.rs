@@ -194,10 +194,18 @@ impl ReferenceRun {
     /// Why the reference solution stopped, or `None` where the budget was used up.
     pub(super) fn go(&mut self, until: Time, purse: &mut WorkBudget) -> Result<(), Option<String>> {
         while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
-            self.integrate(Time::from(next), purse)?;
+            // After an event that came in a long step of the flow its steps may be so short that they end before
+            // the step in which the motion is known.
+            let is_behind = next < self.motion.time.hi && next < self.contact_driver.step_begin().hi;
+            if !is_behind {
+                self.integrate(Time::from(next), purse)?;
+            }
             let steps = if self.is_rounded { self.last.steps } else { 0 };
             if let Some(tangent) = &mut self.tangent {
-                tangent.take(&self.motion, steps);
+                match is_behind {
+                    true => tangent.go_alone(),
+                    false => tangent.take(&self.motion, steps),
+                }
                 let cost = tangent.evaluations() as f64 * purse.prices.evaluation;
                 (*purse.spent, *purse.flow) = (*purse.spent + cost, *purse.flow + cost);
             }

@@ -165,6 +165,11 @@ impl Tangent {
         }
     }
 
+    /// To [`Tangent::next`] along the motion of its own series.
+    pub(super) fn go_alone(&mut self) {
+        self.advance(Time::from(self.next()), None, 0.0);
+    }
+
     /// The number of the next node.
     fn node(&self) -> usize {
         self.path.nodes.len() / (2 * self.weights.len().pow(2))
