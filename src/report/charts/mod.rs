@@ -12,7 +12,6 @@ use crate::chart::{
     self, AngleSeries, Angles, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Picture, Pose, plain,
 };
 use crate::dynamics::Mechanism;
-use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::forest::BodyOrigin;
 use crate::report::curves::{furthest, is_coarse, smoothed, span};
 use crate::report::drawing::Drawing;
@@ -65,15 +64,22 @@ impl Chart {
 /// The charts a run has something to show in: none of angles and positions where nothing moves, none of
 /// constraints that are kept exactly, none of torques without motors.
 pub fn wanted(mechanism: &Mechanism, outcome: &Outcome) -> Vec<Chart> {
-    let driven = mechanism.constraints.iter().any(ConstraintEquation::is_motor);
     let has = |chart: &Chart| match chart {
         Chart::Mechanism | Chart::EnergyDrift => true,
         Chart::Angles => moves(mechanism, outcome),
         Chart::ConstraintDrift => drifts(&[outcome]),
-        Chart::TorquePower => driven,
+        Chart::TorquePower => !motors(mechanism, outcome).is_empty(),
         Chart::Outputs => mechanism.outputs.is_some(),
     };
     Chart::ALL.into_iter().filter(has).collect()
+}
+
+/// The rows of motors, of those that events switch as well, and of gears that have done work.
+fn motors(mechanism: &Mechanism, outcome: &Outcome) -> Vec<usize> {
+    let (all, trace) = (mechanism.with_all_parts(), &outcome.trace);
+    let samples = || trace.whole.iter().chain(&trace.head).chain(&trace.part);
+    let works = |row: usize| all.is_motor(row) && samples().any(|sample| sample.motors[row][1] != 0.0);
+    (0..all.constraints.len()).filter(|&row| all.constraints[row].is_motor() || works(row)).collect()
 }
 
 /// Whether any coordinate of the scene's own bodies changes.

@@ -8,18 +8,17 @@ impl Finished<'_> {
     /// The motors, and which of them push sliders.
     pub fn torque_power(&self) -> (TorquePower, Vec<usize>) {
         let (window, more) = self.window();
-        let driven = self.mechanism.constraints.iter().filter(|row| row.is_motor());
+        let (driven, rows) =
+            (super::motors(self.mechanism, self.outcome), &self.mechanism.with_all_parts().constraints);
         let sliders: Vec<usize> =
-            driven.enumerate().filter(|(_, row)| !row.is_angle()).map(|(k, _)| k).collect();
-        let motors = (self.mechanism.constraints.iter().enumerate()).filter(|(_, row)| row.is_motor()).map(
-            |(r, row)| MotorSeries {
-                name: plain(row.name()),
-                time: window.iter().map(|sample| sample.t).collect(),
-                torque: window.iter().map(|sample| sample.motors[r][0]).collect(),
-                power: window.iter().map(|sample| sample.motors[r][1]).collect(),
-            },
-        );
-        let motors: Vec<MotorSeries> = motors.collect();
+            driven.iter().enumerate().filter(|&(_, &row)| !rows[row].is_angle()).map(|(k, _)| k).collect();
+        let series = |row: usize| MotorSeries {
+            name: plain(rows[row].name()),
+            time: window.iter().map(|sample| sample.t).collect(),
+            torque: window.iter().map(|sample| sample.motors[row][0]).collect(),
+            power: window.iter().map(|sample| sample.motors[row][1]).collect(),
+        };
+        let motors: Vec<MotorSeries> = driven.into_iter().map(series).collect();
         let names: Vec<&str> = motors.iter().map(|motor| motor.name.as_str()).collect();
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
         let mut caption = self.caption(more);

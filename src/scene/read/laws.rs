@@ -379,8 +379,8 @@ fn is_of_place(at: &At, names: &Names, bound: &Bound) -> Result<(), SceneError> 
     Err(at.refuse(&problem, allowed, hint))
 }
 
-/// What events can switch.
-struct Parts<'a>(Vec<&'a str>);
+/// What events can switch, and springs that they cannot.
+struct Parts<'a>(Vec<&'a str>, Vec<&'a str>);
 
 impl<'a> Parts<'a> {
     fn of(scene: &'a Scene) -> Self {
@@ -395,7 +395,8 @@ impl<'a> Parts<'a> {
             .chain(scene.couplings.iter().map(|part| &part.name))
             .chain(scene.locks.iter().map(|part| &part.name))
             .chain(scene.walls.iter().map(|part| &part.name));
-        Self(names.map(String::as_str).collect())
+        let rigid = scene.springs.iter().filter(|spring| spring.rigid).map(|spring| spring.name.as_str());
+        Self(names.map(String::as_str).collect(), rigid.collect())
     }
 
     /// Refuses a list with a name that none has.
@@ -408,6 +409,9 @@ impl<'a> Parts<'a> {
                 continue;
             }
             let hint = match nearest(name, self.0.iter().copied()) {
+                _ if self.1.contains(&name.as_str()) => {
+                    "a spring whose model is \"rigid\" always acts".into()
+                }
                 Some(near) => format!("did you mean \"{near}\"?"),
                 None if self.0.is_empty() => "the scene has none".to_owned(),
                 None => format!("there are: {}", listed(&self.0)),
