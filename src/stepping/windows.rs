@@ -59,7 +59,7 @@ impl<M> Windows<M> {
     }
 }
 
-impl<F: OdeSystem + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Window<'_, F> {
+impl<const D: usize> System<f64, SVector<f64, D>> for Window<'_> {
     fn system(&self, _: f64, y: &SVector<f64, D>, rate: &mut SVector<f64, D>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
@@ -69,7 +69,7 @@ impl<F: OdeSystem + ?Sized, const D: usize> System<f64, SVector<f64, D>> for Win
     }
 }
 
-impl<F: OdeSystem + ?Sized> System<f64, DVector<f64>> for Window<'_, F> {
+impl System<f64, DVector<f64>> for Window<'_> {
     fn system(&self, _: f64, y: &DVector<f64>, rate: &mut DVector<f64>) {
         self.rate(y.as_slice(), rate.as_mut_slice());
     }
@@ -130,13 +130,13 @@ pub struct Stepper {
 }
 
 /// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
-type Integrate<'a, F> = dyn FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome + 'a;
+type Integrate<'a> = dyn FnMut(Window, &[f64], f64, f64, u32) -> Outcome + 'a;
 
 /// The next step of a window, or the first of a new one; nothing where that was interrupted.
 fn step<F: OdeSystem + ?Sized>(
     rows: &mut Rows,
     stepper: &Stepper,
-    integrate: &mut Integrate<F>,
+    integrate: &mut Integrate,
     field: &mut F,
     state: &mut State,
     until: Time,
@@ -168,7 +168,7 @@ fn step<F: OdeSystem + ?Sized>(
 fn part<F: OdeSystem + ?Sized>(
     kept: &mut Rows,
     stepper: &Stepper,
-    integrate: &mut Integrate<F>,
+    integrate: &mut Integrate,
     field: &mut F,
     state: &State,
     until: Time,
@@ -211,7 +211,8 @@ fn part<F: OdeSystem + ?Sized>(
         .min(u64::from(u32::MAX)) as u32;
     let most_rows = (MOST_KEPT / (n + 2)).max(LEAST_KEPT);
     let (mut times, mut rows, outcome) = {
-        let window = Window::new(field, state.time, &unit, most_rows, kept.finishes);
+        let mut rates = |t: Time, y: &[f64], rate: &mut [f64]| field.rhs(t, y, rate);
+        let window = Window::new(&mut rates, state.time, (&unit, time_unit), most_rows, kept.finishes);
         integrate(window, &y, span / time_unit, first, most)
     };
     let reached_time = |x: f64| state.time.hi + x * time_unit;
@@ -277,7 +278,7 @@ fn part<F: OdeSystem + ?Sized>(
 /// The state at `time` \[s\], by a step of its own from the row before it; where that fails, that row.
 fn shorter<F: OdeSystem + ?Sized>(
     stepper: &Stepper,
-    integrate: &mut Integrate<F>,
+    integrate: &mut Integrate,
     field: &mut F,
     from: &State,
     time: Time,
@@ -304,9 +305,9 @@ pub trait Method {
 
     /// The crate's method as it is called.
     #[doc(hidden)]
-    fn integrate<F: OdeSystem + ?Sized>(
+    fn integrate(
         tolerance: Tolerance,
-        window: Window<F>,
+        window: Window,
         y: &[f64],
         span: f64,
         first: f64,
@@ -326,9 +327,9 @@ impl Method for Fifth {
     const STEPPER: Stepper = Stepper { name: "dopri5", attempt: 6, accepted: 0 };
     const ORDER: u32 = 5;
 
-    fn integrate<F: OdeSystem + ?Sized>(
+    fn integrate(
         tolerance: Tolerance,
-        window: Window<F>,
+        window: Window,
         y: &[f64],
         span: f64,
         first: f64,
@@ -343,9 +344,9 @@ impl Method for Eighth {
     const STEPPER: Stepper = Stepper { name: "dop853", attempt: 11, accepted: 1 };
     const ORDER: u32 = 8;
 
-    fn integrate<F: OdeSystem + ?Sized>(
+    fn integrate(
         tolerance: Tolerance,
-        window: Window<F>,
+        window: Window,
         y: &[f64],
         span: f64,
         first: f64,
@@ -366,7 +367,7 @@ impl<M: Method, F: OdeSystem + ?Sized> Integrator<F> for Windows<M> {
     }
 
     fn begin(&mut self, field: &mut F, state: &mut State, until: Time) -> Result<(), StepError> {
-        let mut integrate = called::<M, F>(self.tolerance);
+        let mut integrate = called::<M>(self.tolerance);
         begin(&mut self.rows, &M::STEPPER, &mut integrate, field, state, until)
     }
 
@@ -377,7 +378,7 @@ impl<M: Method, F: OdeSystem + ?Sized> Integrator<F> for Windows<M> {
         until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        let mut integrate = called::<M, F>(self.tolerance);
+        let mut integrate = called::<M>(self.tolerance);
         step(&mut self.rows, &M::STEPPER, &mut integrate, field, state, until, statistics)
     }
 
@@ -393,16 +394,14 @@ impl<M: Method, F: OdeSystem + ?Sized> Integrator<F> for Windows<M> {
     }
 
     fn interpolate(&mut self, field: &mut F, from: &State, time: Time, inside: &mut State) {
-        let mut integrate = called::<M, F>(self.tolerance);
+        let mut integrate = called::<M>(self.tolerance);
         shorter(&M::STEPPER, &mut integrate, field, from, time, inside);
     }
 }
 
 /// A method of the crate at a tolerance.
-fn called<M: Method, F: OdeSystem + ?Sized>(
-    tolerance: Tolerance,
-) -> impl FnMut(Window<F>, &[f64], f64, f64, u32) -> Outcome {
-    move |window: Window<F>, y: &[f64], span: f64, first: f64, most: u32| {
+fn called<M: Method>(tolerance: Tolerance) -> impl FnMut(Window, &[f64], f64, f64, u32) -> Outcome {
+    move |window: Window, y: &[f64], span: f64, first: f64, most: u32| {
         M::integrate(tolerance, window, y, span, first, most)
     }
 }

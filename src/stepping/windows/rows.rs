@@ -87,7 +87,7 @@ impl Rows {
 pub(super) fn begin<F: OdeSystem + ?Sized>(
     rows: &mut Rows,
     stepper: &Stepper,
-    integrate: &mut Integrate<F>,
+    integrate: &mut Integrate,
     field: &mut F,
     state: &mut State,
     until: Time,
