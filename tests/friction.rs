@@ -202,6 +202,56 @@ fn a_force_across_a_rail_that_changes_its_sign_brakes_by_its_size() {
     }
 }
 
+/// A cart on a rail with a bar that whirls under it, and at times lifts it more than it weighs:
+/// (M + m) x'' - m l sin(phi) phi'' = m l cos(phi) phi'² - mu |N|,  N = (M + m) g + m l (cos(phi) phi'' - sin(phi) phi'²).
+#[test]
+fn a_whirling_bar_presses_the_rail_of_its_cart_from_both_sides() {
+    let (cart, bar, arm, mu) = (0.5, 1.0, 0.25, 0.2);
+    let inertia = bar * arm * arm / 3.0;
+    let text = format!(
+        r#"{{"name": "whirl", "gravity": [0, -{G}], "bars": [
+            {{"name": "b", "mass": {cart}, "centre": [0, 0], "inertia": 0.01, "length": 0.2}},
+            {{"name": "c", "mass": {bar}, "centre": [{arm}, 0], "inertia": {inertia}, "length": 0.5}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "b", "point": [0, 0]}}, {{"body": "c", "point": [0, 0]}}]}}],
+        "sliders": [{{"name": "S", "point": {{"body": "b", "point": [0, 0]}}, "angle": "locked",
+            "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "friction": {{"kinetic": {mu}}}}}],
+        "start": {{"b": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [20, 0]}}, "c": {{"phi": -1.5, "omega": 15.12}}}},
+        "until": 1, "every": 0.05}}"#
+    );
+    let (mass, lever) = (cart + bar, bar * arm);
+    let rate = |[_, v, phi, omega]: [f64; 4]| {
+        let (sin, cos) = phi.sin_cos();
+        let of_side = |side: f64| {
+            let [a, b, c] = [mass, lever * (side * mu * cos - sin), -lever * sin];
+            let d = inertia + lever * arm;
+            let right = lever * cos * omega * omega - side * mu * (mass * G - lever * sin * omega * omega);
+            let (first, second) = (right, -bar * G * arm * cos);
+            let det = a * d - b * c;
+            let turn = (a * second - c * first) / det;
+            let normal = mass * G + lever * (cos * turn - sin * omega * omega);
+            (normal * side, [v, (first * d - b * second) / det, omega, turn])
+        };
+        let (pressed, found) = of_side(1.0);
+        if pressed >= 0.0 { found } else { of_side(-1.0).1 }
+    };
+    let (steps, mut y) = (200_000, [0.0, 20.0, -1.5, 15.12]);
+    let h = 1.0 / f64::from(steps);
+    let ahead = |y: [f64; 4], by: f64, k: [f64; 4]| std::array::from_fn(|i| y[i] + by * k[i]);
+    for _ in 0..steps {
+        let a = rate(y);
+        let b = rate(ahead(y, 0.5 * h, a));
+        let c = rate(ahead(y, 0.5 * h, b));
+        let d = rate(ahead(y, h, c));
+        y = std::array::from_fn(|i| y[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+    }
+    for outcome in runs(&text) {
+        for (found, expected) in [(outcome.last.phi[1], y[2]), (outcome.last.omega[1], y[3])] {
+            let method = outcome.plan.method;
+            assert!((found - expected).abs() < 1e-7, "{method}: {found} and not {expected}");
+        }
+    }
+}
+
 /// A hinge at a bar's centre of mass carries nothing, and has no friction.
 #[test]
 fn a_hinge_without_a_load_has_no_friction() {

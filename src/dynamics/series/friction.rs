@@ -27,6 +27,7 @@ use super::polynomial::copy;
 use super::rows::{RowSeries, turning_terms};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::Mechanism;
+use crate::dynamics::compile::Body;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Push, Way};
 use crate::dynamics::friction::{self, Friction, Normal};
 use crate::dynamics::point::Point;
@@ -185,13 +186,20 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         self.places.iter().map(normal).collect()
     }
 
-    /// A tau of about the size of those at these normal forces, a power of two: what normal forces have of one
-    /// is a difference, and is told to as many digits as they are.
-    fn test_load(&self, start: &[Complex<T>]) -> f64 {
-        let size = |(place, normal): (&Sliding<T>, &Complex<T>)| {
-            place.coefficient.value().abs() * libm::hypot(normal.re.value(), normal.im.value())
+    /// A tau of the size that forces of the mechanism may have, a power of two: what normal forces have of one is a
+    /// difference, and is told to as many digits as these forces are.
+    fn test_load(&self, mechanism: &Mechanism, z: &[Complex<T>], rows: &RowSeries<T>) -> f64 {
+        let n = mechanism.coordinates();
+        let size = |force: Complex<T>| libm::hypot(force.re.value(), force.im.value());
+        let of_body = |((centre, body), &applied): ((&Point, &Body), &Complex<T>)| {
+            let acceleration = size(centre.turned(&z[2 * n..3 * n])) * 2.0;
+            let weight = libm::hypot(mechanism.gravity.re, mechanism.gravity.im);
+            body.mass * (acceleration + weight) + size(applied)
         };
-        let most = self.places.iter().zip(start).map(size).fold(0.0, f64::max);
+        let bodies = self.centres.iter().zip(&mechanism.bodies).zip(&self.applied).map(of_body);
+        let forces = bodies.chain(rows.multipliers(0).iter().map(|multiplier| multiplier.value().abs()));
+        let coefficients = self.places.iter().map(|place| place.coefficient.value().abs());
+        let most = forces.fold(0.0, f64::max) * coefficients.fold(0.0, f64::max);
         let load = libm::exp2(libm::log2(most).floor());
         if load.is_normal() { load } else { 1.0 }
     }
@@ -314,7 +322,7 @@ impl<T: SeriesNumber> Series<T> {
         self.solve::<0>(terms, m);
         let start = friction.normals(mechanism, m, &self.z, &self.rows);
         if m == 0 {
-            let load = friction.test_load(&start);
+            let load = friction.test_load(mechanism, &self.z, &self.rows);
             for k in 0..f {
                 friction.places[k].force[0] = T::of(load);
                 self.solve_again(terms, 0, &friction);
