@@ -157,6 +157,11 @@ impl Mechanism {
         pushed
     }
 
+    /// True where motors and locks hold a place.
+    pub(crate) fn is_driven(&self, at: Moment, place: usize) -> bool {
+        Room::new(self, at, &[], &vec![Mode::Open; self.frictions.len()]).is_held(place)
+    }
+
     /// Leaves without friction the places at rest that motors and locks hold.
     pub(super) fn spare_driven(&self, at: Moment, pushed: &[Option<f64>], options: &mut [Vec<Mode>]) {
         let resting = resting(options, pushed);

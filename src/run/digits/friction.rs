@@ -141,15 +141,15 @@ impl<'a, const W: usize> InDigits<'a, W> {
         }
     }
 
-    /// The sign of the acceleration of what a row measures.
-    fn speeding(&self, series: &Series<Digits<W>>, row: &ConstraintEquation<Digits<W>>) -> i8 {
+    /// The sign of the acceleration of what a row measures, where `unit` is the mechanism's own.
+    fn speeding(&self, series: &Series<Digits<W>>, row: &ConstraintEquation<Digits<W>>, unit: f64) -> i8 {
         let n = self.z.len();
         let acceleration = second(series, self.motion.state.t, row);
         let along = gradient(row, &self.z);
         let accelerations = &series.omega[n..2 * n];
         let parts = along.iter().zip(accelerations).fold(Digits::ZERO, |sum, (&g, &a)| sum + (g * a).abs());
         let left = acceleration - dot(&along, accelerations);
-        sign(acceleration, (parts + left.abs()).log2() + self.rounding)
+        sign(acceleration, (parts + left.abs()).log2().max(libm::log2(unit)) + self.rounding)
     }
 }
 
@@ -222,15 +222,20 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
             }),
             _ => 0,
         };
-        let gap = |&contact: &usize| self.speeding(&series, &mechanism.walls[contact].0);
+        let time = structure.units.time;
+        let gap = |&contact: &usize| {
+            let unit = structure.contacts[contact].length / (time * time);
+            self.speeding(&series, &mechanism.walls[contact].0, unit)
+        };
+        let speeding = |(place, friction): (usize, &friction::Friction<Digits<W>>)| {
+            self.speeding(&series, &friction.tangent, self.motion.speed_unit(place) / time)
+        };
         Some(Told {
             regularity: series.regularity(),
             pressures: closed.iter().zip(&rows[standing..]).map(pressure).collect(),
             leaving: touching.iter().map(gap).collect(),
             grips: mechanism.frictions.iter().zip(modes).map(grip).collect(),
-            speeding: (mechanism.frictions.iter())
-                .map(|friction| self.speeding(&series, &friction.tangent))
-                .collect(),
+            speeding: mechanism.frictions.iter().enumerate().map(speeding).collect(),
             load: load.iter().map(|x| x.value()).collect(),
         })
     }
@@ -267,6 +272,20 @@ impl<const W: usize> Motion<W> {
         structure.displacement_unit(place) / structure.units.time
     }
 
+    /// What is told in doubles of the present moment.
+    fn seen_in_doubles<R>(&self, posture: &Posture<W>, tell: impl FnOnce(Moment) -> R) -> R {
+        let in_doubles = |x: &[Digits<W>]| -> Vec<f64> { x.iter().map(|x| x.value()).collect() };
+        let (phi, omega) = (in_doubles(&posture.phi), in_doubles(&posture.omega));
+        let z = self.mechanism.structure.elements(&phi);
+        tell(Moment { t: Time::from(self.state.t.value()), phi: &phi, z: &z, omega: &omega })
+    }
+
+    /// True where motors and locks hold a place, whose velocity friction has no part in.
+    pub(super) fn is_driven(&self, place: usize) -> bool {
+        let structure = &self.mechanism.structure;
+        self.seen_in_doubles(&self.state_posture(), |at| structure.is_driven(at, place))
+    }
+
     /// The walls that hold a point and the modes of all places from the present moment on; of walls those that
     /// would hold one without friction, and all that touch and do not move along their normals.
     pub(super) fn decide(
@@ -274,14 +293,11 @@ impl<const W: usize> Motion<W> {
         contacts: [&[usize]; 2],
         transition: Transition,
     ) -> Result<Decided<W>, StepError> {
-        let evidence = InDigits::of(self);
-        let in_doubles = |x: &[Digits<W>]| -> Vec<f64> { x.iter().map(|x| x.value()).collect() };
-        let (phi, omega) = (in_doubles(&evidence.posture.phi), in_doubles(&evidence.posture.omega));
-        let structure = &self.mechanism.structure;
-        let z = structure.elements(&phi);
-        let at = Moment { t: Time::from(self.state.t.value()), phi: &phi, z: &z, omega: &omega };
+        let (evidence, structure) = (InDigits::of(self), &self.mechanism.structure);
         let before: Vec<Mode> = self.state.acting.sliding.iter().map(Mode::in_doubles).collect();
-        let found = structure.modes_by(&evidence, at, &before, contacts, transition);
+        let found = self.seen_in_doubles(&evidence.posture, |at| {
+            structure.modes_by(&evidence, at, &before, contacts, transition)
+        });
         let (walls, modes) = found.map_err(|paradox| {
             let places: Vec<&str> =
                 structure.frictions.iter().map(|friction| friction.name.as_str()).collect();

@@ -172,14 +172,23 @@ impl<const W: usize> Motion<W> {
     /// Lets it take effect what a place with friction does.
     pub(super) fn rubs(&mut self, rub: Rub) -> Result<(), StepError> {
         let held = self.state().acting.held.clone();
+        let alone = |motion: &Self, place: usize, mode: Mode<Digits<W>>| {
+            let mut modes = motion.state().acting.sliding.clone();
+            modes[place] = mode;
+            modes
+        };
         match rub {
+            // How it goes on is told by the series of its velocity.
+            Rub::Arrives(place) if self.is_driven(place) => {
+                let modes = alone(self, place, Mode::Strained(0.0));
+                self.hold(held, modes, &[])
+            }
             Rub::Arrives(place) => self.rub(&held, Transition { arrived: Some(place), breaks: None }),
             Rub::Breaks(place, sign) => {
                 self.rub(&held, Transition { arrived: None, breaks: Some((place, sign)) })
             }
             Rub::Moves(place, sign) => {
-                let mut modes = self.state().acting.sliding.clone();
-                modes[place] = Mode::Slip(sign);
+                let modes = alone(self, place, Mode::Slip(sign));
                 self.hold(held, modes, &[])
             }
             Rub::Reverses => Ok(()),
