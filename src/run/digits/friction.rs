@@ -5,25 +5,22 @@
 //! what is rounding in three quarters of the digits is zero.  Whether a place is held by the others, a matter
 //! of geometry, is told in doubles.  A place that sticks is a row like any other, the last ones.
 
+use super::evidence::{InDigits, gradient, second};
 use super::keep::Keeper;
 use super::motion::{LongState, Motion};
 use super::posture::Posture;
-use super::wall::{gap, gap_rate};
+use super::wall::{GapRate, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
-use crate::arithmetic::{Complex, Real, Scalar};
-use crate::dynamics::compile::exact::{Acting, ExactMechanism};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
-use crate::dynamics::friction::modes::{Evidence, HINT, Told};
+use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::Time;
+use crate::dynamics::compile::exact::Acting;
+use crate::dynamics::friction::modes::HINT;
 use crate::dynamics::friction::{self, Mode, Moment, Normal, Transition};
 use crate::dynamics::kernel::dot;
-use crate::dynamics::series::Series;
-use crate::dynamics::{Coordinates, Time};
 use crate::stepping::{Cause, StepError};
 
 /// Part of the digits in which velocities, accelerations and forces are told from rounding.
 pub(super) const SURE: f64 = 0.75;
-/// Powers of the rates that accelerations are taken from.
-const POWERS: usize = 2;
 /// Transitions that are kept.
 const KEPT: usize = 100_000;
 /// What places do, as transitions count it.
@@ -79,184 +76,6 @@ pub fn mode_from_words<const W: usize>((kind, sign, at): &(u8, f64, Vec<u64>)) -
     }
 }
 
-/// What is known of a moment in many digits.
-struct InDigits<'a, const W: usize> {
-    motion: &'a Motion<W>,
-    posture: Posture<W>,
-    z: Vec<Complex<Digits<W>>>,
-    /// Where each place sticks, if it does.
-    anchors: Vec<Digits<W>>,
-    /// log2 of the part of a number that is rounding.
-    rounding: f64,
-}
-
-impl<'a, const W: usize> InDigits<'a, W> {
-    fn of(motion: &'a Motion<W>) -> Self {
-        let posture = motion.state_posture();
-        let mechanism = &motion.mechanism;
-        let z = mechanism.elements(&posture.phi);
-        let anchor = |(friction, mode): (&friction::Friction<Digits<W>>, &Mode<Digits<W>>)| match mode {
-            Mode::Stick(at) => *at,
-            _ => friction.displacement(&posture.phi, &z),
-        };
-        let anchors = mechanism.frictions.iter().zip(&mechanism.acting.sliding).map(anchor).collect();
-        Self { motion, posture, z, anchors, rounding: motion.precision.rounding(SURE) }
-    }
-
-    /// Modes with the displacements of what sticks in all digits.
-    fn exact(&self, modes: &[Mode]) -> Vec<Mode<Digits<W>>> {
-        let exact = |(mode, &at): (&Mode, &Digits<W>)| match *mode {
-            Mode::Open => Mode::Open,
-            Mode::Stick(_) => Mode::Stick(at),
-            Mode::Slip(sign) => Mode::Slip(sign),
-            Mode::Strained(sign) => Mode::Strained(sign),
-        };
-        modes.iter().zip(&self.anchors).map(exact).collect()
-    }
-
-    fn mechanism(&self, closed: &[usize], modes: &[Mode]) -> Option<ExactMechanism<Digits<W>>> {
-        let (held, sliding) = (closed.to_vec(), self.exact(modes));
-        self.motion.mechanism.with(Acting { held, sliding, ..self.motion.state.acting.clone() }).ok()
-    }
-
-    /// The first powers of the motion in these modes.
-    fn series(&self, mechanism: &ExactMechanism<Digits<W>>) -> Series<Digits<W>> {
-        let Posture { phi, omega, .. } = &self.posture;
-        let mut series = Series::of_terms(&mechanism.terms(), Coordinates::All, POWERS);
-        series.resolve_reversals(self.rounding);
-        let zeros = vec![Digits::ZERO; phi.len()];
-        series.expand_terms(&mechanism.terms(), self.motion.state.t, phi, &zeros, omega);
-        series
-    }
-
-    /// The relative velocity of a place at these rates, zero where it is rounding.
-    fn rate(&self, place: usize, omega: &[Digits<W>]) -> f64 {
-        let gradient = gradient(&self.motion.mechanism.frictions[place].tangent, &self.z);
-        let rate = dot(&gradient, omega);
-        let parts = gradient.iter().zip(omega).fold(Digits::ZERO, |sum, (&g, &w)| sum + (g * w).abs());
-        let unit = self.motion.speed_unit(place);
-        match sign(rate, parts.log2().max(libm::log2(unit)) + self.rounding) {
-            0 => 0.0,
-            side => f64::from(side) * rate.value().abs().max(f64::MIN_POSITIVE),
-        }
-    }
-
-    /// The sign of the acceleration of what a row measures, where `unit` is the mechanism's own.
-    fn speeding(&self, series: &Series<Digits<W>>, row: &ConstraintEquation<Digits<W>>, unit: f64) -> i8 {
-        let n = self.z.len();
-        let acceleration = second(series, self.motion.state.t, row);
-        let along = gradient(row, &self.z);
-        let accelerations = &series.omega[n..2 * n];
-        let parts = along.iter().zip(accelerations).fold(Digits::ZERO, |sum, (&g, &a)| sum + (g * a).abs());
-        let left = acceleration - dot(&along, accelerations);
-        sign(acceleration, (parts + left.abs()).log2().max(libm::log2(unit)) + self.rounding)
-    }
-}
-
-/// The second derivative of what a row measures.
-fn second<const W: usize>(
-    series: &Series<Digits<W>>,
-    t: Digits<W>,
-    row: &ConstraintEquation<Digits<W>>,
-) -> Digits<W> {
-    let n = series.elements();
-    match row.measure {
-        Measure::Place(_) => gap(series, t, row)[2].scale(2.0),
-        Measure::Angle { body, base } => {
-            base.map_or(series.omega[n + body], |base| series.omega[n + body] - series.omega[n + base])
-        }
-    }
-}
-
-/// The sign of a number, zero where its log2 is not above this.
-fn sign<const W: usize>(x: Digits<W>, least: f64) -> i8 {
-    let size = x.log2();
-    match size > least {
-        true if x < Digits::ZERO => -1,
-        true => 1,
-        false => 0,
-    }
-}
-
-/// The gradient of what a row measures, by all coordinates.
-pub(super) fn gradient<const W: usize>(
-    row: &ConstraintEquation<Digits<W>>,
-    z: &[Complex<Digits<W>>],
-) -> Vec<Digits<W>> {
-    let mut gradient = vec![Digits::ZERO; z.len()];
-    match &row.measure {
-        Measure::Place(place) => place.slopes(z, |k, slope| gradient[k] += slope),
-        Measure::Angle { body, base } => {
-            gradient[*body] += Digits::ONE;
-            base.iter().for_each(|&base| gradient[base] -= Digits::ONE);
-        }
-    }
-    gradient
-}
-
-impl<const W: usize> Evidence for InDigits<'_, W> {
-    fn rates(&self) -> Vec<f64> {
-        (0..self.anchors.len()).map(|place| self.rate(place, &self.posture.omega)).collect()
-    }
-
-    fn told(&self, closed: &[usize], modes: &[Mode], touching: &[usize]) -> Option<Told> {
-        let mechanism = self.mechanism(closed, modes)?;
-        let series = self.series(&mechanism);
-        let (n, rows) = (self.z.len(), series.multipliers(0));
-        let load = &series.omega[n..2 * n];
-        if !load.iter().chain(rows).all(|x| x.is_finite()) {
-            return None;
-        }
-        let structure = &mechanism.structure;
-        let standing = structure.standing_rows();
-        let pressure = |(&contact, &force): (&usize, &Digits<W>)| {
-            sign(-force, libm::log2(structure.contacts[contact].force) + self.rounding)
-        };
-        let most = rows.iter().map(Digits::log2).fold(f64::NEG_INFINITY, f64::max);
-        let mut stuck = rows[standing + closed.len()..].iter().zip(series.sticks());
-        let grip = |(friction, mode): (&friction::Friction<Digits<W>>, &Mode)| match mode {
-            Mode::Stick(_) => stuck.next().map_or(0, |(tau, normal)| {
-                let pressing = friction::size(friction.normal, normal[0]).0;
-                let size = pressing.log2().max(most) + friction.stiction.log2();
-                sign(friction.stiction * pressing - tau.abs(), size + self.rounding)
-            }),
-            _ => 0,
-        };
-        let time = structure.units.time;
-        let gap = |&contact: &usize| {
-            let unit = structure.contacts[contact].length / (time * time);
-            self.speeding(&series, &mechanism.walls[contact].0, unit)
-        };
-        let speeding = |(place, friction): (usize, &friction::Friction<Digits<W>>)| {
-            self.speeding(&series, &friction.tangent, self.motion.speed_unit(place) / time)
-        };
-        Some(Told {
-            regularity: series.regularity(),
-            pressures: closed.iter().zip(&rows[standing..]).map(pressure).collect(),
-            leaving: touching.iter().map(gap).collect(),
-            grips: mechanism.frictions.iter().zip(modes).map(grip).collect(),
-            speeding: mechanism.frictions.iter().enumerate().map(speeding).collect(),
-            load: load.iter().map(|x| x.value()).collect(),
-        })
-    }
-
-    fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], _is_driven: bool) -> bool {
-        let mut modes = modes.to_vec();
-        modes[place] = Mode::Open;
-        self.told(closed, &modes, &[]).is_some_and(|told| told.speeding[place] == 0)
-    }
-
-    fn stands(&self, place: usize, closed: &[usize]) -> bool {
-        let Some(mechanism) = self.mechanism(closed, &vec![Mode::Open; self.anchors.len()]) else {
-            return false;
-        };
-        let Posture { phi, mut omega, .. } = self.posture.clone();
-        let mut keeper = Keeper::new(&mechanism, self.motion.precision);
-        keeper.close(&mechanism, self.motion.state.t, &phi, &mut omega);
-        self.rate(place, &omega) == 0.0
-    }
-}
-
 /// Walls that hold a point, and what places with friction do.
 pub(super) type Decided<const W: usize> = (Vec<usize>, Vec<Mode<Digits<W>>>);
 
@@ -307,12 +126,32 @@ impl<const W: usize> Motion<W> {
         Ok((walls, modes))
     }
 
-    /// Decides anew what sticks and what slides, and which of these walls hold a point.
-    pub(super) fn rub(&mut self, walls: &[usize], transition: Transition) -> Result<(), StepError> {
-        self.rub_at(walls, walls, transition)
+    /// Decides anew what sticks and what slides, and which walls hold a point: those that do so, or others that
+    /// touch.
+    pub(super) fn rub(&mut self, transition: Transition) -> Result<(), StepError> {
+        let held = self.state.acting.held.clone();
+        // Without friction at walls it is known which are pressed.
+        let at_wall = |friction: &friction::Friction<_>| matches!(friction.normal, Normal::Contact(_));
+        let touching =
+            if self.mechanism.frictions.iter().any(at_wall) { self.touching() } else { held.clone() };
+        self.rub_at(&held, &touching, transition)
     }
 
-    /// The same where other walls are touched as well.
+    /// Walls that touch a point which does not move along its normal.
+    fn touching(&self) -> Vec<usize> {
+        let structure = &self.mechanism.structure;
+        let touches = |&wall: &usize| {
+            let (row, contact) = (&self.mechanism.walls[wall].0, &structure.contacts[wall]);
+            let gap = gap_rate(self, wall);
+            self.state.acting.held.contains(&wall)
+                || !self.is_off(row)
+                    && !contact.is_dead(dot(&gap.gradient, &gap.gradient).value())
+                    && self.follows(wall, distance(self, row))
+        };
+        (0..self.mechanism.walls.len()).filter(touches).collect()
+    }
+
+    /// The same with walls that would hold a point without friction, and those that touch.
     pub(super) fn rub_at(
         &mut self,
         staying: &[usize],
@@ -321,9 +160,29 @@ impl<const W: usize> Motion<W> {
     ) -> Result<(), StepError> {
         let (walls, modes) = self.decide([staying, touching], transition)?;
         self.state.is_decided = true;
-        let since: Vec<Digits<W>> =
-            walls.iter().map(|&wall| self.state.t + self.bounces_last(wall, &walls, &modes)).collect();
-        self.hold(walls, modes, &since)
+        let last: Vec<Digits<W>> =
+            walls.iter().map(|&wall| self.bounces_last(wall, &walls, &modes)).collect();
+        let since: Vec<_> = last.iter().map(|&last| self.state.t + last).collect();
+        self.hold(walls.clone(), modes, &since)?;
+        self.leave_to_impacts(&walls, &last);
+        Ok(())
+    }
+
+    /// Takes off what is lost in friction what it would take at these walls for so long \[s\], as bounces have not
+    /// ended before: that is lost in impacts.
+    fn leave_to_impacts(&mut self, walls: &[usize], last: &[Digits<W>]) {
+        if last.iter().all(Digits::is_zero) {
+            return;
+        }
+        let series = InDigits::of(self).series(&self.mechanism);
+        let modes = self.mechanism.frictions.iter().zip(&self.state.acting.sliding);
+        let slide = modes.filter(|(_, mode)| matches!(mode, Mode::Slip(_) | Mode::Strained(_)));
+        let mut lost = self.state.lost;
+        for ((friction, _), slides) in slide.zip(series.slides()) {
+            let at = walls.iter().position(|&wall| friction.normal == Normal::Contact(wall));
+            lost -= at.map_or(Digits::ZERO, |at| slides.force[0] * slides.speed[0] * last[at]);
+        }
+        self.state.lost = lost;
     }
 
     /// How much longer a point would go on bouncing on its wall while these walls hold points and places are in
@@ -387,7 +246,7 @@ impl<const W: usize> Motion<W> {
         });
         let responses: Vec<Vec<Digits<W>>> =
             pushes.map(|push| keeper.response(&rest, t, [&phi, &omega], &push).0).collect();
-        let entry = |gap: &super::wall::GapRate<W>| {
+        let entry = |gap: &GapRate<W>| {
             responses.iter().map(|response| dot(&gap.gradient, response)).collect::<Vec<_>>()
         };
         let mut matrix: Vec<_> = gaps.iter().flat_map(entry).collect();

@@ -8,6 +8,7 @@ mod acting;
 mod branches;
 mod confirm;
 mod events;
+mod evidence;
 mod friction;
 mod functions;
 mod growth;

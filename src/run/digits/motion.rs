@@ -281,8 +281,7 @@ impl<const W: usize> Motion<W> {
                 None => {}
             }
             if !self.state.is_decided {
-                let held = self.state.acting.held.clone();
-                self.rub(&held, Transition::default())?;
+                self.rub(Transition::default())?;
                 continue;
             }
             match rubbing::first(self, end.0.value())? {

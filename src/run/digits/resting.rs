@@ -312,7 +312,7 @@ impl<const W: usize> Motion<W> {
             false => set.push(wall),
         }
         set.sort_unstable();
-        self.rub(&set, Transition::default())
+        self.rub_at(&set, &set, Transition::default())
     }
 
     /// Goes on with these points held, those of them that are not yet from these times on, and places with
@@ -373,8 +373,7 @@ impl<const W: usize> Motion<W> {
         if !self.has_friction() || !self.state.is_decided {
             return Ok(());
         }
-        let held = self.state.acting.held.clone();
-        self.rub(&held, Transition::default())
+        self.rub(Transition::default())
     }
 
     /// Lets the points of these walls go.
@@ -383,7 +382,7 @@ impl<const W: usize> Motion<W> {
         let set: Vec<usize> = held.filter(|wall| !walls.contains(wall)).collect();
         match set == self.state.acting.held {
             true => Ok(()),
-            false if self.has_friction() => self.rub(&set, Transition::default()),
+            false if self.has_friction() => self.rub_at(&set, &set, Transition::default()),
             false => self.hold(set, Vec::new(), &[]),
         }
     }

@@ -183,10 +183,8 @@ impl<const W: usize> Motion<W> {
                 let modes = alone(self, place, Mode::Strained(0.0));
                 self.hold(held, modes, &[])
             }
-            Rub::Arrives(place) => self.rub(&held, Transition { arrived: Some(place), breaks: None }),
-            Rub::Breaks(place, sign) => {
-                self.rub(&held, Transition { arrived: None, breaks: Some((place, sign)) })
-            }
+            Rub::Arrives(place) => self.rub(Transition { arrived: Some(place), breaks: None }),
+            Rub::Breaks(place, sign) => self.rub(Transition { arrived: None, breaks: Some((place, sign)) }),
             Rub::Moves(place, sign) => {
                 let modes = alone(self, place, Mode::Slip(sign));
                 self.hold(held, modes, &[])

@@ -3,7 +3,8 @@
 //!
 //! Friction in hinges and sliders takes no part in impacts: what sticks there may slide after one.
 
-use super::friction::{SURE, gradient};
+use super::evidence::gradient;
+use super::friction::SURE;
 use super::keep::Keeper;
 use super::motion::Motion;
 use super::resting;
