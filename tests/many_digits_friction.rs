@@ -345,6 +345,108 @@ fn shipped_scenes_move_as_in_doubles() {
     }
 }
 
+/// A four-bar whose third bar another one follows in parallel: a constraint too many leaves the forces in the hinges
+/// open, as in doubles.
+#[test]
+fn friction_in_redundant_joints_is_refused() {
+    let bar = |name: &str, length: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": {length}}}"#)
+    };
+    let hinge = |name: &str, a: &str, x: &str, b: &str, y: &str, more: &str| {
+        format!(
+            r#"{{"name": "{name}", "between": [{{"body": "{a}", "point": [{x}, 0]}}, {{"body": "{b}", "point": [{y}, 0]}}]{more}}}"#
+        )
+    };
+    let rubs = r#", "friction": {"radius": 0.01, "kinetic": 0.1}"#;
+    let text = format!(
+        r#"{{"name": "parallel", "gravity": [0, -9.81], "bars": [{}, {}, {}, {}], "hinges": [{}, {}, {}, {}, {}, {}],
+        "start": {{"a": {{"phi": 1, "omega": 0}}, "b": {{"phi": 1}}, "c": {{"phi": 1}}, "d": {{"phi": 0}}}}, "until": 1, "every": 1}}"#,
+        bar("a", "0.4"),
+        bar("b", "0.4"),
+        bar("c", "0.4"),
+        bar("d", "1"),
+        hinge("A", "ground", "0", "a", "0", rubs),
+        hinge("B", "ground", "0.5", "b", "0", ""),
+        hinge("C", "ground", "1", "c", "0", ""),
+        hinge("P", "a", "0.4", "d", "0", ""),
+        hinge("Q", "b", "0.4", "d", "0.5", ""),
+        hinge("R", "c", "0.4", "d", "1", "")
+    );
+    let refusal = long_run(&source(&text, &[], "1", "1"), Precision::new(30, true)).err().expect("a refusal");
+    assert!(refusal.to_string().contains("constraints are redundant"), "{refusal}");
+}
+
+/// A disc in a hinge on a carriage that is pushed to and fro: the hinge carries 10 |cos 4t| N, which passes zero at
+/// π/8 and 3π/8, and friction takes 0.15 |cos 4t| N m.
+#[test]
+fn a_force_in_a_hinge_that_passes_zero_brakes_by_its_size() {
+    let text = r#"{"name": "carried", "gravity": [0, 0],
+        "bars": [{"name": "disc", "mass": 0.8, "centre": [0, 0], "inertia": 0.02, "length": 0.1},
+            {"name": "carriage", "mass": 1.2, "centre": [0, 0], "inertia": 0.01, "length": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "carriage", "point": [0, 0]}, {"body": "disc", "point": [0, 0]}],
+            "friction": {"radius": 0.05, "kinetic": 0.3}}],
+        "sliders": [{"name": "guide", "point": {"body": "carriage", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [3, 4]}}],
+        "forces": [{"name": "F", "body": "carriage", "point": [0, 0], "force": ["15*cos(4*t)", "20*cos(4*t)"]}],
+        "start": {"carriage": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}, "disc": {"phi": 0, "omega": 40}},
+        "until": 9, "every": 9}"#;
+    for digits in [30, 60] {
+        let lost = times(&fixed("1.875"), &(one() * 2 - sine(&fixed("4"))));
+        ran(text, "1", digits).has(&[(1, fixed("40") - lost)], digits as u32 - 3);
+    }
+}
+
+/// Rods, tables, belts, slots and stops.
+#[test]
+fn mechanisms_with_friction_agree_with_other_digits_and_with_doubles() {
+    let table = r#"{"name": "ball", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+        "walls": [{"name": "table", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]},
+            "restitution": 0, "friction": {"kinetic": 0.3}, "law": "-3*t^3"}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [4, 0]}}, "until": 1, "every": 1}"#;
+    let belt = r#"{"name": "belt", "gravity": [0, -9.81], "bars": [{"name": "belt", "mass": 3, "centre": [0, 0], "inertia": 0.1},
+            {"name": "load", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+        "sliders": [{"name": "guide", "point": {"body": "belt", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0.1]}}],
+        "motors": [{"name": "drive", "slider": "guide", "law": "0.3*sin(3*t)"}],
+        "walls": [{"name": "top", "body": "load", "point": [0, 0], "restitution": 0.2, "friction": {"kinetic": 0.15, "static": 0.2},
+            "line": {"body": "belt", "through": [0, 0.1], "normal": [0.05, 1]}}],
+        "start": {"belt": {}, "load": {"phi": 0, "omega": 0, "origin": [0, 0.3], "velocity": [0.5, 0]}}, "until": 2, "every": 2}"#;
+    let slot = r#"{"name": "slot", "gravity": [0, 0], "bars": [{"name": "crank", "mass": 1, "centre": [0, 0], "inertia": 0.2, "length": 0.2},
+            {"name": "rocker", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.8}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "ground", "point": [0.5, 0]}, {"body": "rocker", "point": [0, 0]}]}],
+        "sliders": [{"name": "pin", "point": {"body": "crank", "point": [0.2, 0]},
+            "rail": {"body": "rocker", "point": [0, 0], "direction": [1, 0]}, "friction": {"kinetic": 0.2}}],
+        "start": {"crank": {"phi": 0.3, "omega": 9}, "rocker": {"phi": 2.941}}, "until": 0.7, "every": 0.7}"#;
+    let stop = r#"{"name": "block", "gravity": [0, -10], "bars": [{"name": "block", "mass": 2, "centre": [0, 0], "inertia": 0.1}],
+        "sliders": [{"name": "rail", "point": {"body": "block", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "friction": {"kinetic": 0.4, "static": 0.6}}],
+        "walls": [{"name": "wall", "body": "block", "point": [0, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [1, 0]}}],
+        "forces": [{"name": "F", "body": "block", "point": [0, 0], "force": ["-30*cos(t)", 0]}],
+        "start": {"block": {"phi": 0, "omega": 0, "origin": [0.5, 0], "velocity": [-2, 0]}}, "until": 3, "every": 3}"#;
+    let rough = r#"{"name": "rest", "gravity": [0, -9.81], "bars": [{"name": "a", "mass": 0.7, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6},
+            {"name": "b", "mass": 0.6, "centre": [0.2, 0.1], "inertia": 0.014, "length": 0.5}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0.1, 0]}], "friction": {"radius": 0.03, "kinetic": 0.2}},
+            {"name": "B", "between": [{"body": "a", "point": [0.4, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "walls": [{"name": "floor", "body": "b", "point": [0.5, 0], "restitution": 0.4, "friction": {"kinetic": 0.3},
+            "line": {"through": [0, -0.45], "normal": [0.1, 1]}}],
+        "start": {"a": {"phi": 0.1, "omega": 0}, "b": {"phi": -0.5, "omega": -1.5}}, "until": 0.9, "every": 0.9}"#;
+    let mut impacts = 0;
+    for (text, until, turns) in [
+        (&rod(1.1, 0.4, 3.0, 0.3, 0.25)[..], "0.25", 1),
+        (table, "1", 2),
+        (belt, "2", 3),
+        (slot, "0.7", 1),
+        (stop, "3", 2),
+        (rough, "0.9", 1),
+    ] {
+        let found = compared(text, until).expect("no stop");
+        assert!(found.turns.len() >= turns, "{:?}\n{text}", found.turns);
+        impacts += found.impacts;
+    }
+    assert!(impacts > 3, "{impacts}");
+}
+
 /// How a random scene goes in few digits, in more and in doubles.
 fn compared(text: &str, until: &str) -> Option<Ran> {
     let plain = in_doubles(text, until);

@@ -38,7 +38,7 @@ use self::friction::Turn;
 use self::motion::Motion;
 use self::resting::Hold;
 use super::magnitude::changes;
-use super::plan::Refusal;
+use super::plan::{Refusal, check_forces_of_joints};
 use crate::arithmetic::digits::{Digits, MOST};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Mechanism;
@@ -189,6 +189,7 @@ struct Runner<const W: usize> {
 
 impl<const W: usize> Runner<W> {
     fn new(source: &Source, precision: Precision) -> Result<Self, LongError> {
+        check_forces_of_joints(&source.mechanism)?;
         let (scene, times) = source.template.exact::<Digits<W>>(&source.typed)?;
         let time = |text: &Option<String>, other: Digits<W>| {
             text.as_ref().map_or(Some(other), |text| exact_number(text))
