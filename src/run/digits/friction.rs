@@ -17,6 +17,7 @@ use crate::dynamics::compile::exact::Acting;
 use crate::dynamics::friction::modes::HINT;
 use crate::dynamics::friction::{self, Mode, Moment, Normal, Transition};
 use crate::dynamics::kernel::dot;
+use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
 
 /// Part of the digits in which velocities, accelerations and forces are told from rounding.
@@ -74,6 +75,20 @@ pub fn mode_from_words<const W: usize>((kind, sign, at): &(u8, f64, Vec<u64>)) -
         3 => Some(Mode::Strained(*sign)),
         _ => None,
     }
+}
+
+/// How long bounces last \[s\], and the motion between them.
+type Flight<const W: usize> = (Digits<W>, Series<Digits<W>>);
+
+/// What a motion between bounces that are left out has that one on the wall has not: normal forces of other places,
+/// and their friction with them, are others.
+pub(super) struct Flown<const W: usize> {
+    /// Change of the rates of all coordinates.
+    pub change: Vec<Digits<W>>,
+    /// Work \[J\].
+    pub work: Digits<W>,
+    /// Energy lost in friction \[J\].
+    pub lost: Digits<W>,
 }
 
 /// Walls that hold a point, and what places with friction do.
@@ -160,37 +175,19 @@ impl<const W: usize> Motion<W> {
     ) -> Result<(), StepError> {
         let (walls, modes) = self.decide([staying, touching], transition)?;
         self.state.is_decided = true;
-        let last: Vec<Digits<W>> =
-            walls.iter().map(|&wall| self.bounces_last(wall, &walls, &modes)).collect();
-        let since: Vec<_> = last.iter().map(|&last| self.state.t + last).collect();
-        self.hold(walls.clone(), modes, &since)?;
-        self.leave_to_impacts(&walls, &last);
-        Ok(())
-    }
-
-    /// Takes off what is lost in friction what it would take at these walls for so long \[s\], as bounces have not
-    /// ended before: that is lost in impacts.
-    fn leave_to_impacts(&mut self, walls: &[usize], last: &[Digits<W>]) {
-        if last.iter().all(Digits::is_zero) {
-            return;
-        }
-        let series = InDigits::of(self).series(&self.mechanism);
-        let modes = self.mechanism.frictions.iter().zip(&self.state.acting.sliding);
-        let slide = modes.filter(|(_, mode)| matches!(mode, Mode::Slip(_) | Mode::Strained(_)));
-        let mut lost = self.state.lost;
-        for ((friction, _), slides) in slide.zip(series.slides()) {
-            let at = walls.iter().position(|&wall| friction.normal == Normal::Contact(wall));
-            lost -= at.map_or(Digits::ZERO, |at| slides.force[0] * slides.speed[0] * last[at]);
-        }
-        self.state.lost = lost;
+        let flights: Vec<_> = walls.iter().map(|&wall| self.flight(wall, &walls, &modes)).collect();
+        let last = |flight: &Option<Flight<W>>| flight.as_ref().map_or(Digits::ZERO, |(last, _)| *last);
+        let since: Vec<_> = flights.iter().map(|flight| self.state.t + last(flight)).collect();
+        let flown = self.flown(flights.iter().flatten(), &walls, &modes);
+        self.hold(walls, modes, &since, flown)
     }
 
     /// How much longer a point would go on bouncing on its wall while these walls hold points and places are in
-    /// these modes \[s\].
-    fn bounces_last(&self, wall: usize, walls: &[usize], modes: &[Mode<Digits<W>>]) -> Digits<W> {
+    /// these modes \[s\], and how it would fly.
+    fn flight(&self, wall: usize, walls: &[usize], modes: &[Mode<Digits<W>>]) -> Option<Flight<W>> {
         let (speed, restitution) = (gap_rate(self, wall).rate, self.mechanism.walls[wall].1);
         if self.state.acting.held.contains(&wall) || speed <= Digits::ZERO || restitution >= Digits::ONE {
-            return Digits::ZERO;
+            return None;
         }
         // Those that bounce as well do not press.
         let evidence = InDigits::of(self);
@@ -205,13 +202,36 @@ impl<const W: usize> Motion<W> {
             if flies(friction.normal) { Mode::Open } else { mode.in_doubles() }
         };
         let modes: Vec<Mode> = self.mechanism.frictions.iter().zip(modes).map(mode).collect();
-        let Some(mechanism) = evidence.mechanism(&others, &modes) else { return Digits::ZERO };
+        let mechanism = evidence.mechanism(&others, &modes)?;
         let series = evidence.series(&mechanism);
         let inward = -second(&series, self.state.t, &mechanism.walls[wall].0);
-        match inward > Digits::ZERO {
-            true => speed.scale(2.0) / (inward * (Digits::ONE - restitution)),
-            false => Digits::ZERO,
-        }
+        let last = speed.scale(2.0) / (inward * (Digits::ONE - restitution));
+        (inward > Digits::ZERO).then_some((last, series))
+    }
+
+    /// What flights change while bounces last, beside what is so where these walls hold their points at once.
+    fn flown<'a>(
+        &self,
+        flights: impl Iterator<Item = &'a Flight<W>>,
+        walls: &[usize],
+        modes: &[Mode<Digits<W>>],
+    ) -> Option<Flown<W>> {
+        let mut flights = flights.peekable();
+        flights.peek()?;
+        let evidence = InDigits::of(self);
+        let modes: Vec<Mode> = modes.iter().map(Mode::in_doubles).collect();
+        let held = evidence.series(&evidence.mechanism(walls, &modes)?);
+        let n = held.elements();
+        let first = |of: &[Digits<W>]| of.first().copied().unwrap_or(Digits::ZERO);
+        let nothing = Flown { change: vec![Digits::ZERO; n], work: Digits::ZERO, lost: Digits::ZERO };
+        Some(flights.fold(nothing, |mut flown, (last, flight)| {
+            let accelerations = flight.omega[n..2 * n].iter().zip(&held.omega[n..2 * n]);
+            let changes = flown.change.iter_mut().zip(accelerations);
+            changes.for_each(|(change, (&flies, &is_held))| *change += (flies - is_held) * *last);
+            flown.work += (first(&flight.power) - first(&held.power)) * *last;
+            flown.lost += (first(flight.lost()) - first(held.lost())) * *last;
+            flown
+        }))
     }
 
     /// Takes the velocities along their normals off points that come to rest on walls along which they slide,

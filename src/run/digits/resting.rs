@@ -14,6 +14,7 @@
 //! it plastically and booked as that of impacts.  Bounces that are left out last `τ = 2 v/(a (1-e))`; what
 //! they would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
 
+use super::friction::Flown;
 use super::keep::Keeper;
 use super::motion::{LongState, Motion};
 use super::posture::Posture;
@@ -288,7 +289,7 @@ impl<const W: usize> Motion<W> {
         let since: Vec<Digits<W>> = (set.iter())
             .map(|&wall| self.state().t + touching.bounces_last(wall, &set, self.mechanism.walls[wall].1))
             .collect();
-        self.hold(set, Vec::new(), &since)
+        self.hold(set, Vec::new(), &since, None)
     }
 
     /// The same where there is friction: `set` would stay without it, `touching` touch.
@@ -322,6 +323,7 @@ impl<const W: usize> Motion<W> {
         set: Vec<usize>,
         sliding: Vec<Mode<Digits<W>>>,
         since: &[Digits<W>],
+        flown: Option<Flown<W>>,
     ) -> Result<(), StepError> {
         let before = self.energy();
         let t = self.state.t;
@@ -349,11 +351,17 @@ impl<const W: usize> Motion<W> {
         self.state.radius = None;
         self.tell_turns(&had, &begin);
         if has_new {
+            let mut flown_work = Digits::ZERO;
+            if let Some(Flown { change, work, lost }) = flown {
+                self.state.rate.iter_mut().zip(change).for_each(|(rate, change)| *rate += change);
+                self.state.lost += lost;
+                flown_work = work;
+            }
             let pressed = if is_pressed { self.press()? } else { Digits::ZERO };
             let LongState { t, u, rate, .. } = &mut self.state;
             let (work, _) = self.keeper.close(&self.mechanism, *t, u, rate);
             self.settle()?;
-            let work = work + pressed;
+            let work = work + pressed + flown_work;
             self.state.work += work;
             self.state.jump_energy += self.energy() - before - work;
         }
@@ -383,7 +391,7 @@ impl<const W: usize> Motion<W> {
         match set == self.state.acting.held {
             true => Ok(()),
             false if self.has_friction() => self.rub_at(&set, &set, Transition::default()),
-            false => self.hold(set, Vec::new(), &[]),
+            false => self.hold(set, Vec::new(), &[], None),
         }
     }
 

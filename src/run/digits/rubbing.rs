@@ -181,13 +181,13 @@ impl<const W: usize> Motion<W> {
             // How it goes on is told by the series of its velocity.
             Rub::Arrives(place) if self.is_driven(place) => {
                 let modes = alone(self, place, Mode::Strained(0.0));
-                self.hold(held, modes, &[])
+                self.hold(held, modes, &[], None)
             }
             Rub::Arrives(place) => self.rub(Transition { arrived: Some(place), breaks: None }),
             Rub::Breaks(place, sign) => self.rub(Transition { arrived: None, breaks: Some((place, sign)) }),
             Rub::Moves(place, sign) => {
                 let modes = alone(self, place, Mode::Slip(sign));
-                self.hold(held, modes, &[])
+                self.hold(held, modes, &[], None)
             }
             Rub::Reverses => Ok(()),
         }
