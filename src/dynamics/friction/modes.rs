@@ -319,7 +319,7 @@ impl Mechanism {
             Mode::Open => true,
             // Where the travel of a moving linkage turns back, the linkage moves it on, and no force of
             // friction holds it.
-            Mode::Stick(_) => told.grips[number] >= 0 && !(is_held(number) && !is_still(number, false)),
+            Mode::Stick(_) => told.grips[number] >= 0 && (!is_held(number) || is_still(number, false)),
             Mode::Slip(sign) => {
                 let slides = rates[number] != 0.0 && arrived != Some(number);
                 // What breaks begins with what the coefficients leave, which may be nothing.

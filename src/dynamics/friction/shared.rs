@@ -158,6 +158,7 @@ impl Mechanism {
     }
 
     /// True where motors and locks hold a place.
+    #[cfg(feature = "digits")]
     pub(crate) fn is_driven(&self, at: Moment, place: usize) -> bool {
         Room::new(self, at, &[], &vec![Mode::Open; self.frictions.len()]).is_held(place)
     }

@@ -45,7 +45,7 @@ impl<const W: usize> Turn<W> {
     }
 
     /// What is saved of it.
-    pub fn to_words(&self) -> (usize, usize, Vec<u64>) {
+    pub fn saved(&self) -> (usize, usize, Vec<u64>) {
         (self.place, self.does, self.t.to_words())
     }
 

@@ -71,7 +71,7 @@ pub(super) fn save<const W: usize>(run: &Runner<W>) -> Saved {
         holds: holds.iter().map(Hold::to_words).collect(),
         sliding: acting.sliding.iter().map(mode_to_words).collect(),
         is_decided: *is_decided,
-        turns: turns.iter().map(Turn::to_words).collect(),
+        turns: turns.iter().map(Turn::saved).collect(),
     }
 }
 
