@@ -56,7 +56,7 @@ fn what_makes_no_sense_is_refused_and_leaves_no_files() {
         "rigid.json",
         r#"{"name": "rigid", "gravity": [0, -9.81], "bars": [{"name": "bob", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
         "springs": [{"name": "rope", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bob", "point": [0, 0]}],
-            "stiffness": 1e7, "free_length": 1, "rigid": true}],
+            "stiffness": 1e7, "free_length": 1, "model": "rigid"}],
         "start": {"bob": {"phi": 0, "omega": 0, "origin": [1, 0], "velocity": [0, 0]}}, "until": 1, "every": 1}"#,
     );
     for (arguments, code, word) in [

@@ -142,8 +142,7 @@ impl<C: Decimal> ExactMechanism<C> {
         }
         let partition = CoordinatePartition::new(bodies.len(), forest.coordinates, &constraints)
             .map_err(|error| error.to_string())?;
-        let joints = parts::joints(scene, &forest, &mut constraints);
-        let frictions = frictions(scene, &forest, &joints);
+        let frictions = frictions(scene, &forest, &parts::joints(scene, &forest, &mut constraints));
         constraints.extend(parts::guides(scene, &forest));
         constraints.extend(scene.couplings.iter().map(|coupling| parts::follows(&forest, coupling, scene)));
         let laws = Formulas::of(scene, &forest).map_err(|error| error.to_string())?.map(Arc::new);

@@ -133,8 +133,8 @@ pub trait Evidence {
     /// acceleration; of what motors hold less is asked.
     fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], is_driven: bool) -> bool;
 
-    /// True where a place that contacts and constraints hold has no velocity once that of the rest is as these
-    /// have it.
+    /// True where a place that contacts and constraints hold has no velocity once that of the rest is as
+    /// these have it.
     fn stands(&self, place: usize, closed: &[usize]) -> bool;
 }
 

@@ -17,7 +17,8 @@
 //! follows from Newton's equation of what is beyond it, of which centre c, mass m and applied forces F are
 //! series: `N_m = Σ (m+1)(m+2) m c_{m+2} - F_m`.  Each order is solved twice, without tau_m and with it.
 //!
-//! Numbers of many digits have the normal forces of what sticks as well, by which it is told how long that lasts.
+//! Numbers of many digits have the normal forces of what sticks as well, by which it is told how long that
+//! lasts.
 //!
 //! N may pass zero in a step, and |N| has a corner there; its series goes on below zero instead, and
 //! [`Series::pressing`] tells where.  From there on n of a rail is turned, and N of a joint begins at zero:
@@ -62,8 +63,8 @@ pub struct FrictionSeries<T: SeriesNumber> {
     pub lost: Vec<T>,
     /// The determinant of the equations of tau_0.
     regularity: f64,
-    /// log2 of the share of the time in which a normal force changes by itself below which a zero ahead counts
-    /// as passed.
+    /// log2 of the share of the time in which a normal force changes by itself below which a zero ahead
+    /// counts as passed.
     passed: f64,
 }
 

@@ -1,5 +1,5 @@
-//! What many digits tell of a combination of modes of places with dry friction: accelerations, forces and relative
-//! velocities, of which what is rounding in three quarters of the digits is zero.
+//! What many digits tell of a combination of modes of places with dry friction: accelerations, forces and
+//! relative velocities, of which what is rounding in three quarters of the digits is zero.
 
 use super::friction::SURE;
 use super::keep::Keeper;

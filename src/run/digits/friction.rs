@@ -80,8 +80,8 @@ pub fn mode_from_words<const W: usize>((kind, sign, at): &(u8, f64, Vec<u64>)) -
 /// How long bounces last \[s\], and the motion between them.
 type Flight<const W: usize> = (Digits<W>, Series<Digits<W>>);
 
-/// What a motion between bounces that are left out has that one on the wall has not: normal forces of other places,
-/// and their friction with them, are others.
+/// What a motion between bounces that are left out has that one on the wall has not: normal forces of other
+/// places, and their friction with them, are others.
 pub(super) struct Flown<const W: usize> {
     /// Change of the rates of all coordinates.
     pub change: Vec<Digits<W>>,
@@ -120,8 +120,8 @@ impl<const W: usize> Motion<W> {
         self.seen_in_doubles(&self.state_posture(), |at| structure.is_driven(at, place))
     }
 
-    /// The walls that hold a point and the modes of all places from the present moment on; of walls those that
-    /// would hold one without friction, and all that touch and do not move along their normals.
+    /// The walls that hold a point and the modes of all places from the present moment on; of walls those
+    /// that would hold one without friction, and all that touch and do not move along their normals.
     pub(super) fn decide(
         &self,
         contacts: [&[usize]; 2],
@@ -141,8 +141,8 @@ impl<const W: usize> Motion<W> {
         Ok((walls, modes))
     }
 
-    /// Decides anew what sticks and what slides, and which walls hold a point: those that do so, or others that
-    /// touch.
+    /// Decides anew what sticks and what slides, and which walls hold a point: those that do so, or others
+    /// that touch.
     pub(super) fn rub(&mut self, transition: Transition) -> Result<(), StepError> {
         let held = self.state.acting.held.clone();
         // Without friction at walls it is known which are pressed.
@@ -182,8 +182,8 @@ impl<const W: usize> Motion<W> {
         self.hold(walls, modes, &since, flown)
     }
 
-    /// How much longer a point would go on bouncing on its wall while these walls hold points and places are in
-    /// these modes \[s\], and how it would fly.
+    /// How much longer a point would go on bouncing on its wall while these walls hold points and places are
+    /// in these modes \[s\], and how it would fly.
     fn flight(&self, wall: usize, walls: &[usize], modes: &[Mode<Digits<W>>]) -> Option<Flight<W>> {
         let (speed, restitution) = (gap_rate(self, wall).rate, self.mechanism.walls[wall].1);
         if self.state.acting.held.contains(&wall) || speed <= Digits::ZERO || restitution >= Digits::ONE {
@@ -281,7 +281,8 @@ impl<const W: usize> Motion<W> {
         Ok(work)
     }
 
-    /// Lists what places begin to do that were in these modes; at walls that are held from these times on, then.
+    /// Lists what places begin to do that were in these modes; at walls that are held from these times on,
+    /// then.
     pub(super) fn tell_turns(&mut self, before: &[Mode<Digits<W>>], begin: &[(usize, Digits<W>)]) {
         let LongState { t: now, acting, turns, .. } = &mut self.state;
         let does = |mode: &Mode<Digits<W>>| WORDS.iter().position(|word| *word == mode.word()).unwrap_or(0);

@@ -1,5 +1,5 @@
-//! The impact of one point on a wall where there is dry friction, in many digits: Routh's method as in doubles
-//! (`dynamics::friction::impact`), in all digits.
+//! The impact of one point on a wall where there is dry friction, in many digits: Routh's method as in
+//! doubles (`dynamics::friction::impact`), in all digits.
 //!
 //! Friction in hinges and sliders takes no part in impacts: what sticks there may slide after one.
 

@@ -196,9 +196,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             drives: plain.drives.iter().map(drive).collect::<Result<_, SceneError>>()?,
             couplings: self.couplings(plain)?,
             walls: self.each("walls", &plain.walls, wall)?,
-            frictions: (plain.frictions.iter())
-                .map(|friction| self.friction(friction))
-                .collect::<Result<_, SceneError>>()?,
+            frictions: self.frictions(plain)?,
             start: bars.clone().map(|bar| self.start(plain, bar)).collect::<Result<_, _>>()?,
             given: bars.map(|bar| self.given(plain, bar)).collect::<Result<_, _>>()?,
             parameters: (self.parameters.iter())
@@ -227,6 +225,10 @@ impl<'a, C: Decimal> Reader<'a, C> {
             damping: self.number(at, "damping", spring.damping)?,
             rigid: spring.rigid,
         })
+    }
+
+    fn frictions(&self, plain: &Scene) -> Result<Vec<Friction<C>>, SceneError> {
+        plain.frictions.iter().map(|friction| self.friction(friction)).collect()
     }
 
     fn friction(&self, plain: &Friction) -> Result<Friction<C>, SceneError> {

@@ -19,8 +19,8 @@ pub struct Slides<'a, T> {
 }
 
 impl<T: SeriesNumber> Series<T> {
-    /// Lets a normal force count as zero where it is log2 of this share of the time in which it changes by itself
-    /// away from there.
+    /// Lets a normal force count as zero where it is log2 of this share of the time in which it changes by
+    /// itself away from there.
     pub fn resolve_reversals(&mut self, passed: f64) {
         self.friction.iter_mut().for_each(|friction| friction.passed = passed);
     }
