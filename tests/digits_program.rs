@@ -51,7 +51,14 @@ fn a_horizon_is_proved_or_the_exit_code_says_so() {
 
 #[test]
 fn what_makes_no_sense_is_refused_and_leaves_no_files() {
-    let program = Program::with_scenes(&["free", "friction_pendulum"]);
+    let program = Program::with_scenes(&["free"]);
+    program.write(
+        "rigid.json",
+        r#"{"name": "rigid", "gravity": [0, -9.81], "bars": [{"name": "bob", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+        "springs": [{"name": "rope", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bob", "point": [0, 0]}],
+            "stiffness": 1e7, "free_length": 1, "model": "rigid"}],
+        "start": {"bob": {"phi": 0, "omega": 0, "origin": [1, 0], "velocity": [0, 0]}}, "until": 1, "every": 1}"#,
+    );
     for (arguments, code, word) in [
         ("free.json --digits 19", 2, "20 to 2000"),
         ("free.json --digits 2001", 2, "20 to 2000"),
@@ -62,11 +69,36 @@ fn what_makes_no_sense_is_refused_and_leaves_no_files() {
         ("free.json --trusted-until 0", 2, "is no time"),
         ("free.json --trusted-until 1 --within 0", 2, "above 0"),
         ("free.json --within 1e-3", 2, "--trusted-until"),
-        ("friction_pendulum.json --digits 30", 3, "dry friction"),
+        ("rigid.json --digits 30", 3, "a rigid spring"),
     ] {
         program.run(&format!("run {arguments}")).exits(code).says(&[word]);
     }
     assert!(program.files().iter().all(|file| !file.contains("trajectory") && !file.contains("unfinished")));
+}
+
+/// What dry friction takes is a column of the table, and stands in the record with the transitions.
+#[test]
+fn dry_friction_is_written_in_many_digits() {
+    let program = Program::with_scenes(&["stick_slip"]);
+    let ran = program.run("run stick_slip.json --trusted-until 3 --every 1 --json").exits(0);
+    let object = ran.object();
+    let friction = &object["friction"];
+    assert_eq!(friction["transitions"], friction["first"].as_array().expect("a list").len());
+    assert_eq!(
+        (&friction["first"][0]["t"], &friction["first"][0]["mode"]),
+        (&"0.0".into(), &"sticks".into())
+    );
+    // The shaft turns until 0.7 · 1.962 N m are 3 N m/rad.
+    assert_eq!(
+        (&friction["first"][1]["t"], &friction["first"][1]["mode"]),
+        (&"0.9156".into(), &"slides".into())
+    );
+    assert!(friction["first"][1]["agreement_digits"].as_f64().expect("a number") > 3.0);
+    let table = program.read("output/stick_slip/taylor-trusted/trajectory.csv");
+    let column = |line: &str| line.split(',').rev().nth(1).expect("a cell").to_owned();
+    let cells: Vec<String> = table.lines().map(column).collect();
+    assert_eq!(cells[0], "friction [J]");
+    assert_eq!(cells.last().map(String::as_str), friction["energy_lost_j"].as_str());
 }
 
 /// Events have a table of their own, with the digits to which both runs agree.

@@ -882,7 +882,7 @@ impl Dice {
 
 /// A chain of one to three bars on the ground or on a cart, with friction here and there, springs, dampers,
 /// motors and a floor or a side wall.
-fn any_scene(seed: u64) -> String {
+pub fn any_scene(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1);
     let count = 1 + (dice.next() * 3.0) as usize;
     let has_cart = dice.is(0.3);

@@ -163,7 +163,7 @@ fn what_a_motor_holds_needs_no_friction_and_slides_as_soon_as_it_is_moved() {
 
 /// A crank with a slotted rocker, a slider-crank or a four-bar, with friction in most joints, springs, torques and
 /// motors, some of which rest for a while, and a stop for the crank.
-fn linkage(seed: u64) -> String {
+pub fn linkage(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 7);
     let friction = |dice: &mut Dice, radius: bool| {
         if !dice.is(0.7) {

@@ -215,3 +215,35 @@ fn events_of_the_moment_at_which_one_sets_a_parameter_happen() {
         agree(&run.events(), &expected);
     }
 }
+
+/// Functions that touch zero at their corners pass it nowhere, and those that go through it do so once, whatever
+/// their slope: a rotor of 1 rad/s, in many digits and in doubles.
+#[test]
+fn what_touches_zero_at_a_corner_has_not_passed_it() {
+    let event = |name: &str, when: &str| format!(r#"{{"name": "{name}", "when": "{when}"}}"#);
+    let events = [
+        event("touches", "abs(rotor.phi)"),
+        event("ends", "max(rotor.phi, 0)"),
+        event("bends", "if(rotor.phi > 0, rotor.phi, -2*rotor.phi)"),
+        event("begins", "max(rotor.phi, 0.3) - 0.3"),
+        event("goes", "abs(rotor.phi)*rotor.phi"),
+        event("jumps", "sign(rotor.phi - 0.5)"),
+    ]
+    .join(", ");
+    let text = format!(
+        r#"{{"name": "rotor", "gravity": [0, 0], "events": [{events}],
+        "bars": [{{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "rotor", "point": [0, 0]}}]}}],
+        "start": {{"rotor": {{"phi": -0.75, "omega": 1}}}}, "until": 2, "every": 2}}"#
+    );
+    agree(
+        &ended(&source(&text, &[], "2", "2")).events(),
+        &[("goes", fixed("0.75")), ("jumps", fixed("1.25"))],
+    );
+    let scene = parse_scene(&text, "rotor", &[]).expect("a scene");
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = Simulation::new(&scene).expect("equations").method(method).run().expect("a run");
+        let names: Vec<_> = outcome.events.iter().map(|event| event.name.as_str()).collect();
+        assert_eq!(names, ["goes", "jumps"], "{method}");
+    }
+}

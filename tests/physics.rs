@@ -68,6 +68,8 @@ mod many_digits_couplings;
 #[cfg(feature = "digits")]
 mod many_digits_events;
 #[cfg(feature = "digits")]
+mod many_digits_friction;
+#[cfg(feature = "digits")]
 mod many_digits_resting;
 #[cfg(feature = "digits")]
 mod many_digits_switched;

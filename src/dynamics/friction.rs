@@ -13,10 +13,11 @@
 //!
 //! The friction of a hinge is a torque at the radius r; its D is the relative angle.  Where the Jacobian of
 //! these equations loses its sign no tau follows from the state continuously: Painlevé's paradox, see
-//! [`Kernel::regularity`].
+//! [`Kernel::regularity`](super::kernel::Kernel::regularity).
 //!
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapters 5 and 6.
 
+mod evaluation;
 pub mod impact;
 pub mod modes;
 mod shared;
@@ -24,34 +25,35 @@ pub mod simultaneous;
 
 pub use modes::{Moment, Paradox, Transition};
 
+use super::Mechanism;
 use super::compile::{CompileError, Joint};
-use super::constraint::{self, ConstraintEquation, Measure, Posture};
+use super::constraint::{self, ConstraintEquation, Measure};
 use super::forest::Forest;
 use super::impact::Contact;
-use super::kernel::{Kernel, dot};
 use super::law::Law;
-use super::{Mechanism, Time, tree};
-use crate::arithmetic::{Complex, Real};
+use crate::arithmetic::{Complex, Over, Real};
 use crate::scene::{FrictionPlace, Scene, Wall};
 
 /// Newton steps at most; from a few on only rounding is left.
 const ROUNDS: usize = 40;
 /// Steps after the one that changes no double: for the digits and derivatives that other numbers have.
 const MORE_ROUNDS: usize = 3;
+/// The same of many digits: each step doubles them.
+const MOST_ROUNDS: usize = 9;
 
 /// A place with dry friction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Friction {
+pub struct Friction<C = f64> {
     /// Name of the hinge, slider or wall.
     pub name: String,
     /// Measures the relative displacement \[rad, m\]; its multiplier is tau \[N·m, N\].
-    pub tangent: ConstraintEquation,
+    pub tangent: ConstraintEquation<C>,
     /// Where the normal force comes from.
     pub normal: Normal,
     /// tau over N while it slides: mu r \[m\] of a hinge, else mu \[1\].
-    pub kinetic: f64,
+    pub kinetic: C,
     /// The most of tau over N while it sticks.
-    pub stiction: f64,
+    pub stiction: C,
     /// True where Newton's law of impact holds at a wall, not Poisson's.
     pub is_newton: bool,
 }
@@ -69,12 +71,12 @@ pub enum Normal {
 
 /// What a place with friction does at the moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub enum Mode {
+pub enum Mode<C = f64> {
     /// Nothing: its wall is not touched.
     #[default]
     Open,
     /// It sticks at this relative displacement \[rad, m\].
-    Stick(f64),
+    Stick(C),
     /// It slides: the sign of the relative velocity.
     Slip(f64),
     /// It rests since others hold it: other places, its own friction at the limit `mu0 N` against a velocity
@@ -82,7 +84,20 @@ pub enum Mode {
     Strained(f64),
 }
 
-impl Mode {
+impl<C: Copy> Mode<C> {
+    /// The same with its displacement as a double.
+    pub fn in_doubles(&self) -> Mode
+    where
+        C: Real,
+    {
+        match *self {
+            Self::Open => Mode::Open,
+            Self::Stick(at) => Mode::Stick(at.value()),
+            Self::Slip(sign) => Mode::Slip(sign),
+            Self::Strained(sign) => Mode::Strained(sign),
+        }
+    }
+
     /// What it does in one word.
     pub fn word(self) -> &'static str {
         match self {
@@ -93,30 +108,37 @@ impl Mode {
     }
 
     /// tau over N of what has its friction at the limit.
-    fn coefficient(self, friction: &Friction) -> Option<f64> {
+    pub fn coefficient(self, friction: &Friction<C>) -> Option<C>
+    where
+        C: Real,
+    {
         match self {
             Self::Open | Self::Stick(_) => None,
-            Self::Slip(sign) => Some(sign * friction.kinetic),
-            Self::Strained(sign) => Some(sign * friction.stiction),
+            Self::Slip(sign) => Some(friction.kinetic.scale(sign)),
+            Self::Strained(sign) => Some(friction.stiction.scale(sign)),
         }
     }
 }
 
 /// The friction of a scene; without those whose coefficients are zero.
-pub(super) fn frictions(scene: &Scene, forest: &Forest, joints: &[Joint]) -> Vec<Friction> {
-    let of = |friction: &crate::scene::Friction| {
+pub(super) fn frictions<C: Real>(
+    scene: &Scene<C>,
+    forest: &Forest<C>,
+    joints: &[Joint<C>],
+) -> Vec<Friction<C>> {
+    let of = |friction: &crate::scene::Friction<C>| {
         let (tangent, normal, lever, is_newton) = match friction.at {
             FrictionPlace::Hinge { hinge, radius } => {
                 let Joint { name, between, .. } = &joints[hinge];
                 let [inner, outer] = *between;
                 let (body, base) = if let Some(outer) = outer { (outer, inner) } else { (inner?, None) };
-                let tangent = constraint::angle_equation(name, body, base, Law::constant(0.0));
+                let tangent = constraint::angle_equation(name, body, base, Law::default());
                 (tangent, Normal::Joint(hinge), radius, false)
             }
             FrictionPlace::Slider(slider) => {
                 let slider = &scene.sliders[slider];
                 let tangent = super::compile::travel_along(forest, slider);
-                (tangent, Normal::Rail, 1.0, false)
+                (tangent, Normal::Rail, C::ONE, false)
             }
             FrictionPlace::Wall { wall: number, is_newton } => {
                 let wall = &scene.walls[number];
@@ -125,20 +147,20 @@ pub(super) fn frictions(scene: &Scene, forest: &Forest, joints: &[Joint]) -> Vec
                     // Counted from the origin.
                     None => super::compile::along_wall(
                         forest,
-                        &Wall { through: [0.0; 2], ..wall.clone() },
+                        &Wall { through: [C::ZERO; 2], ..wall.clone() },
                         along,
                         None,
                     ),
                     Some(_) => super::compile::along_wall(forest, wall, along, None),
                 };
                 let tangent = tangent.0;
-                (tangent, Normal::Contact(number), 1.0, is_newton)
+                (tangent, Normal::Contact(number), C::ONE, is_newton)
             }
         };
         let (kinetic, stiction) = (friction.kinetic * lever, friction.stiction * lever);
         Some(Friction { name: tangent.name.clone(), tangent, normal, kinetic, stiction, is_newton })
     };
-    scene.frictions.iter().filter(|friction| friction.stiction > 0.0).filter_map(of).collect()
+    scene.frictions.iter().filter(|friction| friction.stiction > C::ZERO).filter_map(of).collect()
 }
 
 /// Refuses friction at walls whose lines move with the points that meet them: curves, along which it does not
@@ -160,21 +182,21 @@ pub(super) fn check_lines(frictions: &[Friction], contacts: &[Contact]) -> Resul
     }
 }
 
-impl Friction {
+impl<C: Real> Friction<C> {
     /// The relative displacement \[rad, m\] at these coordinates.
-    pub fn displacement(&self, phi: &[f64], z: &[Complex<f64>]) -> f64 {
+    pub fn displacement<T: Over<C>>(&self, phi: &[T], z: &[Complex<T>]) -> T {
         match &self.tangent.measure {
-            Measure::Angle { body, base } => phi[*body] - base.map_or(0.0, |base| phi[base]),
+            Measure::Angle { body, base } => phi[*body] - base.map_or(T::ZERO, |base| phi[base]),
             Measure::Place(place) => place.value(z),
         }
     }
 
     /// The row that keeps it at a displacement \[rad, m\].
-    fn stuck(&self, at: f64) -> ConstraintEquation {
+    pub(super) fn stuck(&self, at: C) -> ConstraintEquation<C> {
         let mut row = self.tangent.clone();
         row.name.push_str(".friction");
         match &mut row.measure {
-            Measure::Angle { .. } => row.law = Some(Law::constant(at)),
+            Measure::Angle { .. } => row.law = Some(Law { start: at, ..Law::default() }),
             Measure::Place(place) => place.constant -= at,
         }
         row
@@ -224,7 +246,7 @@ impl Mechanism {
     }
 
     /// The row whose multiplier is the normal force of a place, where it is one.
-    fn normal_row(&self, friction: &Friction) -> Option<usize> {
+    fn normal_row<C>(&self, friction: &Friction<C>) -> Option<usize> {
         match friction.normal {
             Normal::Joint(_) => None,
             Normal::Rail => self.constraints[..self.standing_rows()]
@@ -239,9 +261,9 @@ impl Mechanism {
 
     /// The force \[N\] that presses a place, as a vector where it is that of a joint, of an evaluation with
     /// these multipliers and joint forces.
-    pub(super) fn normal_force<T: Real>(
+    pub(super) fn normal_force<T: Real, C>(
         &self,
-        friction: &Friction,
+        friction: &Friction<C>,
         multiplier: &[T],
         carried: &[Complex<T>],
     ) -> Complex<T> {
@@ -253,7 +275,7 @@ impl Mechanism {
 }
 
 /// The size of a normal force, and the direction in which it grows; a wall's pressure has a sign.
-pub(super) fn size<T: Real>(normal: Normal, force: Complex<T>) -> (T, Complex<T>) {
+pub fn size<T: Real>(normal: Normal, force: Complex<T>) -> (T, Complex<T>) {
     if let Normal::Contact(_) = normal {
         return (-force.re, Complex::new(-T::ONE, T::ZERO));
     }
@@ -262,13 +284,6 @@ pub(super) fn size<T: Real>(normal: Normal, force: Complex<T>) -> (T, Complex<T>
         return (T::ZERO, Complex::ZERO);
     }
     (size, Complex::new(force.re / size, force.im / size))
-}
-
-/// What one unit of tau does.
-struct Response<T> {
-    acceleration: Vec<T>,
-    multiplier: Vec<T>,
-    normal: Vec<Complex<T>>,
 }
 
 /// Finds tau of places with these coefficients c, `tau_j = c_j N_j`, whose normal forces are `start`
@@ -280,7 +295,8 @@ pub(super) fn forces<T: Real>(
     response: impl Fn(usize, usize) -> Complex<T>,
     tau: &mut [T],
 ) -> f64 {
-    let (mut left, mut last) = (MORE_ROUNDS, f64::INFINITY);
+    let more = if T::HAS_CONSTANTS { MOST_ROUNDS } else { MORE_ROUNDS };
+    let (mut left, mut last) = (more, f64::INFINITY);
     let mut regularity = T::ONE.value();
     for _ in 0..ROUNDS {
         // F_j = tau_j - c_j N_j(tau), and its Jacobian.
@@ -316,103 +332,8 @@ pub(super) fn forces<T: Real>(
     regularity
 }
 
-impl<T: Real> Kernel<T> {
-    /// Adds the friction of what slides to accelerations and multipliers without it.
-    #[cold]
-    pub(super) fn slide(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
-        let n = phi.len();
-        let sliding: Vec<(&Friction, f64)> = mechanism.sliding().collect();
-        self.friction.clear();
-        self.friction.resize(sliding.len(), T::ZERO);
-        self.friction_rows.clear();
-        self.friction_rows.resize(sliding.len() * n, T::ZERO);
-        self.regularity = T::ONE.value();
-        if sliding.is_empty() {
-            return;
-        }
-        let at = Posture { phi, z: &self.z, omega };
-        for ((friction, _), row) in sliding.iter().zip(self.friction_rows.chunks_exact_mut(n)) {
-            friction.tangent.differentiate(t, at, row);
-        }
-        let needed = mechanism.needed_forces(t, &self.z, phi, omega, &self.load);
-        let carried = mechanism.transmitted(&self.z, &self.multiplier, needed);
-        let start: Vec<Complex<T>> = (sliding.iter())
-            .map(|(friction, _)| mechanism.normal_force(friction, &self.multiplier, &carried))
-            .collect();
-        let responses: Vec<Response<T>> =
-            (0..sliding.len()).map(|j| self.response(mechanism, &sliding, j)).collect();
-        let places: Vec<(Normal, T)> =
-            (sliding.iter()).map(|&(friction, coefficient)| (friction.normal, T::of(coefficient))).collect();
-        self.regularity = forces(&places, &start, |j, k| responses[k].normal[j], &mut self.friction);
-        for (response, &tau) in responses.iter().zip(&self.friction) {
-            for (load, &change) in self.load.iter_mut().zip(&response.acceleration) {
-                *load += change * tau;
-            }
-            for (multiplier, &change) in self.multiplier.iter_mut().zip(&response.multiplier) {
-                *multiplier += change * tau;
-            }
-        }
-    }
-
-    /// What a unit of tau at the j-th place that slides does to accelerations, multipliers and normal forces.
-    fn response(&self, mechanism: &Mechanism, sliding: &[(&Friction, f64)], j: usize) -> Response<T> {
-        let (n, rows) = (self.z.len(), mechanism.constraints.len());
-        let mut acceleration: Vec<T> = self.friction_rows[j * n..(j + 1) * n].iter().map(|&d| -d).collect();
-        tree::solve::<T, 0>(n, &self.mass, &self.pivot, &mut acceleration);
-        let mut multiplier: Vec<T> =
-            (0..rows).map(|r| dot(&self.jacobian[r * n..(r + 1) * n], &acceleration)).collect();
-        tree::solve::<T, 0>(rows, &self.schur, &self.schur_pivot, &mut multiplier);
-        for (r, &multiplier) in multiplier.iter().enumerate() {
-            for k in 0..n {
-                acceleration[k] -= self.minv_jt[r * n + k] * multiplier;
-            }
-        }
-        let mut needed = mechanism.inertia_forces(&self.z, &acceleration);
-        sliding[j].0.tangent.add_force(&self.z, T::ONE, &mut needed);
-        let carried = mechanism.transmitted(&self.z, &multiplier, needed);
-        let normal = (sliding.iter())
-            .map(|(friction, _)| mechanism.normal_force(friction, &multiplier, &carried))
-            .collect();
-        Response { acceleration, multiplier, normal }
-    }
-
-    /// The forces of friction \[N·m, N\], as multipliers of the relative displacements, and the sizes of the
-    /// normal forces \[N\] of all places; zeros for those that are open.  After
-    /// [`accelerate`](Kernel::accelerate).
-    pub fn friction_forces(&self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> Vec<[T; 2]> {
-        let mut needed = mechanism.needed_forces(t, &self.z, phi, omega, &self.load);
-        for ((friction, _), &tau) in mechanism.sliding().zip(&self.friction) {
-            friction.tangent.add_force(&self.z, tau, &mut needed);
-        }
-        let carried = mechanism.transmitted(&self.z, &self.multiplier, needed);
-        let mut slid = self.friction.iter();
-        let mut stuck = self.multiplier[mechanism.constraints.len() - mechanism.sticking()..].iter();
-        (mechanism.frictions.iter().zip(&mechanism.modes))
-            .map(|(friction, mode)| {
-                let tau = match mode {
-                    Mode::Open => return [T::ZERO; 2],
-                    Mode::Stick(_) => stuck.next(),
-                    Mode::Slip(_) | Mode::Strained(_) => slid.next(),
-                };
-                let force = mechanism.normal_force(friction, &self.multiplier, &carried);
-                [tau.copied().unwrap_or(T::ZERO), size(friction.normal, force).0]
-            })
-            .collect()
-    }
-
-    /// Power that friction takes \[W\], after an evaluation.
-    #[inline(always)]
-    pub fn friction_power(&self, omega: &[T]) -> T {
-        let n = omega.len();
-        self.friction
-            .iter()
-            .enumerate()
-            .fold(T::ZERO, |sum, (j, &tau)| sum + tau * dot(&self.friction_rows[j * n..(j + 1) * n], omega))
-    }
-}
-
 /// Solves a small system in place by elimination with exchange of rows, and returns its determinant.
-pub(super) fn solve<T: Real>(matrix: &mut [T], x: &mut [T]) -> f64 {
+pub fn solve<T: Real>(matrix: &mut [T], x: &mut [T]) -> f64 {
     let d = x.len();
     let mut determinant = 1.0;
     for k in 0..d {

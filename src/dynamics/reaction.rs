@@ -16,11 +16,11 @@ use super::energy::moment;
 use super::forest::turning_acceleration;
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
-use crate::arithmetic::{Complex, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real, Scalar};
 
-impl ConstraintEquation {
+impl<C: Real> ConstraintEquation<C> {
     /// Adds what bodies need against the force of this row with this multiplier.
-    pub(super) fn add_force<T: Scalar>(&self, z: &[Complex<T>], multiplier: T, needed: &mut [Complex<T>]) {
+    pub(super) fn add_force<T: Over<C>>(&self, z: &[Complex<T>], multiplier: T, needed: &mut [Complex<T>]) {
         let Some(push) = &self.push else { return };
         let force = push.direction(z).times(multiplier);
         if let Some(body) = push.on {

@@ -52,10 +52,11 @@ mod work_integral;
 use self::action::ActionSeries;
 use self::aim::AimSeries;
 use self::bodywise::Bodywise;
-pub use self::coefficient::{Coefficient, Constants, SeriesNumber, Terms};
+pub use self::coefficient::{Coefficient, Constants, FrictionTerms, SeriesNumber, Terms};
 pub use self::drive::powers;
 use self::factors::{Factors, Scale};
 use self::friction::FrictionSeries;
+pub use self::friction::Slides;
 use self::polynomial::{Fractions, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
@@ -186,7 +187,7 @@ impl<T: SeriesNumber> Series<T> {
             time: T::ZERO,
             springs: terms.springs.iter().map(|spring| SpringSeries::new(spring, order)).collect(),
             rows: RowSeries::new(terms, &partition, order, bodywise.is_none()),
-            friction: FrictionSeries::new(mechanism, order).map(Box::new),
+            friction: FrictionSeries::new(terms, order).map(Box::new),
             turned: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: zeros(n),
@@ -378,6 +379,9 @@ impl<T: SeriesNumber> Series<T> {
                 self.bend::<N>(m);
                 self.balance::<N>(terms, m);
                 self.slide::<N>(terms, m);
+                if T::HAS_CONSTANTS {
+                    self.push_factors(m);
+                }
             }
             if T::HAS_WORK {
                 self.work_integral(terms, m);

@@ -4,7 +4,7 @@ use super::page::{Page, counted, figure, magnitude};
 use crate::arithmetic::Real;
 use crate::arithmetic::digits::Layout as Decimals;
 use crate::dynamics::Mechanism;
-use crate::run::digits::{Forecast, LongEvent, LongHold, Pair, Row, Source, Wide};
+use crate::run::digits::{Forecast, LongEvent, LongHold, LongTurn, Pair, Row, Source, Wide};
 use crate::run::files::sha256;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -25,13 +25,15 @@ pub struct Layout {
     /// Digits carried.
     carried: usize,
     is_proved: bool,
+    has_friction: bool,
 }
 
 impl Layout {
     /// Of a mechanism; `is_proved` where two runs are compared.
     pub fn new(mechanism: &Mechanism, shown: Option<usize>, carried: usize, is_proved: bool) -> Self {
         let names = mechanism.own_bodies().iter().map(|body| body.name.clone()).collect();
-        Self { names, shown, carried, is_proved }
+        let has_friction = !mechanism.frictions.is_empty();
+        Self { names, shown, carried, is_proved, has_friction }
     }
 
     /// Digits of the numbers of a row.
@@ -47,6 +49,7 @@ impl Layout {
         }
         columns.extend(["kinetic [J]", "potential [J]", "work [J]", "imbalance [1]"].map(str::to_owned));
         columns.extend(["residual [rad or m]", "residual' [rad/s or m/s]"].map(str::to_owned));
+        columns.extend(self.has_friction.then(|| "friction [J]".to_owned()));
         columns.extend(self.is_proved.then(|| "agreement [digits]".to_owned()));
         columns.join(",")
     }
@@ -111,6 +114,7 @@ impl<W: Write> Table<W> {
         let mut cells = vec![decimal(&row.t, self.layout.carried)];
         cells.extend(bodies.chain(&row.energy).map(|number| decimal(number, digits)));
         cells.extend([row.drift, row.residual[0], row.residual[1]].map(|number| format!("{number:.3e}")));
+        cells.extend(row.friction.iter().map(|number| decimal(number, digits)));
         cells.extend(agreement.map(|agreement| format!("{agreement:.1}")));
         writeln!(self.writer, "{}", cells.join(","))
     }
@@ -155,6 +159,8 @@ pub struct Summary {
     pub wall_s: f64,
     /// The numbers of the last row, body by body.
     last: Vec<Vec<Vec<u64>>>,
+    /// Energy lost in dry friction up to it.
+    friction: Option<Vec<u64>>,
 }
 
 impl Summary {
@@ -168,6 +174,7 @@ impl Summary {
             (Some(least), Some(agreement)) => Some(least.min(agreement)),
             (least, agreement) => agreement.or(least),
         };
+        self.friction = row.friction.as_ref().map(Wide::to_words);
         self.last = row.bodies.iter().map(|body| body.iter().map(Wide::to_words).collect()).collect();
     }
 
@@ -272,6 +279,9 @@ pub fn object(shown: &Shown) -> Value {
     if let Some(holds) = holds(pair, layout) {
         object["holds"] = holds;
     }
+    if let Some(friction) = friction(shown) {
+        object["friction"] = friction;
+    }
     object
 }
 
@@ -285,6 +295,20 @@ fn holds(pair: &Pair, layout: &Layout) -> Option<Value> {
         })
         .collect();
     Some(json!({"count": holds.len(), "first": first}))
+}
+
+/// What dry friction took, and its transitions, where there is any.
+fn friction(shown: &Shown) -> Option<Value> {
+    let lost = Wide::from_words(shown.summary.friction.as_ref()?)?;
+    let turns = shown.pair.turns();
+    let first: Vec<Value> = (turns.iter().take(super::friction::NAMED))
+        .map(|(LongTurn { name, t, does }, agreement)| {
+            let t = decimal(t, shown.layout.digits(*agreement));
+            json!({"t": t, "name": name, "mode": does, "agreement_digits": agreement})
+        })
+        .collect();
+    let lost = decimal(&lost, shown.layout.digits(shown.summary.agreement));
+    Some(json!({"energy_lost_j": lost, "transitions": turns.len(), "first": first}))
 }
 
 /// The record of a run: the report, the scene, versions; what depends on the clock stands apart.
@@ -356,6 +380,14 @@ pub fn text(shown: &Shown) -> String {
     if !source.mechanism.constraints.is_empty() {
         let [position, velocity] = summary.residual.map(magnitude);
         page.entry("constraints", &format!("{position} rad or m and {velocity} rad/s or m/s at most"));
+    }
+    if let Some(lost) = summary.friction.as_ref().and_then(|words| Wide::from_words(words)) {
+        let turns = pair.turns();
+        let last = |name: &str| turns.iter().rfind(|(turn, _)| turn.name == name);
+        let ends: Vec<_> = (source.mechanism.frictions.iter().filter_map(|friction| last(&friction.name)))
+            .map(|(turn, _)| (turn.name.as_str(), turn.does, turn.t.value()))
+            .collect();
+        super::friction::describe_ends(&mut page, lost.value(), turns.len() as u64, &ends);
     }
     let times: Vec<_> = events.iter().map(|(event, _)| (event.name.as_str(), event.t.value())).collect();
     super::events::describe_times(&mut page, &source.mechanism, &times);

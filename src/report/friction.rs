@@ -7,7 +7,7 @@ use crate::scene::{Friction, FrictionPlace, Scene};
 use serde_json::{Value, json};
 
 /// Transitions that the record names.
-const NAMED: usize = 100;
+pub(super) const NAMED: usize = 100;
 
 /// The part it acts at, in words: `hinge A (radius 0.01 m, kinetic 0.2, static 0.3)`.
 fn described(scene: &Scene, friction: &Friction) -> String {
@@ -47,13 +47,19 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome
     if mechanism.frictions.is_empty() {
         return;
     }
-    let lost = figure(outcome.last.friction);
-    let transitions = counted(outcome.friction_count, "transition", "transitions");
     let last = |name: &str| outcome.frictions.iter().rev().find(|record| record.name == name);
-    let ends: Vec<String> = (mechanism.frictions.iter().filter_map(|friction| last(&friction.name)))
+    let ends: Vec<_> = (mechanism.frictions.iter().filter_map(|friction| last(&friction.name)))
         .filter(|_| outcome.friction_count <= outcome.frictions.len() as u64)
-        .map(|record| format!("{} {} since {} s", record.name, record.mode, figure(record.t)))
+        .map(|record| (record.name.as_str(), record.mode.as_str(), record.t))
         .collect();
+    describe_ends(page, outcome.last.friction, outcome.friction_count, &ends);
+}
+
+/// The same of an energy lost \[J\], a number of transitions, and what places do since when.
+pub(super) fn describe_ends(page: &mut Page, lost: f64, transitions: u64, ends: &[(&str, &str, f64)]) {
+    let transitions = counted(transitions, "transition", "transitions");
+    let since = |(name, mode, t): &(&str, &str, f64)| format!("{name} {mode} since {} s", figure(*t));
+    let ends: Vec<String> = ends.iter().map(since).collect();
     let ends = if ends.is_empty() { String::new() } else { format!("; {}", ends.join(", ")) };
-    page.entry("dry friction", &format!("{lost} J lost in sliding, {transitions}{ends}"));
+    page.entry("dry friction", &format!("{} J lost in sliding, {transitions}{ends}", figure(lost)));
 }

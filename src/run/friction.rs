@@ -8,8 +8,8 @@ use super::contact::ContactDriver;
 use super::running::Outcome;
 use crate::arithmetic::Complex;
 use crate::dynamics::constraint::Posture;
-use crate::dynamics::friction::modes::Modes;
-use crate::dynamics::friction::{Friction, Mode, Moment, Paradox, Transition};
+use crate::dynamics::friction::modes::{HINT, JAMS, Modes};
+use crate::dynamics::friction::{Friction, Mode, Moment, Transition};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, StepError};
@@ -168,8 +168,7 @@ impl ContactDriver {
         let motion = self.motion();
         let watch = self.events.as_ref().and_then(|events| events.friction.as_ref());
         let Some(transition) = watch.and_then(|watch| watch.transition(function, &motion)) else {
-            let what = "friction no longer follows from the motion: Painlevé's paradox, the surfaces jam";
-            return Err(self.paradox(outcome, what.into()));
+            return Err(self.paradox(outcome, JAMS.into()));
         };
         self.settle_at(None, None, transition, outcome)
     }
@@ -195,18 +194,7 @@ impl ContactDriver {
             let places: Vec<&str> =
                 self.free.frictions.iter().map(|friction| friction.name.as_str()).collect();
             let places = places.join(", ");
-            let what = match paradox {
-                Paradox::Inconsistent => {
-                    format!("no forces of friction fit the motion at {places}: Painlevé's inconsistent case")
-                }
-                Paradox::Indeterminate => {
-                    format!("more than one motion fits friction at {places}: Painlevé's indeterminate case")
-                }
-                Paradox::TooMany(count) => {
-                    format!("{count} places with friction are at rest at once, more than are taken")
-                }
-            };
-            self.paradox(outcome, what)
+            self.paradox(outcome, paradox.message(&places))
         })
     }
 
@@ -217,7 +205,7 @@ impl ContactDriver {
             t: self.motion().time.hi,
             step: 0.0,
             what,
-            hint: "lower the coefficient, or put a spring and a damper where the bodies touch".into(),
+            hint: HINT.into(),
         }
     }
 

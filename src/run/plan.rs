@@ -6,6 +6,8 @@
 mod pairing;
 mod rates;
 
+#[cfg(feature = "digits")]
+pub(super) use self::pairing::check_forces_of_joints;
 pub(super) use self::pairing::usual;
 
 use self::pairing::{check_vibration, pair};

@@ -170,7 +170,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
                 return Err(self.refuse_part(&at, why));
             }
         }
-        if !scene.frictions.is_empty() {
+        if !scene.frictions.is_empty() && !is_watched {
             let mut items = ["hinges", "sliders", "walls"].iter().flat_map(|list| self.root.items(list));
             let at = items.find_map(|at| at.child("friction")).unwrap_or_else(|| self.root.clone());
             return Err(self.refuse_part(&at, "dry friction has corners"));

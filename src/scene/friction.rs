@@ -4,24 +4,24 @@ use serde::Serialize;
 
 /// Dry friction by Coulomb's law.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Friction {
+pub struct Friction<C = f64> {
     /// Where it acts.
-    pub at: FrictionPlace,
+    pub at: FrictionPlace<C>,
     /// Coefficient while the two slide on each other, not negative.
-    pub kinetic: f64,
+    pub kinetic: C,
     /// Coefficient while they stick, at least the kinetic one.
-    pub stiction: f64,
+    pub stiction: C,
 }
 
 /// What has friction, by its number in the scene's list.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub enum FrictionPlace {
+pub enum FrictionPlace<C = f64> {
     /// A hinge: friction acts at this radius \[m\] of it.
     Hinge {
         /// The hinge.
         hinge: usize,
         /// The radius, positive.
-        radius: f64,
+        radius: C,
     },
     /// A slider.
     Slider(usize),
@@ -43,10 +43,10 @@ pub(super) enum Part {
     Wall,
 }
 
-impl FrictionPlace {
+impl<C> FrictionPlace<C> {
     /// The part by its kind and number.
-    pub(super) fn part(self) -> (Part, usize) {
-        match self {
+    pub(super) fn part(&self) -> (Part, usize) {
+        match *self {
             Self::Hinge { hinge, .. } => (Part::Hinge, hinge),
             Self::Slider(slider) => (Part::Slider, slider),
             Self::Wall { wall, .. } => (Part::Wall, wall),

@@ -99,7 +99,7 @@ pub struct Scene<C = f64> {
     pub walls: Vec<Wall<C>>,
     /// Dry friction of hinges, sliders and walls, each of them once at most.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub frictions: Vec<Friction>,
+    pub frictions: Vec<Friction<C>>,
     /// Numbers with names, for formulas.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<Parameter<C>>,

@@ -1,21 +1,21 @@
 //! The mechanism of a scene whose numbers are known exactly: the same compilation, with constants of many
 //! digits.
 
+mod rows;
+
 use super::parts;
 use super::{Body, CompileError, Mechanism, dense_constants};
-use crate::arithmetic::tape::Slot;
-use crate::arithmetic::{Complex, Over, Real, Scalar};
-#[cfg(feature = "digits")]
-use crate::dynamics::configuration::{Configuration, Values};
-use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
+use crate::arithmetic::Complex;
+use crate::dynamics::constraint::{ConstraintEquation, Posture};
 #[cfg(feature = "digits")]
 use crate::dynamics::force::formula::FormulaEvent;
 use crate::dynamics::force::formula::{Driven, Formulas};
 use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
 use crate::dynamics::forest::Forest;
+use crate::dynamics::friction::{Friction, Mode, frictions};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::partition::CoordinatePartition;
-use crate::dynamics::series::{Constants, Terms};
+use crate::dynamics::series::{FrictionTerms, Terms};
 use crate::dynamics::tree::{self, Tree};
 use crate::scene::{Decimal, Direction, Scene, SceneEvent};
 use std::sync::Arc;
@@ -53,6 +53,10 @@ pub struct ExactMechanism<C> {
     all: Arc<AllParts<C>>,
     /// Constraint equations.
     pub constraints: Vec<ConstraintEquation<C>>,
+    /// Places with dry friction, in the order of the mechanism's.
+    pub frictions: Vec<Friction<C>>,
+    /// Gravity \[m/s²\].
+    gravity: Complex<C>,
     /// The gap of each wall, and its restitution.
     pub walls: Vec<(ConstraintEquation<C>, C)>,
     /// Energy of gravity of the masses if they were at the ground points they hang from \[J\].
@@ -79,8 +83,11 @@ pub struct Acting<C> {
     pub off: Vec<String>,
     /// How far motors, and locks without an angle, go on from what they said, row by row \[rad, m\].
     pub shifts: Vec<C>,
-    /// Walls on which a point stays, in the order of their rows, which are the last.
+    /// Walls on which a point stays, in the order of their rows, which are the last but for those of what
+    /// sticks.
     pub held: Vec<usize>,
+    /// What places with dry friction do.
+    pub sliding: Vec<Mode<C>>,
 }
 
 /// An event.
@@ -135,7 +142,7 @@ impl<C: Decimal> ExactMechanism<C> {
         }
         let partition = CoordinatePartition::new(bodies.len(), forest.coordinates, &constraints)
             .map_err(|error| error.to_string())?;
-        parts::joints(scene, &forest, &mut constraints);
+        let frictions = frictions(scene, &forest, &parts::joints(scene, &forest, &mut constraints));
         constraints.extend(parts::guides(scene, &forest));
         constraints.extend(scene.couplings.iter().map(|coupling| parts::follows(&forest, coupling, scene)));
         let laws = Formulas::of(scene, &forest).map_err(|error| error.to_string())?.map(Arc::new);
@@ -149,6 +156,7 @@ impl<C: Decimal> ExactMechanism<C> {
             off: structure.resting().to_vec(),
             shifts: vec![C::ZERO; constraints.len()],
             held: Vec::new(),
+            sliding: vec![Mode::Open; frictions.len()],
         };
         let event = |event: &SceneEvent| ExactEvent {
             name: event.name.clone(),
@@ -187,6 +195,8 @@ impl<C: Decimal> ExactMechanism<C> {
                 })
                 .collect(),
             constraints: Vec::new(),
+            frictions,
+            gravity,
             ground_energy,
             bodies,
             forest,
@@ -206,8 +216,9 @@ impl<C: Decimal> ExactMechanism<C> {
             let whole = if whole.held.is_empty() { whole.clone() } else { whole.holding(&[]) };
             next.structure = Arc::new(whole.acting(&acting.off)?);
         }
-        if acting.held != next.structure.held {
-            next.structure = Arc::new(next.structure.holding(&acting.held));
+        let sliding: Vec<Mode> = acting.sliding.iter().map(Mode::in_doubles).collect();
+        if acting.held != next.structure.held || sliding != next.structure.modes {
+            next.structure = Arc::new(next.structure.moving(&acting.held, &sliding));
         }
         let AllParts { springs, torsions, actions, constraints } = &*self.all;
         next.springs = springs.iter().filter(|spring| acts(&spring.name)).cloned().collect();
@@ -247,6 +258,11 @@ impl<C: Decimal> ExactMechanism<C> {
             }
         }
         next.constraints.extend(acting.held.iter().map(|&wall| next.walls[wall].0.clone()));
+        let stuck = next.frictions.iter().zip(&acting.sliding).filter_map(|(friction, mode)| match *mode {
+            Mode::Stick(at) => Some(friction.stuck(at)),
+            _ => None,
+        });
+        next.constraints.extend(stuck);
         next.acting = acting;
         Ok(next)
     }
@@ -262,6 +278,12 @@ impl<C: Decimal> ExactMechanism<C> {
             actions: &self.actions,
             forces: &self.forces,
             constraints: &self.constraints,
+            friction: (!self.frictions.is_empty()).then_some(FrictionTerms {
+                places: &self.frictions,
+                bodies: &self.bodies,
+                forest: &self.forest,
+                gravity: self.gravity,
+            }),
         }
     }
 
@@ -367,69 +389,4 @@ impl<C: Decimal> ExactMechanism<C> {
             }
         }
     }
-}
-
-impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
-    /// What is left of every constraint equation, and its rate, at a time; adds its Jacobian to `jacobian`
-    /// (rows × n).
-    pub fn residuals(&self, t: T::Time, phi: &[T], omega: &[T], jacobian: &mut [T]) -> Vec<[T; 2]> {
-        let (z, n) = (self.elements(phi), phi.len());
-        let rows = self.constraints.iter().zip(jacobian.chunks_exact_mut(n.max(1)));
-        rows.map(|(row, jacobian)| {
-            let measured = match &row.measure {
-                Measure::Angle { body, base } => {
-                    jacobian[*body] += T::ONE;
-                    base.iter().for_each(|&base| jacobian[base] -= T::ONE);
-                    base.map_or(phi[*body], |base| phi[*body] - phi[base])
-                }
-                Measure::Place(place) => {
-                    place.slopes(&z, |k, slope| jacobian[k] += slope);
-                    place.value(&z)
-                }
-            };
-            let phase = row.law.as_ref().map(|law| (T::law_value(law, t), T::phase(law, t).rate));
-            let (mut wanted, mut rate) = phase.unwrap_or((T::ZERO, T::ZERO));
-            if let Some(aim) = &row.aim {
-                aim.at(T::moment(t), Posture { phi, z: &z, omega }, |slots| {
-                    let slot = |slot: Slot| slots[slot as usize];
-                    (wanted, rate) = (wanted + slot(aim.value), rate + slot(aim.drive));
-                    aim.slopes.iter().for_each(|&(k, slope)| jacobian[k] -= slot(slope));
-                });
-            }
-            [whole_turns_off(measured - wanted, row.is_angle()), dot(jacobian, omega) - rate]
-        })
-        .collect()
-    }
-}
-
-#[cfg(feature = "digits")]
-impl<C: Decimal + Over<C>> ExactMechanism<C> {
-    /// The rows that are in force and were not in force of this mechanism before.
-    pub fn closing(&self, before: &Self) -> Vec<usize> {
-        let rows = before.structure.constraints.iter().zip(&self.structure.constraints).enumerate();
-        rows.filter(|(_, (before, now))| before.is_released(now)).map(|(r, _)| r).collect()
-    }
-
-    /// What acts after an event at a time, coordinates and rates.
-    pub fn after(&self, event: usize, t: C, phi: &[C], omega: &[C]) -> Acting<C> {
-        let mut next = self.acting.clone();
-        let Some(laws) = &self.laws else { return next };
-        let z = self.elements(phi);
-        let at = Values { time: t, phi, z: &z, omega };
-        let Acting { parameters, modes, .. } = &self.acting;
-        next.parameters = laws.set_exactly_by(event, &Configuration::new(&at), parameters, modes);
-        let FormulaEvent { on, off, .. } = &laws.events[event];
-        next.off.retain(|part| !on.contains(part));
-        next.off.extend(off.iter().filter(|part| !self.acting.off.contains(part)).cloned());
-        next
-    }
-}
-
-/// An angle less the whole turns nearest to it.
-fn whole_turns_off<T: Scalar + Real>(residual: T, is_angle: bool) -> T {
-    let turns = (residual.value() / std::f64::consts::TAU).round();
-    if !is_angle || turns == 0.0 || !turns.is_finite() {
-        return residual;
-    }
-    residual - T::ONE.atan2(T::ZERO).scale(4.0 * turns)
 }

@@ -103,7 +103,10 @@ pub(super) fn travel<C: Real>(
 }
 
 /// The row of the travel of a slider without a law.
-pub(in crate::dynamics) fn travel_along(forest: &Forest, slider: &Slider) -> ConstraintEquation {
+pub(in crate::dynamics) fn travel_along<C: Real>(
+    forest: &Forest<C>,
+    slider: &Slider<C>,
+) -> ConstraintEquation<C> {
     on_rail(forest, &slider.name, slider, rail(slider), None)
 }
 

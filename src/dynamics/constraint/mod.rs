@@ -26,7 +26,7 @@ use super::law::Law;
 use super::point::Point;
 use super::quadratic::Quadratic;
 use crate::arithmetic::angle::difference;
-use crate::arithmetic::{Complex, Over, Real, Scalar};
+use crate::arithmetic::{Complex, Over, Real};
 use std::sync::Arc;
 
 /// Coordinates, elements and rates at one moment.
@@ -103,13 +103,13 @@ pub enum Way<C = f64> {
     Span(Point<C>, C),
 }
 
-impl Push {
+impl<C: Real> Push<C> {
     /// Its direction at the elements `z`.
-    pub fn direction<T: Scalar>(&self, z: &[Complex<T>]) -> Complex<T> {
+    pub fn direction<T: Over<C>>(&self, z: &[Complex<T>]) -> Complex<T> {
         match &self.way {
             Way::Ground(direction) => Complex::of(*direction),
             Way::Body(body, direction) => z[*body].turn(*direction),
-            Way::Span(span, length) => span.position(z).times(T::of(length.recip())),
+            Way::Span(span, length) => span.position(z).times(T::constant(C::ONE / *length)),
         }
     }
 }

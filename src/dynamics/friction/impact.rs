@@ -17,19 +17,20 @@ use super::super::constraint::Posture;
 use super::super::contact::metric::{Gradient, Metric};
 use super::super::{Mechanism, Time};
 use super::{Normal, solve};
+use crate::arithmetic::Real;
 use nalgebra::DVector;
 
 /// What an impact is decided by.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shock {
+pub struct Shock<T = f64> {
     /// a_nn, a_nt, a_tt: velocities that unit impulses make \[1/kg\].
-    pub response: [f64; 3],
+    pub response: [T; 3],
     /// v_n and v_t before it \[m/s\]; v_n is negative.
-    pub velocity: [f64; 2],
+    pub velocity: [T; 2],
     /// e.
-    pub restitution: f64,
+    pub restitution: T,
     /// mu and mu0.
-    pub coefficients: [f64; 2],
+    pub coefficients: [T; 2],
     /// True for Newton's law of impact, else Poisson's.
     pub is_newton: bool,
 }
@@ -40,46 +41,54 @@ const NO_SPEED: f64 = 1e-14;
 impl Shock {
     /// Normal and tangential impulse \[N·s\]; `None` where nothing ends it.
     pub fn impulses(&self) -> Option<[f64; 2]> {
+        let [v_n, v_t] = self.velocity;
+        self.impulses_beyond(NO_SPEED * (v_n.abs() + v_t.abs()))
+    }
+}
+
+impl<T: Real> Shock<T> {
+    /// The same where tangential velocities up to `still` \[m/s\] are rounding.
+    pub fn impulses_beyond(&self, still: T) -> Option<[T; 2]> {
         let [a_nn, a_nt, a_tt] = self.response;
         let [kinetic, stiction] = self.coefficients;
         let [mut v_n, mut v_t] = self.velocity;
         let rebound = -self.restitution * v_n;
-        let still = NO_SPEED * (v_n.abs() + v_t.abs());
-        let [mut p_n, mut p_t] = [0.0; 2];
+        let against = |velocity: T| if velocity < T::ZERO { kinetic } else { -kinetic };
+        let [mut p_n, mut p_t] = [T::ZERO; 2];
         // The normal impulse at which it ends, known to Poisson from the end of compression on.
         let mut end = None;
         for _ in 0..8 {
             let ratio = if v_t.abs() > still {
-                -v_t.signum() * kinetic
-            } else if a_tt == 0.0 || a_nt.abs() <= stiction * a_tt {
-                v_t = 0.0;
-                if a_tt == 0.0 { 0.0 } else { -a_nt / a_tt }
+                against(v_t)
+            } else if a_tt == T::ZERO || a_nt.abs() <= stiction * a_tt {
+                v_t = T::ZERO;
+                if a_tt == T::ZERO { T::ZERO } else { -a_nt / a_tt }
             } else {
-                -a_nt.signum() * kinetic
+                against(a_nt)
             };
             let (n_rate, t_rate) = (a_nn + a_nt * ratio, a_nt + a_tt * ratio);
             // To the end of sliding, of compression, or of the impact.
-            let stops = if v_t != 0.0 && v_t * t_rate < 0.0 { -v_t / t_rate } else { f64::INFINITY };
+            let stops = (v_t * t_rate < T::ZERO).then(|| -v_t / t_rate);
+            let stops = stops.filter(|share| share.value().is_finite());
             let ends = match end {
                 Some(end) => end - p_n,
                 None if self.is_newton => (rebound - v_n) / n_rate,
                 None => -v_n / n_rate,
             };
-            let ends = if ends >= 0.0 { ends } else { f64::INFINITY };
-            let share = stops.min(ends);
-            if !share.is_finite() {
-                return None;
-            }
+            let ends = Some(ends).filter(|&share| share >= T::ZERO && share.value().is_finite());
+            let is_stopped = stops.is_some_and(|stops| ends.is_none_or(|ends| stops <= ends));
+            let has_ended = ends.is_some_and(|ends| stops.is_none_or(|stops| ends <= stops));
+            let share = if is_stopped { stops? } else { ends? };
             (p_n, p_t) = (p_n + share, p_t + ratio * share);
             (v_n, v_t) = (v_n + n_rate * share, v_t + t_rate * share);
-            if stops <= ends {
-                v_t = 0.0;
+            if is_stopped {
+                v_t = T::ZERO;
             }
-            if ends <= stops {
+            if has_ended {
                 if end.is_some() || self.is_newton {
                     return Some([p_n, p_t]);
                 }
-                end = Some((1.0 + self.restitution) * p_n);
+                end = Some((T::ONE + self.restitution) * p_n);
             }
         }
         None

@@ -13,12 +13,16 @@
 //! stick most come first: with a static coefficient above the kinetic one a place at rest stays so.
 //! Places that share a degree of freedom may also be at their limits, see `friction/shared.rs`.
 //!
+//! The combinations are the same for all numbers; what is told of one by its equations, and what counts as
+//! rounding there, is [`Evidence`].
+//!
 //! Source: D. Stewart, *Rigid-body dynamics with friction and impact*, SIAM Review 42 (2000); of the paradox
 //! F. Génot, B. Brogliato, *New results on Painlevé paradoxes*, Eur. J. Mech. A 18 (1999).
 
 use super::super::constraint::Posture;
 use super::super::kernel::{Bias, Kernel, dot};
 use super::super::{Mechanism, Motion, Time};
+use super::shared::Room;
 use super::{Mode, Normal};
 use crate::arithmetic::Complex;
 
@@ -53,6 +57,28 @@ pub enum Paradox {
     TooMany(usize),
 }
 
+impl Paradox {
+    /// What it says of places with these names.
+    pub fn message(&self, places: &str) -> String {
+        match self {
+            Self::Inconsistent => {
+                format!("no forces of friction fit the motion at {places}: Painlevé's inconsistent case")
+            }
+            Self::Indeterminate => {
+                format!("more than one motion fits friction at {places}: Painlevé's indeterminate case")
+            }
+            Self::TooMany(count) => {
+                format!("{count} places with friction are at rest at once, more than are taken")
+            }
+        }
+    }
+}
+
+/// What to do about one.
+pub const HINT: &str = "lower the coefficient, or put a spring and a damper where the bodies touch";
+/// What is said where the equations of friction become singular.
+pub const JAMS: &str = "friction no longer follows from the motion: Painlevé's paradox, the surfaces jam";
+
 /// Contacts that are held, and the modes of all places.
 pub type Modes = (Vec<usize>, Vec<Mode>);
 
@@ -77,6 +103,47 @@ struct Known<'a> {
     arrived: Option<usize>,
 }
 
+/// What the equations tell of contacts that are closed and places in these modes: signs, zero where rounding
+/// leaves them open.
+#[derive(Clone, Debug)]
+pub struct Told {
+    /// The determinant of the equations of friction.
+    pub regularity: f64,
+    /// Pressures of the closed contacts.
+    pub pressures: Vec<i8>,
+    /// Accelerations of the gaps of all that touch.
+    pub leaving: Vec<i8>,
+    /// mu0 N - |tau| of what sticks.
+    pub grips: Vec<i8>,
+    /// Accelerations of the relative displacements of all places.
+    pub speeding: Vec<i8>,
+    /// Accelerations of all coordinates.
+    pub load: Vec<f64>,
+}
+
+/// What is known of a moment in the numbers of a run.
+pub trait Evidence {
+    /// The relative velocity \[rad/s, m/s\] of every place, zero where it is rounding.
+    fn rates(&self) -> Vec<f64>;
+
+    /// What the equations tell; `None` where they have no finite solution.
+    fn told(&self, closed: &[usize], modes: &[Mode], touching: &[usize]) -> Option<Told>;
+
+    /// True where a place that is held by contacts, constraints and the others in these modes has no
+    /// acceleration; of what motors hold less is asked.
+    fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], is_driven: bool) -> bool;
+
+    /// True where a place that contacts and constraints hold has no velocity once that of the rest is as
+    /// these have it.
+    fn stands(&self, place: usize, closed: &[usize]) -> bool;
+}
+
+/// The evidence in doubles.
+struct InDoubles<'a> {
+    mechanism: &'a Mechanism,
+    at: Moment<'a>,
+}
+
 impl Mechanism {
     /// The modes at a moment, of a mechanism that is in those of `before`; `staying` are the contacts that
     /// would be held without friction, `touching` all that touch and do not move along their normals.
@@ -87,15 +154,30 @@ impl Mechanism {
         &self,
         at: Moment,
         before: &[Mode],
+        contacts: [&[usize]; 2],
+        transition: Transition,
+    ) -> Result<Modes, Paradox> {
+        self.modes_by(&InDoubles { mechanism: self, at }, at, before, contacts, transition)
+    }
+
+    /// The same by the evidence that other numbers give.
+    ///
+    /// # Errors
+    /// There is none, or more than one.
+    pub fn modes_by(
+        &self,
+        evidence: &dyn Evidence,
+        at: Moment,
+        before: &[Mode],
         [staying, touching]: [&[usize]; 2],
         transition: Transition,
     ) -> Result<Modes, Paradox> {
-        let rates = self.sliding_rates(at);
+        let rates = evidence.rates();
         let pushed = self.pushed(at, before, staying, transition);
         let mut found: Option<(Modes, Vec<f64>)> = None;
         let mut looked_at = 0;
         for closed in subsets(staying, touching) {
-            let rates = self.rates_beside(at, &closed, &rates);
+            let rates = self.rates_beside(evidence, at, &closed, &rates);
             let mut options = self.options(at, before, &rates, &closed, (&pushed, transition));
             let resting = options.iter().filter(|of| of.len() > 1).count();
             let count = |options: &[Vec<Mode>]| {
@@ -114,7 +196,7 @@ impl Mechanism {
             }
             let known = Known { rates: &rates, pushed: &pushed, arrived: transition.arrived };
             let fit = combinations(&options).into_iter().find_map(|modes| {
-                let load = self.fits(at, &closed, &modes, touching, known)?;
+                let load = self.fits(evidence, at, &closed, &modes, touching, known)?;
                 Some(((closed.clone(), modes), load))
             });
             found = match (fit, found) {
@@ -212,30 +294,61 @@ impl Mechanism {
     /// The accelerations in these modes, where they and the forces are such as the modes claim.
     fn fits(
         &self,
+        evidence: &dyn Evidence,
         at: Moment,
         closed: &[usize],
         modes: &[Mode],
         touching: &[usize],
         Known { rates, pushed, arrived }: Known,
     ) -> Option<Vec<f64>> {
-        let mechanism = self.moving(closed, modes);
+        let told = evidence.told(closed, modes, touching)?;
+        // At walls the pressure has a sign, which tells; the force of joints and rails may have either.
+        let at_walls = self.frictions.iter().zip(modes).all(|(friction, mode)| {
+            matches!(friction.normal, Normal::Contact(_)) || matches!(mode, Mode::Open | Mode::Stick(_))
+        });
+        let leaves = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
+        if !at_walls && told.regularity <= 0.0
+            || told.pressures.iter().any(|&sign| sign < 0)
+            || !touching.iter().zip(&told.leaving).all(leaves)
+        {
+            return None;
+        }
+        let is_held = |place: usize| self.room_beside(at, closed, modes, place).is_held(place);
+        let is_still = |place: usize, is_driven| evidence.is_still(place, closed, modes, is_driven);
+        let fit = modes.iter().enumerate().all(|(number, mode)| match mode {
+            Mode::Open => true,
+            // Where the travel of a moving linkage turns back, the linkage moves it on, and no force of
+            // friction holds it.
+            Mode::Stick(_) => told.grips[number] >= 0 && (!is_held(number) || is_still(number, false)),
+            Mode::Slip(sign) => {
+                let slides = rates[number] != 0.0 && arrived != Some(number);
+                // What breaks begins with what the coefficients leave, which may be nothing.
+                let is_pushed = pushed[number].is_some() && !is_held(number);
+                slides || is_pushed || sign * f64::from(told.speeding[number]) > 0.0
+            }
+            Mode::Strained(strain) => is_held(number) && is_still(number, *strain == 0.0),
+        });
+        fit.then_some(told.load)
+    }
+}
+
+impl Evidence for InDoubles<'_> {
+    fn rates(&self) -> Vec<f64> {
+        self.mechanism.sliding_rates(self.at)
+    }
+
+    fn told(&self, closed: &[usize], modes: &[Mode], touching: &[usize]) -> Option<Told> {
+        let Self { mechanism: free, at } = *self;
+        let mechanism = free.moving(closed, modes);
         let mut kernel = Kernel::<f64>::new(&mechanism);
         kernel.accelerate::<0>(&mechanism, at.t, at.phi, at.omega, Bias::default());
         if !kernel.load.iter().chain(&kernel.multiplier).all(|x| x.is_finite()) {
             return None;
         }
-        // At walls the pressure has a sign, which tells; the force of joints and rails may have either.
-        let at_walls = mechanism.sliding().all(|(friction, _)| matches!(friction.normal, Normal::Contact(_)));
-        if !at_walls && kernel.regularity <= 0.0 {
-            return None;
-        }
         let forces = kernel.friction_forces(&mechanism, at.t, at.phi, at.omega);
         let pressures = closed.iter().zip(&kernel.multiplier[mechanism.standing_rows()..]);
-        let pressures: Vec<f64> =
-            (pressures).map(|(&contact, &multiplier)| self.contacts[contact].pressure(multiplier)).collect();
-        if pressures.iter().any(|&pressure| pressure < -ROUNDING) {
-            return None;
-        }
+        let pressure = |(&contact, &multiplier): (&usize, &f64)| free.contacts[contact].pressure(multiplier);
+        let pressures = pressures.map(pressure).map(|pressure| sign(pressure, ROUNDING)).collect();
         let posture = Posture { phi: at.phi, z: at.z, omega: at.omega };
         let mut row = vec![0.0; at.phi.len()];
         let mut acceleration = |of: &super::ConstraintEquation| {
@@ -244,45 +357,36 @@ impl Mechanism {
             let parts = row.iter().zip(&kernel.load).map(|(g, a)| (g * a).abs()).sum::<f64>();
             (dot(&row, &kernel.load) + here.convective, parts + here.convective.abs())
         };
-        let leaves = |contact: &usize| {
-            let (apart, size) = acceleration(&self.contacts[*contact].row);
-            closed.contains(contact) || apart >= -ROUNDING * size
+        let mut acceleration = |of: &super::ConstraintEquation| {
+            let (acceleration, size) = acceleration(of);
+            sign(acceleration, ROUNDING * size)
         };
-        if !touching.iter().all(leaves) {
-            return None;
-        }
-        let beside = |number: usize| self.room_beside(at, closed, modes, number);
-        let fit = (self.frictions.iter().zip(modes).zip(forces).enumerate()).all(
-            |(number, ((friction, mode), [tau, pressing]))| match mode {
-                Mode::Open => true,
-                Mode::Stick(_) => {
-                    let rounding =
-                        f64::EPSILON * kernel.multiplier.iter().fold(pressing, |most, x| most.max(x.abs()));
-                    let is_enough = tau.abs()
-                        <= friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding;
-                    // Where the travel of a moving linkage turns back, the linkage moves it on, and no
-                    // force of friction holds it.
-                    let is_moved_on = || {
-                        let room = beside(number);
-                        room.is_held(number) && !room.is_still(number, false)
-                    };
-                    is_enough && !is_moved_on()
-                }
-                Mode::Slip(sign) => {
-                    let slides = rates[number] != 0.0 && arrived != Some(number);
-                    // What breaks begins with what the coefficients leave, which may be nothing.
-                    let is_pushed = pushed[number].is_some() && !beside(number).is_held(number);
-                    let (speeding, size) = acceleration(&friction.tangent);
-                    slides || is_pushed || sign * speeding > ROUNDING * size
-                }
-                Mode::Strained(strain) => {
-                    let room = beside(number);
-                    room.is_held(number) && room.is_still(number, *strain == 0.0)
-                }
-            },
-        );
-        fit.then_some(kernel.load)
+        let leaving = touching.iter().map(|&contact| acceleration(&free.contacts[contact].row)).collect();
+        let speeding = free.frictions.iter().map(|friction| acceleration(&friction.tangent)).collect();
+        let grip = |(friction, [tau, pressing]): (&super::Friction, [f64; 2])| {
+            let rounding =
+                f64::EPSILON * kernel.multiplier.iter().fold(pressing, |most, x| most.max(x.abs()));
+            let most = friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding;
+            if tau.abs() <= most { 0 } else { -1 }
+        };
+        let grips = free.frictions.iter().zip(forces).map(grip).collect();
+        let regularity = kernel.regularity;
+        Some(Told { regularity, pressures, leaving, grips, speeding, load: kernel.load })
     }
+
+    fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], is_driven: bool) -> bool {
+        self.mechanism.room_beside(self.at, closed, modes, place).is_still(place, is_driven)
+    }
+
+    fn stands(&self, place: usize, closed: &[usize]) -> bool {
+        let open = vec![Mode::Open; self.mechanism.frictions.len()];
+        Room::new(self.mechanism, self.at, closed, &open).stands(place)
+    }
+}
+
+/// The sign of a number, zero up to what is rounding.
+fn sign(x: f64, rounding: f64) -> i8 {
+    if x > rounding { 1 } else { -i8::from(x < -rounding) }
 }
 
 /// Whether two motions have the same accelerations.

@@ -12,6 +12,7 @@
 use super::super::Mechanism;
 use super::super::constraint::Posture;
 use super::super::contact::metric::{Gradient, Metric};
+use super::modes::Evidence;
 use super::{Mode, Moment, Normal, Transition};
 
 /// Acceleration, over that without constraints, up to which the rest leaves a place still.
@@ -63,7 +64,7 @@ impl<'a> Room<'a> {
 
     /// True where a place that is held has no velocity once that of the rest is as constraints and contacts
     /// have it.
-    fn stands(&self, place: usize) -> bool {
+    pub fn stands(&self, place: usize) -> bool {
         self.metric.as_ref().is_some_and(|metric| {
             let Gradient { row, along } = self.gradient(place);
             let (column, velocity) = (metric.column(&along), metric.velocity(self.at.omega));
@@ -103,7 +104,13 @@ impl Mechanism {
 
     /// Relative velocities of all places, zero of those at closed contacts that are held there: the speed with
     /// which a point has come to its wall, and moves along it as well, is taken off.
-    pub(super) fn rates_beside(&self, at: Moment, closed: &[usize], rates: &[f64]) -> Vec<f64> {
+    pub(super) fn rates_beside(
+        &self,
+        evidence: &dyn Evidence,
+        at: Moment,
+        closed: &[usize],
+        rates: &[f64],
+    ) -> Vec<f64> {
         let mut rates = rates.to_vec();
         let may_stand = |(number, rate): (usize, &f64)| match self.frictions[number].normal {
             Normal::Contact(contact) if closed.contains(&contact) && *rate != 0.0 => Some(number),
@@ -114,7 +121,9 @@ impl Mechanism {
             return rates;
         }
         let room = Room::new(self, at, closed, &vec![Mode::Open; rates.len()]);
-        for place in may_stand.into_iter().filter(|&place| room.is_held(place) && room.stands(place)) {
+        for place in
+            may_stand.into_iter().filter(|&place| room.is_held(place) && evidence.stands(place, closed))
+        {
             rates[place] = 0.0;
         }
         rates
@@ -146,6 +155,12 @@ impl Mechanism {
             }
         }
         pushed
+    }
+
+    /// True where motors and locks hold a place.
+    #[cfg(feature = "digits")]
+    pub(crate) fn is_driven(&self, at: Moment, place: usize) -> bool {
+        Room::new(self, at, &[], &vec![Mode::Open; self.frictions.len()]).is_held(place)
     }
 
     /// Leaves without friction the places at rest that motors and locks hold.

@@ -4,8 +4,11 @@ use super::factors::Factored;
 use super::{Series, bodywise, drive};
 use crate::arithmetic::lanes::wide::Task;
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Over, Real};
+use crate::dynamics::compile::Body;
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
+use crate::dynamics::forest::Forest;
+use crate::dynamics::friction::Friction;
 use crate::dynamics::law::{Law, Phase};
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::tree::Tree;
@@ -30,6 +33,21 @@ pub struct Terms<'a, C> {
     pub forces: &'a [UserForce<C>],
     /// Constraint equations.
     pub constraints: &'a [ConstraintEquation<C>],
+    /// Dry friction, where there is any.
+    pub friction: Option<FrictionTerms<'a, C>>,
+}
+
+/// What dry friction follows from.
+#[derive(Clone, Copy, Debug)]
+pub struct FrictionTerms<'a, C> {
+    /// The places it acts at, in the modes of the mechanism.
+    pub places: &'a [Friction<C>],
+    /// The bodies, which need forces.
+    pub bodies: &'a [Body<C>],
+    /// How they hang.
+    pub forest: &'a Forest<C>,
+    /// Gravity \[m/s²\].
+    pub gravity: Complex<C>,
 }
 
 impl Mechanism {
@@ -44,6 +62,12 @@ impl Mechanism {
             actions: &self.actions,
             forces: &self.forces,
             constraints: &self.constraints,
+            friction: (!self.frictions.is_empty()).then_some(FrictionTerms {
+                places: &self.frictions,
+                bodies: &self.bodies,
+                forest: &self.forest,
+                gravity: self.gravity,
+            }),
         }
     }
 }
@@ -117,6 +141,11 @@ pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constan
     #[inline(always)]
     fn with_constant(self, factor: Self, constant: Self::Constant) -> Self {
         self + factor.by(constant)
+    }
+
+    /// log2 of its magnitude.
+    fn log2_size(self) -> f64 {
+        libm::log2(self.value().abs())
     }
 
     /// The number kept to so many limbs, where it has limbs.

@@ -17,22 +17,29 @@
 //! follows from Newton's equation of what is beyond it, of which centre c, mass m and applied forces F are
 //! series: `N_m = Σ (m+1)(m+2) m c_{m+2} - F_m`.  Each order is solved twice, without tau_m and with it.
 //!
+//! Numbers of many digits have the normal forces of what sticks as well, by which it is told how long that
+//! lasts.
+//!
 //! N may pass zero in a step, and |N| has a corner there; its series goes on below zero instead, and
 //! [`Series::pressing`] tells where.  From there on n of a rail is turned, and N of a joint begins at zero:
 //! what rounding has left of it has no direction.
 
+mod told;
+
+pub use self::told::Slides;
 use super::Series;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::copy;
 use super::rows::{RowSeries, turning_terms};
-use crate::arithmetic::{Complex, Real};
+use crate::arithmetic::{Complex, Over, Real};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Body;
 use crate::dynamics::constraint::{ConstraintEquation, Measure, Push, Way};
-use crate::dynamics::friction::{self, Friction, Normal};
+use crate::dynamics::friction::{self, Friction, Mode, Normal};
 use crate::dynamics::point::Point;
 
-/// Share of the time in which a normal force changes by itself below which a zero ahead counts as passed.
+/// Share of the time in which a normal force changes by itself below which a zero ahead counts as passed, in
+/// doubles.
 const PASSED: f64 = 1e-9;
 /// Rounds of Newton's iteration on a direction.
 const ROUNDS: usize = 12;
@@ -41,8 +48,10 @@ const ROUNDS: usize = 12;
 #[derive(Clone, Debug)]
 pub struct FrictionSeries<T: SeriesNumber> {
     places: Vec<Sliding<T>>,
+    /// The places that stick, of numbers of many digits.
+    stuck: Vec<Sticking<T>>,
     /// The centre of mass of every body.
-    centres: Vec<Point>,
+    centres: Vec<Point<T::Constant>>,
     /// Forces applied to every body at the present power \[N/s^m\].
     pub applied: Vec<Complex<T>>,
     /// N of place j by tau of place k.
@@ -53,12 +62,24 @@ pub struct FrictionSeries<T: SeriesNumber> {
     load: Vec<T>,
     /// Power that friction takes (powers 0…P-1) \[W/s^m\].
     pub lost: Vec<T>,
+    /// The determinant of the equations of tau_0.
+    regularity: f64,
+    /// log2 of the share of the time in which a normal force changes by itself below which a zero ahead
+    /// counts as passed.
+    passed: f64,
+}
+
+/// A place that sticks, and its normal force.
+#[derive(Clone, Debug)]
+struct Sticking<T: SeriesNumber> {
+    friction: Friction<T::Constant>,
+    normal: Vec<Complex<T>>,
 }
 
 /// One place and its series.
 #[derive(Clone, Debug)]
-struct Sliding<T> {
-    friction: Friction,
+struct Sliding<T: SeriesNumber> {
+    friction: Friction<T::Constant>,
     /// c.
     coefficient: T,
     /// tau and s'.
@@ -92,10 +113,11 @@ impl<T: SeriesNumber> Sliding<T> {
 
 impl<T: SeriesNumber> FrictionSeries<T> {
     /// Room for the series of what slides; `None` where nothing does.
-    pub fn new(mechanism: &Mechanism, order: usize) -> Option<Self> {
-        let place = |(friction, coefficient): (&Friction, f64)| Sliding {
+    pub fn new(terms: &Terms<T::Constant>, order: usize) -> Option<Self> {
+        let (mechanism, known) = (terms.structure, terms.friction?);
+        let place = |friction: &Friction<T::Constant>, coefficient: T::Constant| Sliding {
             friction: friction.clone(),
-            coefficient: T::of(coefficient),
+            coefficient: T::constant(coefficient),
             force: Vec::with_capacity(order),
             speed: Vec::with_capacity(order),
             normal: Vec::with_capacity(order),
@@ -104,17 +126,33 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             lead: None,
             is_turned: false,
         };
-        let places: Vec<Sliding<T>> = mechanism.sliding().map(place).collect();
+        let all = || known.places.iter().zip(&mechanism.modes);
+        let sliding = all().filter_map(|(friction, mode)| {
+            let mode = match *mode {
+                Mode::Slip(sign) => Mode::Slip(sign),
+                Mode::Strained(sign) => Mode::Strained(sign),
+                Mode::Open | Mode::Stick(_) => return None,
+            };
+            Some(place(friction, mode.coefficient(friction)?))
+        });
+        let places: Vec<Sliding<T>> = sliding.collect();
+        let sticks = all().filter(|(_, mode)| T::HAS_CONSTANTS && matches!(mode, Mode::Stick(_)));
+        let stuck: Vec<Sticking<T>> =
+            sticks.map(|(friction, _)| Sticking { friction: friction.clone(), normal: Vec::new() }).collect();
+        let centre = |(bar, body): (usize, &Body<T::Constant>)| known.forest.walk(bar, body.centre);
         let (n, f) = (mechanism.coordinates(), places.len());
-        (f > 0).then(|| Self {
+        (f + stuck.len() > 0).then(|| Self {
             places,
-            centres: (0..mechanism.bodies.len()).map(|body| mechanism.centre(body)).collect(),
+            stuck,
+            centres: known.bodies.iter().enumerate().map(centre).collect(),
             applied: vec![Complex::ZERO; mechanism.bodies.len()],
             response: vec![Complex::ZERO; f * f],
             rest: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
             load: vec![T::ZERO; n],
             lost: vec![T::ZERO; order],
+            regularity: 1.0,
+            passed: libm::log2(PASSED),
         })
     }
 
@@ -128,7 +166,13 @@ impl<T: SeriesNumber> FrictionSeries<T> {
     }
 
     /// Puts tau of one place on the loads and the elements' balance.
-    fn push(tangent: &ConstraintEquation, tau: T, z: &[Complex<T>], load: &mut [T], rest: &mut [Complex<T>]) {
+    fn push(
+        tangent: &ConstraintEquation<T::Constant>,
+        tau: T,
+        z: &[Complex<T>],
+        load: &mut [T],
+        rest: &mut [Complex<T>],
+    ) {
         match &tangent.measure {
             Measure::Place(place) => {
                 place.slopes(z, |k, slope| load[k] -= slope * tau);
@@ -147,21 +191,22 @@ impl<T: SeriesNumber> FrictionSeries<T> {
     /// and tau.
     fn normals(
         &self,
-        mechanism: &Mechanism,
+        terms: &Terms<T::Constant>,
         m: usize,
         z: &[Complex<T>],
         rows: &RowSeries<T>,
-    ) -> Vec<Complex<T>> {
+    ) -> [Vec<Complex<T>>; 2] {
+        let (mechanism, Some(known)) = (terms.structure, terms.friction) else { return Default::default() };
         let n = mechanism.coordinates();
         let newest = &z[(m + 2) * n..(m + 3) * n];
         let factor = T::of(((m + 1) * (m + 2)) as f64);
-        let gravity = if m == 0 { Complex::of(mechanism.gravity) } else { Complex::ZERO };
+        let gravity = if m == 0 { Complex::of(known.gravity) } else { Complex::ZERO };
         let mut needed = Vec::with_capacity(self.centres.len());
-        for ((centre, body), &applied) in self.centres.iter().zip(&mechanism.bodies).zip(&self.applied) {
+        for ((centre, body), &applied) in self.centres.iter().zip(known.bodies).zip(&self.applied) {
             let acceleration = centre.turned(newest).times(factor) - gravity;
-            needed.push(acceleration.times(T::of(body.mass)) - applied);
+            needed.push(acceleration.times(T::constant(body.mass)) - applied);
         }
-        let mut add = |push: &Option<Push>, multiplier: &dyn Fn(usize) -> T| {
+        let mut add = |push: &Option<Push<T::Constant>>, multiplier: &dyn Fn(usize) -> T| {
             let Some(push) = push else { return };
             let force = (0..=m).fold(Complex::ZERO, |sum, l| {
                 sum + direction(push, &z[(m - l) * n..(m - l + 1) * n], m - l).times(multiplier(l))
@@ -173,7 +218,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
                 needed[body] -= force;
             }
         };
-        for (i, row) in mechanism.constraints.iter().enumerate() {
+        for (i, row) in terms.constraints.iter().enumerate() {
             add(&row.push, &|l| rows.multipliers(l)[i]);
         }
         for place in &self.places {
@@ -181,9 +226,11 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         }
         let mut carried = Vec::with_capacity(mechanism.joints.len());
         mechanism.pass_on(rows.multipliers(m), &mut needed, &mut carried);
-        let normal =
-            |place: &Sliding<T>| mechanism.normal_force(&place.friction, rows.multipliers(m), &carried);
-        self.places.iter().map(normal).collect()
+        let normal = |friction: &Friction<T::Constant>| {
+            mechanism.normal_force(friction, rows.multipliers(m), &carried)
+        };
+        let slide = self.places.iter().map(|place| normal(&place.friction)).collect();
+        [slide, self.stuck.iter().map(|place| normal(&place.friction)).collect()]
     }
 
     /// A tau of the size that forces of the mechanism may have, a power of two: what normal forces have of one is a
@@ -191,7 +238,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
     fn test_load(&self, mechanism: &Mechanism, z: &[Complex<T>], rows: &RowSeries<T>) -> f64 {
         let n = mechanism.coordinates();
         let size = |force: Complex<T>| libm::hypot(force.re.value(), force.im.value());
-        let of_body = |((centre, body), &applied): ((&Point, &Body), &Complex<T>)| {
+        let of_body = |((centre, body), &applied): ((&Point<T::Constant>, &Body), &Complex<T>)| {
             let acceleration = size(centre.turned(&z[2 * n..3 * n])) * 2.0;
             let weight = libm::hypot(mechanism.gravity.re, mechanism.gravity.im);
             body.mass * (acceleration + weight) + size(applied)
@@ -210,7 +257,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         let sliding: Vec<(Normal, T)> =
             self.places.iter().map(|place| (place.friction.normal, place.coefficient)).collect();
         let mut tau = vec![T::ZERO; f];
-        friction::forces(&sliding, start, |j, k| self.response[j * f + k], &mut tau);
+        self.regularity = friction::forces(&sliding, start, |j, k| self.response[j * f + k], &mut tau);
         for (j, place) in self.places.iter_mut().enumerate() {
             let normal = (0..f).fold(start[j], |sum, k| sum + self.response[j * f + k].times(tau[k]));
             let (size, mut along) = friction::size(place.friction.normal, normal);
@@ -283,12 +330,12 @@ impl<T: SeriesNumber> FrictionSeries<T> {
 }
 
 /// Power m of the direction of a force, from that of the elements.
-fn direction<T: Real>(push: &Push, z: &[Complex<T>], m: usize) -> Complex<T> {
+fn direction<T: Over<C>, C: Real>(push: &Push<C>, z: &[Complex<T>], m: usize) -> Complex<T> {
     match &push.way {
         _ if m == 0 => push.direction(z),
         Way::Ground(_) => Complex::ZERO,
         Way::Body(body, direction) => z[*body].turn(*direction),
-        Way::Span(span, length) => span.turned(z).times(T::of(length.recip())),
+        Way::Span(span, length) => span.turned(z).times(T::constant(C::ONE / *length)),
     }
 }
 
@@ -306,8 +353,7 @@ impl<T: SeriesNumber> Series<T> {
     #[inline(never)]
     fn slide_with(&mut self, terms: &Terms<T::Constant>, m: usize, mut friction: Box<FrictionSeries<T>>) {
         let (n, f) = (self.elements, friction.places.len());
-        let mechanism = terms.structure;
-        friction.rest.copy_from_slice(&self.rest[m * n..(m + 1) * n]);
+        friction.rest.copy_from_slice(&self.rest[Self::row(m, n)]);
         friction.bend.copy_from_slice(&self.bend);
         friction.load.copy_from_slice(&self.load);
         for place in &mut friction.places {
@@ -320,13 +366,30 @@ impl<T: SeriesNumber> Series<T> {
             place.normal.push(Complex::ZERO);
         }
         self.solve::<0>(terms, m);
-        let start = friction.normals(mechanism, m, &self.z, &self.rows);
+        if f > 0 {
+            self.find_forces(terms, m, &mut friction);
+            self.solve_again(terms, m, &friction);
+        }
+        if !friction.stuck.is_empty() {
+            let [_, normals] = friction.normals(terms, m, &self.z, &self.rows);
+            for (place, normal) in friction.stuck.iter_mut().zip(normals) {
+                place.normal.truncate(m);
+                place.normal.push(normal);
+            }
+        }
+        self.friction = Some(friction);
+    }
+
+    /// tau_m, where order m is solved without it.
+    fn find_forces(&mut self, terms: &Terms<T::Constant>, m: usize, friction: &mut FrictionSeries<T>) {
+        let f = friction.places.len();
+        let [start, _] = friction.normals(terms, m, &self.z, &self.rows);
         if m == 0 {
-            let load = friction.test_load(mechanism, &self.z, &self.rows);
+            let load = friction.test_load(terms.structure, &self.z, &self.rows);
             for k in 0..f {
                 friction.places[k].force[0] = T::of(load);
-                self.solve_again(terms, 0, &friction);
-                let normals = friction.normals(mechanism, 0, &self.z, &self.rows);
+                self.solve_again(terms, 0, friction);
+                let [normals, _] = friction.normals(terms, 0, &self.z, &self.rows);
                 friction.places[k].force[0] = T::ZERO;
                 for (j, normal) in normals.into_iter().enumerate() {
                     friction.response[j * f + k] = (normal - start[j]).times(T::of(load.recip()));
@@ -336,8 +399,6 @@ impl<T: SeriesNumber> Series<T> {
         } else {
             friction.advance(m, &start);
         }
-        self.solve_again(terms, m, &friction);
-        self.friction = Some(friction);
     }
 
     /// Order m once more, with tau_m.
@@ -345,58 +406,12 @@ impl<T: SeriesNumber> Series<T> {
         let n = self.elements;
         self.bend.copy_from_slice(&friction.bend);
         self.load.copy_from_slice(&friction.load);
-        let rest = &mut self.rest[m * n..(m + 1) * n];
+        let rest = &mut self.rest[Self::row(m, n)];
         rest.copy_from_slice(&friction.rest);
         for place in &friction.places {
             let (tangent, tau) = (&place.friction.tangent, place.force[m]);
             FrictionSeries::push(tangent, tau, &self.z[..n], &mut self.load, rest);
         }
         self.solve::<0>(terms, m);
-    }
-
-    /// Powers of the power that friction takes \[W/s^m\]; none where nothing slides.
-    pub fn lost(&self) -> &[T] {
-        self.friction.as_ref().map_or(&[], |friction| &friction.lost)
-    }
-
-    /// Powers of the force that presses every hinge and rail that slides, negative from where it passes zero
-    /// \[N/s^m\].
-    pub fn pressing(&self) -> impl Iterator<Item = Vec<f64>> {
-        let places = self.friction.iter().flat_map(|friction| &friction.places);
-        let has_corner = |place: &&Sliding<T>| !matches!(place.friction.normal, Normal::Contact(_));
-        places.filter(has_corner).map(|place| place.size.iter().map(|size| size.value()).collect())
-    }
-
-    /// Marks the places whose N passes zero here, for an expansion anew; false where there are none.  `unit`
-    /// is the mechanism's unit of time \[s\].
-    pub(super) fn find_reversals(&mut self, unit: f64) -> bool {
-        let mut is_any = false;
-        for place in self.friction.iter_mut().flat_map(|friction| &mut friction.places) {
-            let power = |m: usize| {
-                place.normal.get(m).map_or([0.0; 2], |normal| [normal.re.value(), normal.im.value()])
-            };
-            let [force, rate, bend] = [power(0), power(1), power(2)];
-            place.is_turned = match place.friction.normal {
-                Normal::Contact(_) => false,
-                Normal::Rail => {
-                    let natural = if bend[0] == 0.0 { unit } else { unit.min((rate[0] / bend[0]).abs()) };
-                    let is_near = (force[0] / rate[0]).abs() < PASSED * natural;
-                    place.along.re.value() * rate[0] < 0.0 && is_near
-                }
-                // Powers beyond the second are those of the direction that rounding has left.
-                Normal::Joint(_) => {
-                    let [force, rate] = [force, rate].map(|[x, y]| libm::hypot(x, y));
-                    force != 0.0 && force < PASSED * unit * rate
-                }
-            };
-            is_any |= place.is_turned;
-        }
-        is_any
-    }
-
-    /// Forgets which places were marked.
-    pub(super) fn forget_reversals(&mut self) {
-        let places = self.friction.iter_mut().flat_map(|friction| &mut friction.places);
-        places.for_each(|place| place.is_turned = false);
     }
 }

@@ -77,6 +77,10 @@ impl<const W: usize> SeriesNumber for Digits<W> {
         series.orders::<0>(terms, first);
     }
 
+    fn log2_size(self) -> f64 {
+        self.log2()
+    }
+
     fn kept(self, limbs: usize) -> Self {
         self.shortened(limbs.min(self.limbs()))
     }

@@ -34,7 +34,7 @@ impl<T: SeriesNumber> Task for Part<'_, '_, T> {
 impl<T: SeriesNumber> Series<T> {
     /// Where R_m is, of `n` elements; where series are factors of products, their powers before are there.
     #[inline(always)]
-    fn row(m: usize, n: usize) -> Range<usize> {
+    pub(super) fn row(m: usize, n: usize) -> Range<usize> {
         let m = if T::HAS_CONSTANTS { 0 } else { m };
         m * n..(m + 1) * n
     }
@@ -322,9 +322,15 @@ impl<T: SeriesNumber> Series<T> {
             newest[i] = self.fractions.vector_over((self.turned[i] + z[i].times(omega[i])).left(), m + 2);
         }
         mass_terms::<T, N>(terms.tree, &self.factors, &self.bend, rest);
-        if T::HAS_CONSTANTS {
-            self.factors.push(newest, omega, rest);
-        }
+    }
+
+    /// Takes what order m has come to into the factors of products.
+    #[inline(always)]
+    pub(super) fn push_factors(&mut self, m: usize) {
+        let n = self.elements;
+        let newest = &self.z[(m + 2) * n..(m + 3) * n];
+        let omega = &self.omega[(m + 1) * n..(m + 2) * n];
+        self.factors.push(newest, omega, &self.rest[..n]);
     }
 }
 

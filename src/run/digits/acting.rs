@@ -7,6 +7,7 @@
 use super::branches::Branches;
 use super::confirm::Probe;
 use super::events::Watch;
+use super::friction;
 use super::functions::Functions;
 use super::keep::Keeper;
 use super::motion::{LongState, Motion, coordinates_of};
@@ -58,7 +59,8 @@ impl<const W: usize> Motion<W> {
     pub(super) fn change(&mut self, event: usize) -> Result<(), StepError> {
         let Posture { phi, omega, .. } = self.state_posture();
         let acting = self.mechanism.after(event, self.state.t, &phi, &omega);
-        self.let_act(acting)
+        self.let_act(acting)?;
+        self.rub_again()
     }
 
     /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.
@@ -137,6 +139,7 @@ impl<const W: usize> Motion<W> {
         }
         self.series = Series::of_terms(&mechanism.terms(), self.coordinates, order);
         self.series.keep(self.kept.clone());
+        self.series.resolve_reversals(self.precision.rounding(friction::SURE));
         self.probe = Probe::of(&mechanism, self.coordinates);
         self.watch = std::mem::take(&mut self.watch).renewed([&self.mechanism, &mechanism], order);
         self.branches = Branches::new(Functions::new(&mechanism.conditions, order));

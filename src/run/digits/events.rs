@@ -76,9 +76,15 @@ impl<const W: usize> Watch<W> {
     }
 
     /// Looks for what happens in a step of so many seconds, of those for which the series is made; where an event
-    /// changes what acts, the step is to end there, after so many seconds.
-    pub fn look(&mut self, motion: &Motion<W>, [step, made]: [f64; 2]) -> Option<Digits<W>> {
-        (self.ahead, self.ends) = self.passing(motion, [step, made]);
+    /// changes what acts, the step is to end there, after so many seconds.  A function that is zero where the step
+    /// `ends_at_corner` of a formula may only touch zero: that is told by the next step.
+    pub fn look(
+        &mut self,
+        motion: &Motion<W>,
+        [step, made]: [f64; 2],
+        ends_at_corner: bool,
+    ) -> Option<Digits<W>> {
+        (self.ahead, self.ends) = self.passing(motion, [step, made], ends_at_corner);
         let is_last = |ahead: &Ahead<W>| {
             let event = &motion.mechanism.events[ahead.event];
             event.stop || event.changes
@@ -90,7 +96,7 @@ impl<const W: usize> Watch<W> {
             return None;
         }
         // What happens at this moment as well is left to the next step: it begins on the side before.
-        let (passing, ends) = self.passing(motion, [last.after.value(), made]);
+        let (passing, ends) = self.passing(motion, [last.after.value(), made], false);
         self.ends = ends;
         for (event, side) in self.ends.iter_mut().enumerate() {
             let of_event = |ahead: &&Ahead<W>| ahead.event == event;
@@ -107,7 +113,12 @@ impl<const W: usize> Watch<W> {
 
     /// The passages that count in a step of so many seconds, in the order of their times, and the sides of all
     /// functions at its end.
-    fn passing(&self, motion: &Motion<W>, [step, made]: [f64; 2]) -> (Vec<Ahead<W>>, Vec<i8>) {
+    fn passing(
+        &self,
+        motion: &Motion<W>,
+        [step, made]: [f64; 2],
+        ends_at_corner: bool,
+    ) -> (Vec<Ahead<W>>, Vec<i8>) {
         let (mut ahead, mut ends) = (Vec::new(), Vec::new());
         let off = &motion.mechanism.acting.off;
         for (event, powers) in self.functions.powers.iter().enumerate() {
@@ -124,7 +135,8 @@ impl<const W: usize> Watch<W> {
                 .take_while(|last| (motion.state().t - last.t).value() <= SAME * made)
                 .any(|last| last.event == event);
             let least = magnitude * libm::exp2(motion.precision.rounding(SURE));
-            let (passages, end) = passages(&shares, step / made, least, (self.sides[event], began));
+            let span = (step / made, ends_at_corner);
+            let (passages, end) = passages(&shares, span, least, (self.sides[event], began));
             ends.push(end);
             for (share, rises) in passages.into_iter().filter(|(_, rises)| counts(*rises)) {
                 let near = Digits::of(share * made);
@@ -177,8 +189,13 @@ impl<const W: usize> Watch<W> {
 
 /// Passages of a formula through zero up to `end`, in shares of what its series is made for, and whether it
 /// rises, and its side there; `began` says that one of them ended the step before.  What nowhere is larger than
-/// `least` is rounding, as of a point that is kept at rest.
-fn passages(shares: &[f64], end: f64, least: f64, (before, began): (i8, bool)) -> (Vec<(f64, bool)>, i8) {
+/// `least` is rounding, as of a point that is kept at rest.  Zeros at a corner at the end are left to the next step.
+fn passages(
+    shares: &[f64],
+    (end, ends_at_corner): (f64, bool),
+    least: f64,
+    (before, began): (i8, bool),
+) -> (Vec<(f64, bool)>, i8) {
     let curve = Powers { powers: shares, end: 1.0 };
     let at = |share: f64| curve.at(share)[0];
     let most = magnitude(shares);
@@ -197,6 +214,9 @@ fn passages(shares: &[f64], end: f64, least: f64, (before, began): (i8, bool)) -
         && let Some(zero) = root(&curve, 0.0, share, end)
     {
         share = zero + SAME;
+        if ends_at_corner && share >= end {
+            return (all, side);
+        }
         let after = sign(at(share.min(end)));
         // At the very end of a step what follows is not known: it is on the other side.
         let next = if after == 0 || share >= end { -side } else { after };
@@ -210,7 +230,7 @@ fn passages(shares: &[f64], end: f64, least: f64, (before, began): (i8, bool)) -
     }
     // A step may end at a zero, as one that ends on a wall does.
     let [value, slope] = curve.at(end);
-    if value.abs() <= NO_VALUE * most && sign(slope) == -side {
+    if !ends_at_corner && value.abs() <= NO_VALUE * most && sign(slope) == -side {
         all.push((end, slope > 0.0));
         side = -side;
     }

@@ -1,6 +1,7 @@
 //! Functions of a motion in many digits, as series: those of events, and the conditions of formulas.
 
-use super::motion::{JUDGES, Motion};
+use super::motion::Motion;
+use super::polynomial::JUDGES;
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::force::UserForce;
 use crate::dynamics::series::FormulaSeries;

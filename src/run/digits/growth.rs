@@ -10,6 +10,7 @@ use super::precision::{DIGITS, Precision};
 use super::{LongError, LongRun, Runner, Source};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::friction::Mode;
 use crate::stepping::StepError;
 use std::time::Instant;
 
@@ -131,8 +132,9 @@ fn measured(
             return Ok(None);
         }
         let (here, there) = (motion.state_at(t), other.state_at(t));
-        // Where a point stays on its wall in one of them only, they are no neighbours for that time.
-        if here.acting.held != there.acting.held {
+        // Where a point stays on its wall, or a place sticks, in one of them only, they are no neighbours for
+        // that time.
+        if here.acting.held != there.acting.held || !move_alike(&here, &there) {
             continue;
         }
         let apart = distance(&here, &there);
@@ -150,6 +152,11 @@ fn measured(
             for (back, (&a, &b)) in back.rate.iter_mut().zip(here.rate.iter().zip(&there.rate)) {
                 *back = a + (b - a) * share;
             }
+            for (back, there) in back.acting.sliding.iter_mut().zip(&there.acting.sliding) {
+                if let (Mode::Stick(a), Mode::Stick(b)) = (&mut *back, there) {
+                    *a = *a + (*b - *a) * share;
+                }
+            }
             other.resume(back);
             other.settle()?;
             total = if now.is_finite() { now } else { total };
@@ -157,6 +164,15 @@ fn measured(
         }
     }
     Ok(Some(most))
+}
+
+/// True where all places with dry friction do the same in two states.
+fn move_alike<const W: usize>(a: &LongState<W>, b: &LongState<W>) -> bool {
+    let without_place = |mode: &Mode<Digits<W>>| match mode {
+        Mode::Stick(_) => Mode::Stick(0.0),
+        mode => mode.in_doubles(),
+    };
+    a.acting.sliding.iter().map(without_place).eq(b.acting.sliding.iter().map(without_place))
 }
 
 /// How far two states are apart \[rad, m\], rates counted over one second.

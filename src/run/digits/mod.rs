@@ -8,15 +8,21 @@ mod acting;
 mod branches;
 mod confirm;
 mod events;
+mod evidence;
+mod friction;
 mod functions;
 mod growth;
 mod keep;
 mod motion;
 mod pair;
+mod polynomial;
 mod posture;
 mod precision;
 mod resting;
+mod rubbing;
+mod saved;
 mod several;
+mod shock;
 mod shown;
 mod touch;
 mod wall;
@@ -24,23 +30,24 @@ mod wall;
 pub use self::growth::{Forecast, forecast, planned};
 pub use self::pair::{Pair, Progress};
 pub use self::precision::{DIGITS, Precision};
-pub use self::shown::{LongEvent, LongHold, Row};
+pub use self::saved::Saved;
+pub use self::shown::{LongEvent, LongHold, LongTurn, Row};
 
 use self::events::Happened;
-use self::motion::{LongState, Motion};
+use self::friction::Turn;
+use self::motion::Motion;
 use self::resting::Hold;
 use super::magnitude::changes;
-use super::plan::Refusal;
+use super::plan::{Refusal, check_forces_of_joints};
 use crate::arithmetic::digits::{Digits, MOST};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Laws;
-use crate::dynamics::compile::exact::{Acting, ExactMechanism};
+use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::configuration::Configuration;
 use crate::scene::exact::exact_number;
 use crate::scene::{Scene, SceneError, Template};
 use crate::stepping::StepError;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// Numbers with room for all digits a run may have.
@@ -75,34 +82,6 @@ pub enum LongError {
     /// The run stopped.
     #[error("{0}")]
     Step(#[from] StepError),
-}
-
-/// Where a run in many digits is.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Saved {
-    precision: Precision,
-    words: Vec<Vec<u64>>,
-    steps: u64,
-    impacts: u64,
-    radius: Option<f64>,
-    /// Events with the numbers of each, and the sides of zero their formulas are on.
-    happened: Vec<(usize, Vec<Vec<u64>>)>,
-    sides: Vec<i8>,
-    /// Parameters, branches and parts that rest.
-    parameters: Vec<Vec<u64>>,
-    modes: Vec<bool>,
-    off: Vec<String>,
-    shifts: Vec<Vec<u64>>,
-    /// Walls that hold a point, and all holds.
-    held: Vec<usize>,
-    holds: Vec<(usize, Vec<Vec<u64>>)>,
-}
-
-impl Saved {
-    /// Digits and order of the run it is of.
-    pub fn precision(&self) -> Precision {
-        self.precision
-    }
 }
 
 /// A run in many digits, whatever their number.
@@ -140,6 +119,9 @@ pub trait LongRun: Send {
 
     /// The times that points stayed on their walls, up to the last row that was asked for.
     fn holds(&self) -> Vec<LongHold>;
+
+    /// The transitions of places with dry friction, up to the last row that was asked for.
+    fn turns(&self) -> Vec<LongTurn>;
 
     /// The event that has ended the run.
     fn ended_by(&self) -> Option<&str>;
@@ -193,11 +175,6 @@ fn refusal(what: &str, reason: &str, alternative: &str) -> Refusal {
     Refusal { what: what.into(), reason: reason.into(), alternative: alternative.into(), is_usage: true }
 }
 
-/// Numbers that were saved.
-fn numbers_of<const W: usize>(words: &[Vec<u64>]) -> Option<Vec<Digits<W>>> {
-    words.iter().map(|words| Digits::from_words(words)).collect()
-}
-
 /// A run on numbers of `W` limbs.
 struct Runner<const W: usize> {
     motion: Motion<W>,
@@ -212,6 +189,7 @@ struct Runner<const W: usize> {
 
 impl<const W: usize> Runner<W> {
     fn new(source: &Source, precision: Precision) -> Result<Self, LongError> {
+        check_forces_of_joints(&source.mechanism)?;
         let (scene, times) = source.template.exact::<Digits<W>>(&source.typed)?;
         let time = |text: &Option<String>, other: Digits<W>| {
             text.as_ref().map_or(Some(other), |text| exact_number(text))
@@ -288,85 +266,16 @@ impl<const W: usize> LongRun for Runner<W> {
         } else {
             self.motion.keeper.left(mechanism, t, &posture.phi, &posture.omega).map(libm::exp2)
         };
-        Ok(Some(Row { number, t: t.resized(), bodies, energy, drift, residual }))
+        let friction = self.motion.has_friction().then(|| posture.lost.resized());
+        Ok(Some(Row { number, t: t.resized(), bodies, energy, friction, drift, residual }))
     }
 
     fn save(&self) -> Saved {
-        let LongState { t, u, rate, work, jump_energy, steps, impacts, radius, acting, holds } =
-            self.motion.state();
-        let numbers = [t, work, jump_energy].into_iter().chain(u).chain(rate);
-        let words = numbers.map(Digits::to_words).collect();
-        let happened = self.motion.watch.happened.iter().map(|Happened { event, t, phi, omega }| {
-            (*event, std::iter::once(t).chain(phi).chain(omega).map(Digits::to_words).collect())
-        });
-        Saved {
-            precision: self.precision(),
-            words,
-            steps: *steps,
-            impacts: *impacts,
-            radius: *radius,
-            happened: happened.collect(),
-            sides: self.motion.watch.sides.clone(),
-            parameters: acting.parameters.iter().map(Digits::to_words).collect(),
-            modes: acting.modes.clone(),
-            off: acting.off.clone(),
-            shifts: acting.shifts.iter().map(Digits::to_words).collect(),
-            held: acting.held.clone(),
-            holds: holds.iter().map(Hold::to_words).collect(),
-        }
+        saved::save(self)
     }
 
     fn resume(&mut self, saved: &Saved) -> bool {
-        let n = self.motion.mechanism.structure.coordinates();
-        let happened = |(event, words): &(usize, Vec<Vec<u64>>)| {
-            let numbers = numbers_of(words).filter(|numbers| numbers.len() == 1 + 2 * n)?;
-            let (phi, omega) = numbers[1..].split_at(n);
-            let is_known = *event < self.motion.mechanism.events.len();
-            is_known.then(|| Happened {
-                event: *event,
-                t: numbers[0],
-                phi: phi.to_vec(),
-                omega: omega.to_vec(),
-            })
-        };
-        let happened: Option<Vec<Happened<W>>> = saved.happened.iter().map(happened).collect();
-        let (Some(numbers), Some(happened)) = (numbers_of(&saved.words), happened) else { return false };
-        if saved.sides.len() != self.motion.watch.sides.len() {
-            return false;
-        }
-        let (Some(parameters), Some(shifts)) = (numbers_of(&saved.parameters), numbers_of(&saved.shifts))
-        else {
-            return false;
-        };
-        let Some(holds) = saved.holds.iter().map(Hold::from_words).collect::<Option<Vec<_>>>() else {
-            return false;
-        };
-        let (&[t, work, jump_energy], rest) = match numbers.split_first_chunk::<3>() {
-            Some(split) if split.1.len() % 2 == 0 && saved.precision == self.precision() => split,
-            _ => return false,
-        };
-        // While points stay on walls there are more coordinates: whether they fit is known of what acts.
-        let (u, rate) = rest.split_at(rest.len() / 2);
-        let is_known = self.motion.resume(LongState {
-            t,
-            u: u.to_vec(),
-            rate: rate.to_vec(),
-            work,
-            jump_energy,
-            steps: saved.steps,
-            impacts: saved.impacts,
-            radius: saved.radius,
-            acting: Acting {
-                parameters,
-                modes: saved.modes.clone(),
-                off: saved.off.clone(),
-                shifts,
-                held: saved.held.clone(),
-            },
-            holds,
-        });
-        (self.motion.watch.happened, self.motion.watch.sides) = (happened, saved.sides.clone());
-        is_known
+        saved::resume(self, saved)
     }
 
     fn counts(&self) -> [u64; 2] {
@@ -400,6 +309,15 @@ impl<const W: usize> LongRun for Runner<W> {
             until: hold.until.map(Digits::resized),
         };
         self.motion.state().holds.iter().map(hold).collect()
+    }
+
+    fn turns(&self) -> Vec<LongTurn> {
+        let turn = |turn: &Turn<W>| LongTurn {
+            name: self.motion.mechanism.frictions[turn.place].name.clone(),
+            t: turn.t.resized(),
+            does: turn.word(),
+        };
+        self.motion.state().turns.iter().map(turn).collect()
     }
 
     fn ended_by(&self) -> Option<&str> {

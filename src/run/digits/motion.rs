@@ -14,28 +14,29 @@
 use super::branches::Branches;
 use super::confirm::{Probe, confirmed};
 use super::events::Watch;
+use super::friction::{self, Turn};
 use super::functions::Functions;
 use super::keep::Keeper;
 use super::precision::Precision;
 use super::resting::Hold;
+use super::rubbing;
 use super::wall::{self, Ends};
 use crate::arithmetic::digits::{Digits, Scale};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism, ExactStart};
 use crate::dynamics::constraint::ConstraintEquation;
+use crate::dynamics::friction::Transition;
+use crate::dynamics::friction::modes::{HINT, JAMS};
 use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
 
 /// log2 of the factor by which a step may be longer than the one before.
 const SLACK: f64 = 0.25;
-/// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
-const WORK: f64 = 10.0;
 /// Changes of what is held at one moment, beyond four a wall.
 const ROUNDS: usize = 16;
-/// Powers the step is taken from: by symmetry some of them may vanish.
-pub(super) const JUDGES: usize = 5;
-
+/// The determinant of the equations of friction below which ever smaller steps are Painlevé's paradox.
+const JAMMED: f64 = 1e-2;
 /// Where a run is, with all that its next step depends on.
 #[derive(Clone, Debug)]
 pub struct LongState<const W: usize> {
@@ -60,6 +61,12 @@ pub struct LongState<const W: usize> {
     pub acting: Acting<Digits<W>>,
     /// Times that points stayed on their walls.
     pub holds: Vec<Hold<W>>,
+    /// Energy lost in dry friction since t = 0, which the work has as well \[J\].
+    pub lost: Digits<W>,
+    /// Transitions of places with friction.
+    pub turns: Vec<Turn<W>>,
+    /// False until it is known what places with friction do at the start.
+    pub is_decided: bool,
 }
 
 /// A mechanism in motion.
@@ -103,6 +110,7 @@ impl<const W: usize> Motion<W> {
         let mut series = Series::of_terms(&mechanism.terms(), coordinates, precision.order);
         let kept = precision.kept();
         series.keep(kept.clone());
+        series.resolve_reversals(precision.rounding(friction::SURE));
         let keeper = Keeper::new(&mechanism, precision);
         let f = series.coordinates();
         let cut = |x: Digits<W>| x.shortened(precision.limbs);
@@ -130,6 +138,9 @@ impl<const W: usize> Motion<W> {
                 radius: None,
                 acting: mechanism.acting.clone(),
                 holds: Vec::new(),
+                lost: Digits::ZERO,
+                turns: Vec::new(),
+                is_decided: mechanism.frictions.is_empty(),
             },
             mechanism,
         };
@@ -145,8 +156,9 @@ impl<const W: usize> Motion<W> {
 
     /// The state at a time inside the step that is next.
     pub(super) fn state_at(&self, t: Digits<W>) -> LongState<W> {
-        let (u, rate, work) = self.evaluate(t - self.state.t);
-        LongState { t, u, rate, work: self.state.work + work, ..self.state.clone() }
+        let (u, rate, [work, lost]) = self.evaluate(t - self.state.t);
+        let (work, lost) = (self.state.work + work, self.state.lost + lost);
+        LongState { t, u, rate, work, lost, ..self.state.clone() }
     }
 
     /// Another motion of the same mechanism at the same state.
@@ -179,7 +191,7 @@ impl<const W: usize> Motion<W> {
     pub fn resume(&mut self, state: LongState<W>) -> bool {
         let is_known = state.acting == self.mechanism.acting || {
             let fits = |acting: &Acting<Digits<W>>| {
-                (acting.parameters.len(), acting.modes.len(), acting.shifts.len())
+                (acting.parameters.len(), acting.modes.len(), acting.shifts.len(), acting.sliding.len())
             };
             let walls = self.mechanism.walls.len();
             fits(&state.acting) == fits(&self.mechanism.acting)
@@ -220,6 +232,7 @@ impl<const W: usize> Motion<W> {
             match ends {
                 Some(Ends::Met(wall)) => wall::impact(self, wall)?,
                 Some(Ends::Let(wall)) => self.let_go(&[wall])?,
+                Some(Ends::Rubs(rub)) => self.rubs(rub)?,
                 _ => {}
             }
             change.map_or(Ok(()), |event| self.change(event))?;
@@ -248,12 +261,10 @@ impl<const W: usize> Motion<W> {
         if let Some(step) = self.step {
             return Ok(step);
         }
-        for _ in 0..ROUNDS + 4 * self.mechanism.walls.len() {
+        for _ in 0..ROUNDS + 4 * (self.mechanism.walls.len() + self.mechanism.frictions.len()) {
             let step = self.on_its_branches()?;
-            let mut end = match self.branches.change(self, step) {
-                Some(corner) => (corner, None),
-                None => (Digits::of(step), None),
-            };
+            let corner = self.branches.change(self, step);
+            let mut end = (corner.unwrap_or(Digits::of(step)), None);
             match wall::first(self, end.0.value())? {
                 // What acts is another thing then.
                 Some((Ends::Rests(wall), _)) => {
@@ -267,13 +278,30 @@ impl<const W: usize> Motion<W> {
                 Some((ends, length)) => end = (length, Some(ends)),
                 None => {}
             }
-            if let Some(event) = self.watched(|watch, motion| watch.look(motion, [end.0.value(), step])) {
+            if !self.state.is_decided {
+                self.rub(Transition::default())?;
+                continue;
+            }
+            match rubbing::first(self, end.0.value())? {
+                Some((Ends::Rubs(rub), length)) if length <= Digits::ZERO => {
+                    self.rubs(rub)?;
+                    continue;
+                }
+                Some((ends, length)) if length <= end.0 => end = (length, Some(ends)),
+                _ => {}
+            }
+            let ends_at_corner = end.1.is_none() && corner == Some(end.0);
+            let span = [end.0.value(), step];
+            if let Some(event) = self.watched(|watch, motion| watch.look(motion, span, ends_at_corner)) {
                 end = (event, end.1.filter(|_| event >= end.0));
             }
             self.step = Some(end);
             return Ok(end);
         }
-        let what = "points at walls are held and let go without end";
+        let what = match self.has_friction() {
+            true => "points at walls are held and let go, or places stick and slide, without end",
+            false => "points at walls are held and let go without end",
+        };
         Err(self.stop(Cause::RestingContact, 0.0, what, "move one of the walls, or end the run before"))
     }
 
@@ -295,6 +323,9 @@ impl<const W: usize> Motion<W> {
             return Err(self.stop(Cause::NotFinite, 0.0, "the series is not finite", hint));
         }
         if step < 1e-13 * seconds.abs().max(1e-3 * self.mechanism.structure.units.time) {
+            if self.series.regularity().abs() < JAMMED {
+                return Err(self.stop(Cause::Friction, step, JAMS, HINT));
+            }
             let hint = "more digits carry nearer to a singular position";
             return Err(self.stop(
                 Cause::StepTooSmall,
@@ -347,90 +378,26 @@ impl<const W: usize> Motion<W> {
         StepError { cause, method: "taylor".into(), t, step, what: what.into(), hint: hint.into() }
     }
 
-    /// log2 of the largest of power k of the rates.
-    fn size(&self, k: usize) -> f64 {
-        let f = self.state.u.len();
-        let sizes = self.series.rate[k * f..(k + 1) * f].iter().map(Digits::log2);
-        sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
-    }
-
-    /// The step at which the last powers fall below the tolerance \[s\].
-    fn wanted(&self) -> f64 {
-        let (order, first) = (self.precision.order, self.size(0).max(0.0));
-        let mut least = f64::INFINITY;
-        for k in order + 1 - JUDGES..=order {
-            let size = self.size(k);
-            if size.is_nan() {
-                return f64::NAN;
-            }
-            least = least.min((self.precision.tolerance() + first - size) / k as f64);
-        }
-        if self.mechanism.structure.has_work_integral() {
-            // The work of a force is a product, and may converge later than its factors.
-            let energy = libm::log2(self.mechanism.structure.energy_scale);
-            let allowed = self.precision.tolerance() + WORK + energy;
-            let last = self.series.power.iter().enumerate().skip(order - JUDGES);
-            least =
-                last.fold(least, |least, (k, power)| least.min((allowed - power.log2()) / (k + 1) as f64));
-        }
-        libm::exp2(least)
-    }
-
-    /// True where no power was kept to fewer limbs than it weighs in a step of this length.
-    fn is_enough(&self, step: f64) -> bool {
-        let (kept, first) = (&self.kept, self.size(0).max(0.0));
-        let log_step = libm::log2(step);
-        let far = |m: usize| {
-            let weight = self.size(m) - first + m as f64 * log_step;
-            weight - 64.0 * (kept[m] - 1) as f64 > self.precision.tolerance()
-        };
-        !(0..=self.precision.order).any(far)
-    }
-
     /// Moves the state along the series.
     pub(super) fn advance(&mut self, length: Digits<W>) -> Result<(), StepError> {
-        let (u, rate, work) = self.evaluate(length);
+        let (u, rate, [work, lost]) = self.evaluate(length);
         self.state.t += length;
         (self.state.u, self.state.rate) = (u, rate);
         self.state.work += work;
+        self.state.lost += lost;
         self.state.steps += 1;
         self.state.radius = self.radius;
         self.step = None;
         self.settle()
     }
-
-    /// Coordinates, rates and the work done since the state's time at a time after that.
-    pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, Digits<W>) {
-        let f = self.state.u.len();
-        let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
-        let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;
-        let u = self.state.u.iter().enumerate().map(moved).collect();
-        let work = if self.mechanism.structure.has_work_integral() {
-            self.sum(&self.series.power, 1, h, true) * h
-        } else {
-            Digits::ZERO
-        };
-        (u, rates, work)
-    }
-
-    /// Σ a_m h^m, or Σ a_m h^m/(m+1), of every `stride`-th number: with as many limbs as each power is kept
-    /// to, and all of them at the end.
-    fn sum(&self, series: &[Digits<W>], stride: usize, h: Digits<W>, is_integral: bool) -> Digits<W> {
-        let mut sum = Digits::ZERO;
-        let count = series.len().div_ceil(stride);
-        for (m, a) in series.iter().step_by(stride).enumerate().rev() {
-            let limbs = self.kept[m].min(self.precision.limbs);
-            let a = a.shortened(limbs);
-            let a = if is_integral { a.over_whole(m as u64 + 1) } else { a };
-            sum = if m + 1 == count { a } else { sum.shortened(limbs) * h + a };
-        }
-        sum.shortened(self.precision.limbs)
-    }
 }
 
 /// The coordinates that a mechanism is integrated in.
 pub(super) fn coordinates_of<const W: usize>(mechanism: &ExactMechanism<Digits<W>>) -> Coordinates {
-    if mechanism.structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent }
+    let structure = &mechanism.structure;
+    // Friction follows from the multipliers of motors, and what sticks is a row.
+    let rubs = !structure.frictions.is_empty() && (structure.sticking() > 0 || structure.partition.driven());
+    if structure.has_multipliers() || rubs { Coordinates::All } else { Coordinates::Independent }
 }
 
 /// A step with few bits, so that times have few: 2⁻²⁰ of its size is cut off.

@@ -1,6 +1,6 @@
 //! Runs side by side, from row to row: one, or two with other digits and orders that prove each other.
 
-use super::{LongError, LongEvent, LongHold, LongRun, Row, Saved, Source, Wide, long_run};
+use super::{LongError, LongEvent, LongHold, LongRun, LongTurn, Row, Saved, Source, Wide, long_run};
 use crate::arithmetic::Real;
 use crate::stepping::StepError;
 use std::time::{Duration, Instant};
@@ -111,6 +111,25 @@ impl Pair {
             (hold, least)
         };
         best.into_iter().map(with_agreement).collect()
+    }
+
+    /// The transitions of places with friction of the run with the most digits, with the digits to which all
+    /// agree.
+    pub fn turns(&self) -> Vec<(LongTurn, Option<f64>)> {
+        let mut found: Vec<Vec<LongTurn>> = self.runs.iter().map(|run| run.turns()).collect();
+        let best = found.pop().unwrap_or_default();
+        let most = self.most();
+        let with_agreement = |(i, turn): (usize, LongTurn)| {
+            let digits = |other: &Vec<LongTurn>| match other.get(i) {
+                Some(other) if other.name == turn.name && other.does == turn.does => {
+                    agreed(&[other.t], &[turn.t]).min(most)
+                }
+                _ => 0.0,
+            };
+            let least = found.iter().map(digits).reduce(f64::min);
+            (turn, least)
+        };
+        best.into_iter().enumerate().map(with_agreement).collect()
     }
 
     /// Where all digits are the same, there are no more than the runs have.

@@ -15,6 +15,8 @@ pub struct Posture<const W: usize> {
     pub omega: Vec<Digits<W>>,
     /// Work, and energy of impacts, corners and events \[J\].
     pub work: [Digits<W>; 2],
+    /// Energy lost in dry friction \[J\].
+    pub lost: Digits<W>,
 }
 
 impl<const W: usize> Motion<W> {
@@ -50,16 +52,21 @@ impl<const W: usize> Motion<W> {
 
     /// All coordinates at the last step's end.
     pub(super) fn state_posture(&self) -> Posture<W> {
-        let LongState { t, u, rate, work, jump_energy, .. } = &self.state;
+        let LongState { t, u, rate, work, jump_energy, lost, .. } = &self.state;
         let (phi, omega) = self.bodies(*t, u, rate);
-        Posture { phi, omega, work: [*work, *jump_energy] }
+        Posture { phi, omega, work: [*work, *jump_energy], lost: *lost }
     }
 
     /// All coordinates at a time inside the step that is next.
     pub fn at(&self, t: Digits<W>) -> Posture<W> {
-        let (u, rate, work) = self.evaluate(t - self.state.t);
+        let (u, rate, [work, lost]) = self.evaluate(t - self.state.t);
         let (phi, omega) = self.bodies(t, &u, &rate);
-        Posture { phi, omega, work: [self.state.work + work, self.state.jump_energy] }
+        Posture {
+            phi,
+            omega,
+            work: [self.state.work + work, self.state.jump_energy],
+            lost: self.state.lost + lost,
+        }
     }
 
     /// Angles and rates of all bodies.

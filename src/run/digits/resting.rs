@@ -14,6 +14,7 @@
 //! it plastically and booked as that of impacts.  Bounces that are left out last `τ = 2 v/(a (1-e))`; what
 //! they would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
 
+use super::friction::Flown;
 use super::keep::Keeper;
 use super::motion::{LongState, Motion};
 use super::posture::Posture;
@@ -24,6 +25,7 @@ use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
+use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
 use crate::stepping::search::TOUCH;
@@ -78,7 +80,7 @@ pub enum Released<const W: usize> {
     Pulled,
 }
 
-/// The mechanism without holds.
+/// The mechanism without holds and without dry friction.
 pub struct Unheld<const W: usize> {
     pub mechanism: ExactMechanism<Digits<W>>,
     pub keeper: Keeper<W>,
@@ -87,10 +89,12 @@ pub struct Unheld<const W: usize> {
 impl<const W: usize> Unheld<W> {
     /// That of a motion.
     pub fn of(motion: &Motion<W>) -> Result<Self, StepError> {
-        if motion.state().acting.held.is_empty() {
+        let LongState { acting, .. } = motion.state();
+        if acting.held.is_empty() && acting.sliding.iter().all(|mode| *mode == Mode::Open) {
             return Ok(Self { mechanism: motion.mechanism.clone(), keeper: motion.keeper.clone() });
         }
-        let acting = Acting { held: Vec::new(), ..motion.state().acting.clone() };
+        let sliding = vec![Mode::Open; acting.sliding.len()];
+        let acting = Acting { held: Vec::new(), sliding, ..acting.clone() };
         let mechanism = motion.mechanism.with(acting);
         let mechanism = mechanism.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
         let keeper = Keeper::new(&mechanism, motion.precision);
@@ -140,7 +144,7 @@ pub fn is_struck<const W: usize>(motion: &Motion<W>, wall: usize, powers: &[Digi
 
 /// The first row of walls.
 fn standing<const W: usize>(motion: &Motion<W>) -> usize {
-    motion.mechanism.constraints.len() - motion.state().acting.held.len()
+    motion.mechanism.structure.standing_rows()
 }
 
 /// When the force of the wall at this place among those that hold a point passes zero.
@@ -271,6 +275,9 @@ impl<const W: usize> Motion<W> {
         let pressed = touching.walls.iter().zip(&forces).filter(is_pressed);
         let mut set: Vec<usize> = pressed.map(|(&wall, _)| wall).collect();
         let held = &self.state().acting.held;
+        if self.has_friction() {
+            return self.rest_with_friction(wall, &set, &touching.walls);
+        }
         if set == *held {
             // Its force and its acceleration are zero to rounding: what comes after decides.
             match held.contains(&wall) {
@@ -282,11 +289,42 @@ impl<const W: usize> Motion<W> {
         let since: Vec<Digits<W>> = (set.iter())
             .map(|&wall| self.state().t + touching.bounces_last(wall, &set, self.mechanism.walls[wall].1))
             .collect();
-        self.hold(set, &since)
+        self.hold(set, Vec::new(), &since, None)
     }
 
-    /// Goes on with these points held, those of them that are not yet from these times on.
-    fn hold(&mut self, set: Vec<usize>, since: &[Digits<W>]) -> Result<(), StepError> {
+    /// The same where there is friction: `set` would stay without it, `touching` touch.
+    fn rest_with_friction(
+        &mut self,
+        wall: usize,
+        set: &[usize],
+        touching: &[usize],
+    ) -> Result<(), StepError> {
+        let before = self.state.acting.clone();
+        self.rub_at(set, touching, Transition::default())?;
+        let is_same = |(now, before): (&Mode<Digits<W>>, &Mode<Digits<W>>)| now.word() == before.word();
+        let Acting { held, sliding, .. } = &self.state.acting;
+        if *held != before.held || !sliding.iter().zip(&before.sliding).all(is_same) {
+            return Ok(());
+        }
+        // Its force and its acceleration are zero to rounding: what comes after decides.
+        let mut set = held.clone();
+        match held.contains(&wall) {
+            true => set.retain(|&other| other != wall),
+            false => set.push(wall),
+        }
+        set.sort_unstable();
+        self.rub_at(&set, &set, Transition::default())
+    }
+
+    /// Goes on with these points held, those of them that are not yet from these times on, and places with
+    /// friction in these modes.
+    pub(super) fn hold(
+        &mut self,
+        set: Vec<usize>,
+        sliding: Vec<Mode<Digits<W>>>,
+        since: &[Digits<W>],
+        flown: Option<Flown<W>>,
+    ) -> Result<(), StepError> {
         let before = self.energy();
         let t = self.state.t;
         let is_new = |wall: &usize| !self.state.acting.held.contains(wall);
@@ -298,29 +336,63 @@ impl<const W: usize> Motion<W> {
         // What ends before its bounces would have ended has not begun.
         self.state.holds.retain(|hold| !(goes(hold) && t <= hold.since));
         self.state.holds.iter_mut().filter(|hold| goes(hold)).for_each(|hold| hold.until = Some(t));
-        let has_new = !new.is_empty();
+        let had = self.state.acting.sliding.clone();
+        let sticks = |modes: &[Mode<Digits<W>>], place: usize| matches!(modes[place], Mode::Stick(_));
+        let is_new_row = |place: usize| sticks(&sliding, place) && !sticks(&had, place);
+        let begin: Vec<(usize, Digits<W>)> = new.iter().map(|hold| (hold.wall, hold.since)).collect();
+        let has_new = !new.is_empty() || (0..sliding.len()).any(is_new_row);
+        let is_pressed = new.iter().any(|hold| self.slides_at(hold.wall, &sliding));
         let room = KEPT.saturating_sub(self.state.holds.len());
         self.state.holds.extend(new.into_iter().take(room));
-        let acting = Acting { held: set, ..self.state.acting.clone() };
+        let acting = Acting { held: set, sliding, ..self.state.acting.clone() };
         self.exchange(&acting).map_err(|error| self.cannot_go_on(&error, "look at that formula"))?;
         self.state.acting = acting;
         // The next series is another one.
         self.state.radius = None;
+        self.tell_turns(&had, &begin);
         if has_new {
+            let mut flown_work = Digits::ZERO;
+            if let Some(Flown { change, work, lost }) = flown {
+                self.state.rate.iter_mut().zip(change).for_each(|(rate, change)| *rate += change);
+                self.state.lost += lost;
+                flown_work = work;
+            }
+            let pressed = if is_pressed { self.press()? } else { Digits::ZERO };
             let LongState { t, u, rate, .. } = &mut self.state;
             let (work, _) = self.keeper.close(&self.mechanism, *t, u, rate);
             self.settle()?;
+            let work = work + pressed + flown_work;
             self.state.work += work;
             self.state.jump_energy += self.energy() - before - work;
         }
         Ok(())
     }
 
+    /// True where a point slides along a wall with friction in these modes.
+    fn slides_at(&self, wall: usize, modes: &[Mode<Digits<W>>]) -> bool {
+        let slides = |(friction, mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| {
+            friction.normal == Normal::Contact(wall) && matches!(mode, Mode::Slip(_) | Mode::Strained(_))
+        };
+        self.mechanism.frictions.iter().zip(modes).any(slides)
+    }
+
+    /// Decides anew what places with friction do, where something else has changed.
+    pub(super) fn rub_again(&mut self) -> Result<(), StepError> {
+        if !self.has_friction() || !self.state.is_decided {
+            return Ok(());
+        }
+        self.rub(Transition::default())
+    }
+
     /// Lets the points of these walls go.
     pub(super) fn let_go(&mut self, walls: &[usize]) -> Result<(), StepError> {
         let held = self.state.acting.held.iter().copied();
         let set: Vec<usize> = held.filter(|wall| !walls.contains(wall)).collect();
-        if set == self.state.acting.held { Ok(()) } else { self.hold(set, &[]) }
+        match set == self.state.acting.held {
+            true => Ok(()),
+            false if self.has_friction() => self.rub_at(&set, &set, Transition::default()),
+            false => self.hold(set, Vec::new(), &[], None),
+        }
     }
 
     /// Lets those points go that leave their walls.

@@ -12,6 +12,7 @@
 
 use super::motion::Motion;
 use super::resting::Unheld;
+use super::shock;
 use super::wall::{Jump, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -75,6 +76,9 @@ impl<const W: usize> Meeting<W> {
         if self.walls.len() > MOST {
             let what = format!("more than {MOST} walls are met at one moment: {names}");
             return Err(motion.stop(Cause::Unsuited, 0.0, &what, "leave out walls that others imply"));
+        }
+        if self.walls.iter().any(|&wall| motion.mechanism.structure.friction_at(wall).is_some()) {
+            return Err(shock::beside_friction(motion, &names));
         }
         let (t, posture) = (motion.state().t, motion.state_posture());
         // Points that stay on walls take part as all others that touch.

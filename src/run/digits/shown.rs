@@ -15,6 +15,8 @@ pub struct Row {
     pub bodies: Vec<[Wide; 6]>,
     /// Kinetic and potential energy, and the work of motors, dampers and applied forces \[J\].
     pub energy: [Wide; 3],
+    /// Energy lost in dry friction since the start, where there is any \[J\].
+    pub friction: Option<Wide>,
     /// Energy less work and what impacts took, less that at the start, over the energy scale.
     pub drift: f64,
     /// Largest residual of the constraints \[rad or m\] and of its rate.
@@ -50,4 +52,15 @@ pub struct LongHold {
     pub t: Wide,
     /// End \[s\]; `None`: held to the end of the run.
     pub until: Option<Wide>,
+}
+
+/// A transition of a place with dry friction, in many digits.
+#[derive(Clone, Debug)]
+pub struct LongTurn {
+    /// Name of the hinge, slider or wall.
+    pub name: String,
+    /// Time \[s\].
+    pub t: Wide,
+    /// What it does from then on: `sticks`, `slides` or `apart`.
+    pub does: &'static str,
 }

@@ -11,7 +11,9 @@
 
 use super::motion::Motion;
 use super::resting::{self, Released};
+use super::rubbing::Rub;
 use super::several::Meeting;
+use super::shock;
 use super::touch::Passage;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
@@ -38,6 +40,8 @@ pub enum Ends {
     Let(usize),
     /// It cannot begin: a point that touches this wall, or stays on it, is pressed or pulled otherwise now.
     Rests(usize),
+    /// A place with friction begins to do something else.
+    Rubs(Rub),
 }
 
 /// What ends a step of so many seconds, and the exact time up to it.
@@ -206,6 +210,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     }
     let jump = match several {
         Some(meeting) => meeting.jump(motion)?,
+        None if motion.has_friction() => shock::alone(motion, wall, &gap)?,
         None => loop {
             let (jump, pulls) = alone(motion, wall, &gap);
             // A point that its wall would have to pull is let go.
@@ -217,6 +222,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     };
     jumped(motion, &jump);
     motion.let_leaving_go()?;
+    motion.rub_again()?;
     // What motors drive there no impulse turns back.
     let after = gap_rate(motion, wall).rate;
     let is_left = after < Digits::ZERO && (after / approach).log2() > motion.precision.rounding(SURE);

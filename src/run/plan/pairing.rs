@@ -205,6 +205,16 @@ pub(super) fn check_vibration(
     Ok(())
 }
 
+/// Dry friction asks for the forces of joints.
+pub(in crate::run) fn check_forces_of_joints(mechanism: &Mechanism) -> Result<(), Refusal> {
+    let Some(friction) = mechanism.frictions.first().filter(|_| !mechanism.redundant().is_empty()) else {
+        return Ok(());
+    };
+    let what = format!("dry friction ({} {}) here", friction.kind(), friction.name);
+    let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are not determined";
+    Err(mismatch(what, reason, "leave out a constraint that others imply already"))
+}
+
 /// Dry friction takes methods that end their steps at its transitions and keep by projection what sticks.
 fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
     let Some(friction) = mechanism.frictions.first() else { return Ok(()) };
@@ -226,11 +236,7 @@ fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) ->
         let reason = "friction follows from the multipliers, which this one changes or leaves out";
         return Err(mismatch(format!("{} with it", place()), reason, "--stabilize projection"));
     }
-    if !mechanism.redundant().is_empty() {
-        let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are not determined";
-        let alternative = "leave out a constraint that others imply already";
-        return Err(mismatch(format!("{} here", place()), reason, alternative));
-    }
+    check_forces_of_joints(mechanism)?;
     if !mechanism.tree.is_dense() {
         let reason = format!("it takes matrices, and at most {DENSE_LIMIT} coordinates have them");
         return Err(mismatch(format!("{} here", place()), &reason, "fewer bodies"));

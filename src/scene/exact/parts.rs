@@ -4,8 +4,8 @@ use super::{Cursor, Decimal, Reader};
 use crate::scene::error::SceneError;
 use crate::scene::locate::Value;
 use crate::scene::{
-    Bar, Drive, Force, Given, Hinge, Law, Lock, Motor, Parameter, Place, Rail, Scene, Sine, Slider, Spring,
-    Start, Torque, TorsionSpring, Wall, Weld,
+    Bar, Drive, Force, Friction, FrictionPlace, Given, Hinge, Law, Lock, Motor, Parameter, Place, Rail,
+    Scene, Sine, Slider, Spring, Start, Torque, TorsionSpring, Wall, Weld,
 };
 
 impl<'a, C: Decimal> Reader<'a, C> {
@@ -196,6 +196,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             drives: plain.drives.iter().map(drive).collect::<Result<_, SceneError>>()?,
             couplings: self.couplings(plain)?,
             walls: self.each("walls", &plain.walls, wall)?,
+            frictions: self.frictions(plain)?,
             start: bars.clone().map(|bar| self.start(plain, bar)).collect::<Result<_, _>>()?,
             given: bars.map(|bar| self.given(plain, bar)).collect::<Result<_, _>>()?,
             parameters: (self.parameters.iter())
@@ -224,6 +225,34 @@ impl<'a, C: Decimal> Reader<'a, C> {
             damping: self.number(at, "damping", spring.damping)?,
             rigid: spring.rigid,
         })
+    }
+
+    fn frictions(&self, plain: &Scene) -> Result<Vec<Friction<C>>, SceneError> {
+        plain.frictions.iter().map(|friction| self.friction(friction)).collect()
+    }
+
+    fn friction(&self, plain: &Friction) -> Result<Friction<C>, SceneError> {
+        let (list, number) = match plain.at {
+            FrictionPlace::Hinge { hinge, .. } => ("hinges", hinge),
+            FrictionPlace::Slider(slider) => ("sliders", slider),
+            FrictionPlace::Wall { wall, .. } => ("walls", wall),
+        };
+        let at = self.root.items(list).get(number).and_then(|at| at.child("friction"));
+        let at =
+            at.ok_or_else(|| self.refuse(&self.root, "has no friction", "compare with the scene's text"))?;
+        let kinetic = self.number(&at, "kinetic", plain.kinetic)?;
+        let stiction = match at.child("static") {
+            Some(_) => self.number(&at, "static", plain.stiction)?,
+            None => kinetic,
+        };
+        let place = match plain.at {
+            FrictionPlace::Hinge { hinge, radius } => {
+                FrictionPlace::Hinge { hinge, radius: self.number(&at, "radius", radius)? }
+            }
+            FrictionPlace::Slider(slider) => FrictionPlace::Slider(slider),
+            FrictionPlace::Wall { wall, is_newton } => FrictionPlace::Wall { wall, is_newton },
+        };
+        Ok(Friction { at: place, kinetic, stiction })
     }
 
     fn force(&self, at: &Cursor, force: &Force) -> Result<Force<C>, SceneError> {

@@ -55,7 +55,9 @@ impl<C: Real> TermSet<C> {
     /// With the structure of a mechanism.
     pub fn terms<'a>(&'a self, structure: &'a Mechanism) -> Terms<'a, C> {
         let Self { tree, partition, springs, torsions, actions, forces, constraints } = self;
-        Terms { structure, tree, partition, springs, torsions, actions, forces, constraints }
+        // Lanes take no dry friction.
+        let friction = None;
+        Terms { structure, tree, partition, springs, torsions, actions, forces, constraints, friction }
     }
 }
 

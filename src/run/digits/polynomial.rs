@@ -1,0 +1,84 @@
+//! The series of a step as polynomials: how far they reach, and their values inside the step.
+
+use super::motion::Motion;
+use crate::arithmetic::Scalar;
+use crate::arithmetic::digits::Digits;
+
+/// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
+const WORK: f64 = 10.0;
+/// Powers the step is taken from: by symmetry some of them may vanish.
+pub(super) const JUDGES: usize = 5;
+
+impl<const W: usize> Motion<W> {
+    /// log2 of the largest of power k of the rates.
+    fn size(&self, k: usize) -> f64 {
+        let f = self.state.u.len();
+        let sizes = self.series.rate[k * f..(k + 1) * f].iter().map(Digits::log2);
+        sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
+    }
+
+    /// The step at which the last powers fall below the tolerance \[s\].
+    pub(super) fn wanted(&self) -> f64 {
+        let (order, first) = (self.precision.order, self.size(0).max(0.0));
+        let mut least = f64::INFINITY;
+        for k in order + 1 - JUDGES..=order {
+            let size = self.size(k);
+            if size.is_nan() {
+                return f64::NAN;
+            }
+            least = least.min((self.precision.tolerance() + first - size) / k as f64);
+        }
+        if self.mechanism.structure.has_work_integral() {
+            // The work of a force is a product, and may converge later than its factors.
+            let energy = libm::log2(self.mechanism.structure.energy_scale);
+            let allowed = self.precision.tolerance() + WORK + energy;
+            let last = self.series.power.iter().enumerate().skip(order - JUDGES);
+            least =
+                last.fold(least, |least, (k, power)| least.min((allowed - power.log2()) / (k + 1) as f64));
+        }
+        libm::exp2(least)
+    }
+
+    /// True where no power was kept to fewer limbs than it weighs in a step of this length.
+    pub(super) fn is_enough(&self, step: f64) -> bool {
+        let (kept, first) = (&self.kept, self.size(0).max(0.0));
+        let log_step = libm::log2(step);
+        let far = |m: usize| {
+            let weight = self.size(m) - first + m as f64 * log_step;
+            weight - 64.0 * (kept[m] - 1) as f64 > self.precision.tolerance()
+        };
+        !(0..=self.precision.order).any(far)
+    }
+
+    /// Coordinates, rates, and the work done and the energy lost in friction since the state's time at a time after that.
+    pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, [Digits<W>; 2]) {
+        let f = self.state.u.len();
+        let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
+        let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;
+        let u = self.state.u.iter().enumerate().map(moved).collect();
+        let work = if self.mechanism.structure.has_work_integral() {
+            self.sum(&self.series.power, 1, h, true) * h
+        } else {
+            Digits::ZERO
+        };
+        let lost = match self.series.lost() {
+            [] => Digits::ZERO,
+            lost => self.sum(lost, 1, h, true) * h,
+        };
+        (u, rates, [work, lost])
+    }
+
+    /// Σ a_m h^m, or Σ a_m h^m/(m+1), of every `stride`-th number: with as many limbs as each power is kept
+    /// to, and all of them at the end.
+    fn sum(&self, series: &[Digits<W>], stride: usize, h: Digits<W>, is_integral: bool) -> Digits<W> {
+        let mut sum = Digits::ZERO;
+        let count = series.len().div_ceil(stride);
+        for (m, a) in series.iter().step_by(stride).enumerate().rev() {
+            let limbs = self.kept[m].min(self.precision.limbs);
+            let a = a.shortened(limbs);
+            let a = if is_integral { a.over_whole(m as u64 + 1) } else { a };
+            sum = if m + 1 == count { a } else { sum.shortened(limbs) * h + a };
+        }
+        sum.shortened(self.precision.limbs)
+    }
+}

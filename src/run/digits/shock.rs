@@ -1,0 +1,95 @@
+//! The impact of one point on a wall where there is dry friction, in many digits: Routh's method as in
+//! doubles (`dynamics::friction::impact`), in all digits.
+//!
+//! Friction in hinges and sliders takes no part in impacts: what sticks there may slide after one.
+
+use super::evidence::gradient;
+use super::friction::SURE;
+use super::keep::Keeper;
+use super::motion::Motion;
+use super::resting;
+use super::wall::{GapRate, Jump};
+use crate::arithmetic::digits::Digits;
+use crate::arithmetic::{Real, Scalar};
+use crate::dynamics::compile::exact::Acting;
+use crate::dynamics::friction::impact::Shock;
+use crate::dynamics::friction::{Friction, Mode, Normal};
+use crate::dynamics::kernel::dot;
+use crate::stepping::{Cause, StepError};
+
+/// An error where an impact presses several walls at once, one of them with friction.
+pub fn beside_friction<const W: usize>(motion: &Motion<W>, names: &str) -> StepError {
+    let what = format!("walls {names} are pressed by one impact, and dry friction acts there");
+    let hint = "impulses of friction at several walls are not found in many digits: run it without --digits, or leave the friction out";
+    motion.stop(Cause::Unsuited, 0.0, &what, hint)
+}
+
+/// What the impulses at one wall do.
+pub(super) fn alone<const W: usize>(
+    motion: &mut Motion<W>,
+    wall: usize,
+    gap: &GapRate<W>,
+) -> Result<Jump<W>, StepError> {
+    loop {
+        let (jump, pulls) = jump(motion, wall, gap)?;
+        // A point that its wall would have to pull is let go.
+        if let Some(held) = resting::pulled(motion, &pulls, 0.0) {
+            motion.let_go(&[held])?;
+            continue;
+        }
+        let (held, standing) = (&motion.state().acting.held, motion.mechanism.structure.standing_rows());
+        let rounding = motion.precision.rounding(SURE);
+        let is_pressed = |(other, pull): (&usize, &Digits<W>)| {
+            *pull < Digits::ZERO
+                && pull.log2() > rounding
+                && motion.mechanism.structure.friction_at(*other).is_some()
+        };
+        if held.iter().zip(&pulls[standing..]).any(is_pressed) {
+            let name = |&wall: &usize| motion.mechanism.structure.contacts[wall].row.name();
+            let names = std::iter::once(&wall).chain(held).map(name).collect::<Vec<_>>().join(", ");
+            return Err(beside_friction(motion, &names));
+        }
+        return Ok(jump);
+    }
+}
+
+/// The jump, and the impulses of the constraints over that of the wall.
+fn jump<const W: usize>(
+    motion: &Motion<W>,
+    wall: usize,
+    GapRate { gradient: normal, travel, rate }: &GapRate<W>,
+) -> Result<(Jump<W>, Vec<Digits<W>>), StepError> {
+    let (t, posture) = (motion.state().t, motion.state_posture());
+    let sliding = vec![Mode::Open; motion.mechanism.frictions.len()];
+    let striking = motion.mechanism.with(Acting { sliding, ..motion.state().acting.clone() });
+    let striking = striking.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
+    let mut keeper = Keeper::new(&striking, motion.precision);
+    let at = [&posture.phi[..], &posture.omega[..]];
+    let (response, pulls) = keeper.response(&striking, t, at, normal);
+    let restitution = motion.mechanism.walls[wall].1;
+    let is_here = |friction: &&Friction<Digits<W>>| friction.normal == Normal::Contact(wall);
+    let Some(friction) = motion.mechanism.frictions.iter().find(is_here) else {
+        let impulse = -(Digits::ONE + restitution) * *rate / dot(normal, &response);
+        let change = response.iter().map(|&a| a * impulse).collect();
+        return Ok((Jump { change, work: impulse * *travel, walls: 1 }, pulls));
+    };
+    let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
+    let (across, pulls_across) = keeper.response(&striking, t, at, &along);
+    let slides = dot(&along, &posture.omega);
+    let still = ((*rate).abs() + slides.abs()).ldexp(motion.precision.rounding(SURE) as i32);
+    let shock = Shock {
+        response: [dot(normal, &response), dot(normal, &across), dot(&along, &across)],
+        velocity: [*rate, slides],
+        restitution,
+        coefficients: [friction.kinetic, friction.stiction],
+        is_newton: friction.is_newton,
+    };
+    let Some([impulse, tangential]) = shock.impulses_beyond(still) else {
+        let what = format!("no impulses fit the law of impact and friction at wall {}", friction.name);
+        return Err(motion.stop(Cause::Unsuited, 0.0, &what, "lower the coefficient of friction"));
+    };
+    let change = response.iter().zip(&across).map(|(&a, &b)| a * impulse + b * tangential).collect();
+    let ratio = tangential / impulse;
+    let pulls = pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
+    Ok((Jump { change, work: impulse * *travel, walls: 1 }, pulls))
+}
