@@ -396,6 +396,24 @@ fn an_integral_is_a_further_unknown_in_every_method() {
     assert_eq!(again, scene(&text));
 }
 
+/// How large an integral is makes no step of a mechanism with a wall shorter: no wall sees it.
+#[test]
+fn steps_beside_a_wall_do_not_depend_on_the_size_of_an_integral() {
+    let steps = |size: &str| {
+        let text = format!(
+            r#"{{"name": "bar", "gravity": [0, -9.81], "parameters": {{"size": {size}}}, "integrals": {{"I": "size*cos(b.phi)"}},
+            "bars": [{{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "walls": [{{"name": "W", "body": "b", "point": [1, 0], "restitution": 0.5, "line": {{"through": [0, -2], "normal": [0, 1]}}}}],
+            "start": {{"b": {{"phi": 0.5, "omega": 0}}}}, "until": 2, "every": 2}}"#
+        );
+        run(&scene(&text), &adaptive(MethodId::Taylor, 1e-10)).statistics.steps
+    };
+    let [small, large] = ["0.01", "1e5"].map(steps);
+    println!("{small} and {large} steps");
+    assert!(large < 3 * small, "{small} and {large} steps");
+}
+
 #[test]
 fn a_motors_law_may_be_a_formula_of_time() {
     let motor = |law: &str| {

@@ -256,3 +256,63 @@ fn a_corner_at_the_start_makes_no_event_of_what_is_zero_there() {
         }
     }
 }
+
+/// A point comes to its wall at every impact, whatever rounding makes of its height there.
+#[test]
+fn what_is_zero_at_an_impact_happens_with_it() {
+    let fall = 0.2_f64.sqrt();
+    let more = r#", "events": [{"name": "down", "when": "p.y"}, {"name": "falls", "when": "p.y", "direction": "falling"}]"#;
+    for (e, flights) in [(0.0, &[][..]), (0.6, &[1.2, 0.72][..]), (1.0, &[2.0][..])] {
+        let mut expected = vec![fall];
+        for flight in flights {
+            expected.push(expected[expected.len() - 1] + flight * fall);
+        }
+        // One that turns meets its wall by a point beside its centre.
+        for (omega, point) in [(0.0, 0.0), (0.0, 0.3)] {
+            let text = format!(
+                r#"{{"name": "ball", "gravity": [0, -10],
+                "bars": [{{"name": "ball", "mass": 2, "centre": [{point}, 0], "inertia": 1}}],
+                "points": [{{"name": "p", "body": "ball", "point": [{point}, 0]}}],
+                "walls": [{{"name": "floor", "body": "ball", "point": [{point}, 0], "restitution": {e},
+                           "line": {{"through": [0, 0], "normal": [0, 1]}}}}]{more}, "until": 1.4, "every": 1.4,
+                "start": {{"ball": {{"phi": 0.7, "omega": {omega}, "origin": [0.1, {}], "velocity": [0, 0]}}}}}}"#,
+                1.0 - point * 0.7_f64.sin()
+            );
+            for request in methods() {
+                let outcome = run(&scene(&text), &request);
+                for name in ["down", "falls"] {
+                    let found = times(&outcome, name);
+                    assert_eq!(found.len(), expected.len(), "{:?}, {e}: {name} at {found:?}", request.method);
+                    found
+                        .iter()
+                        .zip(&expected)
+                        .for_each(|(t, expected)| assert_near(*t, *expected, 1e-9, name));
+                }
+            }
+        }
+    }
+}
+
+/// The rate of what sticks passes zero as it comes to rest, and not again as it breaks away in the same direction
+/// as it would have gone on.
+#[test]
+fn what_breaks_away_makes_events_of_its_direction_alone() {
+    for size in [0.3, 0.5, 0.7] {
+        let text = format!(
+            r#"{{"name": "sticks", "gravity": [0, -9.81], "until": 1.75, "every": 0.25,
+            "bars": [{{"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.05, "length": 0.6}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}],
+                        "friction": {{"radius": 0.1, "kinetic": 0.5, "static": 0.5}}}}],
+            "torques": [{{"name": "T", "body": "b", "torque": "{size}*sin(3*t)"}}],
+            "events": [{{"name": "falls", "when": "b.omega", "direction": "falling"}},
+                       {{"name": "either", "when": "b.omega"}}],
+            "start": {{"b": {{"phi": -1.5, "omega": -2}}}}}}"#
+        );
+        for request in methods() {
+            let outcome = run(&scene(&text), &request);
+            // It rises to zero, falls to it where it comes to rest, and goes on below.
+            let found = ["falls", "either"].map(|name| times(&outcome, name).len());
+            assert_eq!(found, [1, 2], "{size}, {:?}: {:?}", request.method, outcome.events);
+        }
+    }
+}

@@ -300,3 +300,41 @@ fn what_is_not_carried_is_refused_by_name() {
     let error = long_run(&source, Precision::new(30, false)).err().expect("refused").to_string();
     assert!(error.contains("rigid") && error.contains("many digits"), "{error}");
 }
+
+/// Without weight a linkage moves alike whatever its size: of metres, and of micrometres.
+#[test]
+fn linkages_of_any_size_are_put_together() {
+    let at_size = |power: i32| {
+        let bar = |name: &str, length: f64| {
+            let (half, inertia) = (length / 2.0, length * length / 12.0);
+            format!(
+                r#"{{"name": "{name}", "mass": 1, "centre": [{half}e{power}, 0], "inertia": {inertia}e{}, "length": {length}e{power}}}"#,
+                2 * power
+            )
+        };
+        let hinge = |name: &str, [a, b]: [(&str, f64); 2]| {
+            let place =
+                |(body, x): (&str, f64)| format!(r#"{{"body": "{body}", "point": [{x}e{power}, 0]}}"#);
+            format!(r#"{{"name": "{name}", "between": [{}, {}]}}"#, place(a), place(b))
+        };
+        let text = format!(
+            r#"{{"name": "linkage", "gravity": [0, 0], "bars": [{}, {}, {}], "hinges": [{}, {}, {}, {}],
+            "start": {{"p": {{"phi": 1, "omega": 5}}, "q": {{"phi": 0.65}}, "r": {{"phi": 1.58}}}}, "until": 1, "every": 1}}"#,
+            bar("p", 0.2),
+            bar("q", 0.55),
+            bar("r", 0.5),
+            hinge("A", [("ground", 0.0), ("p", 0.0)]),
+            hinge("B", [("p", 0.2), ("q", 0.0)]),
+            hinge("C", [("ground", 0.55), ("r", 0.0)]),
+            hinge("D", [("q", 0.55), ("r", 0.5)])
+        );
+        last(&source(&text, &[], "0.1", "0.1"), 40)
+    };
+    let [large, small] = [0, -6].map(at_size);
+    for (large, small) in large.bodies.iter().zip(&small.bodies) {
+        for what in [0, 1] {
+            // What is rounded in the scene is spread over all angles in doubles.
+            near(&number(large[what]), &number(small[what]), 13);
+        }
+    }
+}

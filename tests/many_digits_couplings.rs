@@ -126,3 +126,11 @@ fn a_follower_with_a_corner_is_that_of_runs_in_doubles() {
     assert!(stop.what.contains("jumps") && (stop.t - 0.477234).abs() < 1e-5, "{stop:?}");
     assert!(many.drift.abs() < 1e-26 && many.residual[0] < 1e-28, "{:e}, {:?}", many.drift, many.residual);
 }
+
+/// A motor whose law is a signal of time alone.
+#[test]
+fn a_motor_may_follow_a_signal_of_time() {
+    let parts = r#""signals": {"turn": "0.3 + 2*t"}, "motors": [{"name": "m", "body": "a", "law": "turn"}]"#;
+    let row = last(&source(&discs(parts, r#""b": {"phi": 0.1, "omega": 1}"#), &[], "2", "2"), DIGITS);
+    holds(&row, 0, &[(0, fixed("4.3"))]);
+}

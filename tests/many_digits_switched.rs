@@ -181,3 +181,28 @@ fn shipped_scenes_are_those_of_runs_in_doubles() {
         }
     }
 }
+
+/// Events of the moment at which a lock closes happen, though it keeps their functions at zero from then on: a disc
+/// of 3 rad/s is caught at 1.5 rad, and the other one is pushed from there.
+#[test]
+fn events_of_the_moment_at_which_a_lock_closes_happen() {
+    let parts = |second: &str| {
+        discs(&format!(
+            r#""locks": [{{"name": "catch", "body": "a", "angle": 1.5}}], "inactive": ["catch"], "parameters": {{"k": 0}},
+            "torques": [{{"name": "push", "body": "b", "torque": "k"}}],
+            "events": [{{"name": "caught", "when": "a.phi - 1.5", "on": ["catch"]}},
+                       {{"name": "second", "when": "a.phi - 1.5"{second}}}]"#
+        ))
+    };
+    for (second, end) in [("", "0.2"), (r#", "set": {"k": 1}"#, "1.2")] {
+        let source = source(&parts(second), &[], "2.5", "2.5");
+        holds(&last(&source, DIGITS), 1, &[(0, fixed(end))]);
+    }
+    let source = source(&parts(r#", "action": "stop""#), &[], "2.5", "0.1");
+    let mut run = long_run(&source, Precision::new(DIGITS, false)).expect("a run");
+    while run.ended_by().is_none() && run.last_row() > 5 {
+        run.row(run.last_row().min(6), &mut || false).expect("no stop");
+    }
+    let names: Vec<_> = run.events().iter().map(|event| event.name.clone()).collect();
+    assert_eq!((run.ended_by(), names), (Some("second"), vec!["caught".to_owned(), "second".into()]));
+}

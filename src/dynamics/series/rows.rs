@@ -335,7 +335,10 @@ impl<T: SeriesNumber> RowSeries<T> {
             } else if let Kind::Place { aim: Some(aim), .. } = kind
                 && let Some(drive) = aim.drive()
             {
-                power -= with_rates(&self.multiplier[i..], r, &drive[..=m]);
+                power -= match *drive {
+                    [constant] => self.multiplier[i + m * r] * constant,
+                    _ => with_rates(&self.multiplier[i..], r, &drive[..=m]),
+                };
             }
         }
         power

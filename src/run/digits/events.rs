@@ -44,6 +44,10 @@ pub struct Watch<const W: usize> {
     ends: Vec<i8>,
     /// The sides they were on at the end of the last one: -1, 1, or 0 where that is not known.
     pub sides: Vec<i8>,
+    /// Events of the moment at which another one has changed what acts, and whether their functions rise: they
+    /// happen where the next step begins; and those of the end of the step that is next.
+    pub due: Vec<(usize, bool)>,
+    put_off: Vec<(usize, bool)>,
     /// What happened before.
     pub happened: Vec<Happened<W>>,
 }
@@ -72,7 +76,7 @@ impl<const W: usize> Watch<W> {
         let functions_of = before.functions.iter().zip(&now.functions);
         let is_same = functions_of.map(|(before, now)| keeps || before == now);
         let sides = self.sides.iter().zip(is_same).map(|(&side, is_same)| if is_same { side } else { 0 });
-        Self { functions, sides: sides.collect(), happened: self.happened, ..Self::default() }
+        Self { functions, sides: sides.collect(), due: self.due, happened: self.happened, ..Self::default() }
     }
 
     /// Looks for what happens in a step of so many seconds, of those for which the series is made; where an event
@@ -85,17 +89,23 @@ impl<const W: usize> Watch<W> {
         ends_at_corner: bool,
     ) -> Option<Digits<W>> {
         (self.ahead, self.ends) = self.passing(motion, [step, made], ends_at_corner);
+        let due = self.due.iter().map(|&(event, rises)| Ahead { event, after: Digits::ZERO, rises });
+        self.ahead.splice(0..0, due);
+        self.put_off.clear();
         let is_last = |ahead: &Ahead<W>| {
             let event = &motion.mechanism.events[ahead.event];
             event.stop || event.changes
         };
         let end = self.ahead.iter().position(is_last)?;
-        self.ahead.truncate(end + 1);
+        let later = self.ahead.split_off(end + 1);
         let last = self.ahead[end];
         if !motion.mechanism.events[last.event].changes {
             return None;
         }
-        // What happens at this moment as well is left to the next step: it begins on the side before.
+        // What happens at this moment as well is left to the next step.
+        let is_now = |ahead: &&Ahead<W>| (ahead.after - last.after).value() <= SAME * made;
+        self.put_off = later.iter().filter(is_now).map(|ahead| (ahead.event, ahead.rises)).collect();
+        self.put_off.retain(|(event, _)| *event != last.event);
         let (passing, ends) = self.passing(motion, [last.after.value(), made], false);
         self.ends = ends;
         for (event, side) in self.ends.iter_mut().enumerate() {
@@ -107,6 +117,9 @@ impl<const W: usize> Watch<W> {
             if seen != kept {
                 *side = if rises == (seen < kept) { 1 } else { -1 };
             }
+        }
+        for &(event, rises) in &self.put_off {
+            self.ends[event] = if rises { 1 } else { -1 };
         }
         Some(last.after)
     }
@@ -133,7 +146,8 @@ impl<const W: usize> Watch<W> {
                 |rises: bool| *direction == Direction::Either || rises == (*direction == Direction::Rising);
             let began = (self.happened.iter().rev())
                 .take_while(|last| (motion.state().t - last.t).value() <= SAME * made)
-                .any(|last| last.event == event);
+                .any(|last| last.event == event)
+                || self.due.iter().any(|due| due.0 == event);
             let least = magnitude * libm::exp2(motion.precision.rounding(SURE));
             let span = (step / made, ends_at_corner);
             let (passages, end) = passages(&shares, span, least, (self.sides[event], began));
@@ -183,6 +197,7 @@ impl<const W: usize> Watch<W> {
         let passed: Vec<_> = self.happening(motion).collect();
         self.happened.extend(passed);
         self.sides.clone_from(&self.ends);
+        self.due = std::mem::take(&mut self.put_off);
         self.ahead.clear();
     }
 }

@@ -102,7 +102,8 @@ impl<const W: usize> Keeper<W> {
         for column in order {
             let size = |r: usize| matrix[r * n + column].log2();
             let Some(&row) = free.iter().max_by(|&&a, &&b| size(a).total_cmp(&size(b))) else { break };
-            let least = libm::log2(LEAST_PIVOT * self.scale[row].sqrt().min(1.0));
+            let entries = &self.jacobian[row * n..(row + 1) * n];
+            let least = libm::log2(LEAST_PIVOT) + entries.iter().map(Digits::log2).fold(f64::MIN, f64::max);
             if size(row) < least || size(row) == f64::NEG_INFINITY {
                 continue;
             }

@@ -20,6 +20,7 @@ pub struct Saved {
     /// Events with the numbers of each, and the sides of zero their formulas are on.
     happened: Vec<(usize, Vec<Vec<u64>>)>,
     sides: Vec<i8>,
+    due: Vec<(usize, bool)>,
     /// Parameters, branches and parts that rest.
     parameters: Vec<Vec<u64>>,
     modes: Vec<bool>,
@@ -63,6 +64,7 @@ pub(super) fn save<const W: usize>(run: &Runner<W>) -> Saved {
         radius: *radius,
         happened: happened.collect(),
         sides: run.motion.watch.sides.clone(),
+        due: run.motion.watch.due.clone(),
         parameters: acting.parameters.iter().map(Digits::to_words).collect(),
         modes: acting.modes.clone(),
         off: acting.off.clone(),
@@ -79,7 +81,8 @@ pub(super) fn save<const W: usize>(run: &Runner<W>) -> Saved {
 pub(super) fn resume<const W: usize>(run: &mut Runner<W>, saved: &Saved) -> bool {
     let Some((state, happened)) = state_of(run, saved) else { return false };
     let is_known = run.motion.resume(state);
-    (run.motion.watch.happened, run.motion.watch.sides) = (happened, saved.sides.clone());
+    let watch = &mut run.motion.watch;
+    (watch.happened, watch.sides, watch.due) = (happened, saved.sides.clone(), saved.due.clone());
     is_known
 }
 
@@ -97,6 +100,7 @@ fn state_of<const W: usize>(run: &Runner<W>, saved: &Saved) -> Option<(LongState
     if rest.len() % 2 != 0
         || saved.precision != run.precision()
         || saved.sides.len() != run.motion.watch.sides.len()
+        || saved.due.iter().any(|due| due.0 >= saved.sides.len())
     {
         return None;
     }

@@ -1,5 +1,7 @@
 //! The events of a run: which functions there are, what they belong to, and what is done at their zeros.
 
+mod shortened;
+
 use super::search::{NO_VALUE, Passage};
 use super::{Action, Change, Direction, Event, EventRecord};
 use crate::dynamics::compile::Laws;
@@ -41,6 +43,9 @@ pub(in crate::run) struct EventMemory {
     pub(super) resting: Vec<usize>,
     /// Those that rested until the last step.
     pub(super) woken: Vec<usize>,
+    /// Those whose functions were at zero throughout the last part of a step, as rates are of what sticks or lies
+    /// on a wall.
+    pub(super) still: Vec<usize>,
     /// True where what is to be done cannot be: the motion is driven back onto that condition from both
     /// sides.
     pub slides: bool,
@@ -89,18 +94,10 @@ impl EventDetector {
     pub fn new(mechanism: Arc<Mechanism>, events: Vec<Box<dyn Event>>) -> Self {
         let laws = mechanism.laws.clone();
         let friction = FrictionWatch::new(&mechanism);
-        let (memory, found) = (EventMemory::default(), Vec::new());
-        let mut detector = Self {
-            events,
-            laws,
-            mechanism,
-            friction,
-            memory,
-            closers: Vec::new(),
-            resolved: RESOLVED,
-            found,
-            count: 0,
-        };
+        let (memory, found, closers) = (EventMemory::default(), Vec::new(), Vec::new());
+        let resolved = RESOLVED;
+        let mut detector =
+            Self { events, laws, mechanism, friction, memory, closers, resolved, found, count: 0 };
         detector.closers = detector.closing();
         detector.memory.sides = vec![0; detector.functions()];
         detector.memory.largest = vec![0.0; detector.functions()];
@@ -211,7 +208,7 @@ impl EventDetector {
         let fits = memory.sides.len() == functions
             && memory.largest.len() == functions
             && memory.last.iter().all(|(event, _)| *event < functions)
-            && memory.due.iter().all(|(event, _)| *event < functions)
+            && memory.due.iter().map(|due| &due.0).chain(&memory.still).all(|event| *event < functions)
             && memory.pending.as_ref().is_none_or(|(event, _)| *event < functions);
         if fits {
             self.memory = memory;
@@ -356,7 +353,7 @@ impl StepWatcher for EventDetector {
         if self.memory.largest[..self.before_friction()].contains(&0.0) {
             self.measure(inside.at(begin));
         }
-        let (mut passages, before) = (Vec::new(), self.memory.sides.clone());
+        let (mut passages, before) = (Vec::new(), (self.memory.sides.clone(), self.memory.still.clone()));
         self.passages(inside, begin, span, 0, &mut passages);
         self.memory.woken.clear();
         // In the order of their times for each function.
@@ -390,7 +387,7 @@ impl StepWatcher for EventDetector {
                 }
                 self.memory.pending = Some((event, self.action(event, &motion)));
                 self.put_off(&passages[number + 1..], t, span);
-                self.cut(&all, t, (t - begin).hi <= SAME * span, &before);
+                self.cut(&all, t, (begin, span), &before);
                 return Some(t);
             }
             self.count += 1;
@@ -406,40 +403,10 @@ impl StepWatcher for EventDetector {
                 self.memory.flipped.clear();
                 self.memory.pending = Some((event, action));
                 self.put_off(&passages[number + 1..], t, span);
-                self.cut(&all, t, (t - begin).hi <= SAME * span, &before);
+                self.cut(&all, t, (begin, span), &before);
                 return Some(t);
             }
         }
         None
-    }
-}
-
-impl EventDetector {
-    /// Takes back what passes zero later than the step is cut short; where that `is_begin` of it, functions are on
-    /// the sides `before`, but those of events that happened: what the step shows is not what follows.
-    fn cut(&mut self, passages: &[Passage], t: Time, is_begin: bool, before: &[i8]) {
-        for Passage { event, rises, .. } in passages.iter().rev().filter(|passage| passage.t > t) {
-            self.memory.sides[*event] = if *rises { -1 } else { 1 };
-        }
-        let events = self.of_the_scene() + self.events.len();
-        for (event, &side) in before.iter().enumerate().take(events).filter(|_| is_begin) {
-            if !self.memory.last.iter().any(|(last, _)| *last == event) {
-                self.memory.sides[event] = side;
-            }
-        }
-    }
-
-    /// Remembers the events that happen at the very moment, too, at which another one cuts a step short:
-    /// where the next one begins rounding may have them behind.  Conditions stay on their sides until they
-    /// flip.
-    fn put_off(&mut self, later: &[Passage], t: Time, span: f64) {
-        let is_now = |passage: &&Passage| (passage.t - t).hi <= SAME * span;
-        for Passage { event, rises, .. } in later.iter().take_while(is_now) {
-            let is_done = self.memory.last.iter().any(|(last, _)| last == event);
-            let is_event = matches!(self.owner(*event), Owner::Scene(..) | Owner::Outside(_));
-            if is_event && !is_done {
-                self.memory.due.push((*event, *rises));
-            }
-        }
     }
 }

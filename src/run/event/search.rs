@@ -57,6 +57,8 @@ struct Part<'a> {
     places: &'a [f64],
     /// True where the interpolant is as good as the function.
     is_resolved: bool,
+    /// True where the step ends with it.
+    is_last: bool,
 }
 
 impl Part<'_> {
@@ -104,12 +106,13 @@ impl EventDetector {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);
             return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
         }
+        let is_last = (inside.span().1 - (begin + span)).hi <= SAME * span;
         for (event, curve) in curves.iter().enumerate() {
             if self.memory.resting.contains(&event) {
                 continue;
             }
             let is_resolved = is_enough(curve) || !curve.most().is_finite();
-            let part = Part { begin, span, curve, values: &values[event], places, is_resolved };
+            let part = Part { begin, span, curve, values: &values[event], places, is_resolved, is_last };
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),
                 Owner::Friction(..) => Some(true),
@@ -156,13 +159,18 @@ impl EventDetector {
         let may_begin = self.memory.sides[event] == 0 && !part.is_resolved;
         let beyond =
             (is_corner || may_begin).then(|| self.values(inside.at(begin + AFTER * part.span))[event]);
-        let EventMemory { sides, largest, last, due, .. } = &mut self.memory;
+        let EventMemory { sides, largest, last, due, still, .. } = &mut self.memory;
         let (side, largest) = (&mut sides[event], &mut largest[event]);
         *largest = largest.max(most);
         // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding alone.
         if most <= NO_VALUE * *largest {
+            if !still.contains(&event) {
+                still.push(event);
+            }
             return;
         }
+        let was_still = still.contains(&event);
+        still.retain(|other| *other != event);
         let is_at_zero = first.abs() <= NO_VALUE * *largest;
         if is_at_zero && *side != 0 && sign(next) == -*side {
             all.push(Passage { t: begin, event, rises: *side < 0, jumps: false });
@@ -186,11 +194,27 @@ impl EventDetector {
             return self.between(inside, part, (event, is_behind), all);
         }
         // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
-        let from = if is_woken || begins { LEAVES } else { 0.0 };
-        if is_woken || begins {
+        let leaves = is_woken || begins || was_still && is_at_zero;
+        let off = (self.resolved.max(NO_VALUE) * most).max(first.abs());
+        let from = if leaves { clear(part.curve, 0.0, off).unwrap_or(0.0).max(LEAVES) } else { 0.0 };
+        if leaves {
             *side = sign(part.curve.at(from)[0]);
         }
         self.zeros(part, event, (from, None), all);
+        if part.is_last {
+            self.end_at_zero(part, event, inside.span().1, all);
+        }
+    }
+
+    /// The passage of a function that comes to zero where the step ends, as the height of a point does on its wall:
+    /// on which side rounding has it there does not matter.
+    fn end_at_zero(&mut self, part: &Part, event: usize, end: Time, all: &mut Vec<Passage>) {
+        let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
+        let off = self.resolved.max(NO_VALUE) * part.curve.most();
+        if *side != 0 && value.abs() <= off && sign(slope) == -*side {
+            all.push(Passage { t: end, event, rises: *side < 0, jumps: false });
+            *side = -*side;
+        }
     }
 
     /// Zeros of an interpolant from a share of the part on; where it is `off` by so much about them, the side
@@ -205,6 +229,10 @@ impl EventDetector {
         let side = &mut self.memory.sides[event];
         while let Some(zero) = root(part.curve, 0.0, share, 1.0) {
             let next = zero + SAME;
+            if next >= 1.0 && !part.is_last {
+                // The part that follows tells.
+                break;
+            }
             share = off.and_then(|off| clear(part.curve, next, off)).unwrap_or(next);
             let after = sign(part.curve.at(share.min(1.0))[0]);
             // At the very end of a step what follows is not known: it is on the other side.

@@ -136,6 +136,8 @@ impl<T: Coefficient> Expansion<T> {
                     vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()))
                 };
                 let (turning, sliding) = vectors.split_at(self.mechanism.bodies.len());
+                // No wall sees the angles that stand for integrals.
+                let turning = &turning[..self.mechanism.own_bodies().len()];
                 let size = larger(of(turning), of(sliding) / units.length);
                 least = least.min(minus_log2(size) / k as f64);
             }
