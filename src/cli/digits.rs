@@ -55,6 +55,11 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     refuse_others(flags)?;
     let text = read_text(&flags.scene.scene)?;
     let mut task = Task::new(flags, &text, arguments)?;
+    if !task.source.scene.outputs.is_empty() && !flags.scene.tell.quiet {
+        super::output::message(
+            "note: outputs are not written in many digits, whose table has the coordinates alone",
+        );
+    }
     let precisions = task.first()?;
     let path = flags.out.join(&task.source.scene.name).join(folder_name(&precisions, task.within));
     let pair = Pair::new(&task.source, &precisions)?;

@@ -60,7 +60,7 @@ impl<const W: usize> Motion<W> {
         let Posture { phi, omega, .. } = self.state_posture();
         let acting = self.mechanism.after(event, self.state.t, &phi, &omega);
         self.let_act(acting)?;
-        self.rub_again()
+        self.settle_modes_again()
     }
 
     /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.

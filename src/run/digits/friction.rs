@@ -143,13 +143,13 @@ impl<const W: usize> Motion<W> {
 
     /// Decides anew what sticks and what slides, and which walls hold a point: those that do so, or others
     /// that touch.
-    pub(super) fn rub(&mut self, transition: Transition) -> Result<(), StepError> {
+    pub(super) fn settle_modes(&mut self, transition: Transition) -> Result<(), StepError> {
         let held = self.state.acting.held.clone();
         // Without friction at walls it is known which are pressed.
         let at_wall = |friction: &friction::Friction<_>| matches!(friction.normal, Normal::Contact(_));
         let touching =
             if self.mechanism.frictions.iter().any(at_wall) { self.touching() } else { held.clone() };
-        self.rub_at(&held, &touching, transition)
+        self.settle_modes_at(&held, &touching, transition)
     }
 
     /// Walls that touch a point which does not move along its normal.
@@ -167,7 +167,7 @@ impl<const W: usize> Motion<W> {
     }
 
     /// The same with walls that would hold a point without friction, and those that touch.
-    pub(super) fn rub_at(
+    pub(super) fn settle_modes_at(
         &mut self,
         staying: &[usize],
         touching: &[usize],

@@ -19,7 +19,7 @@ use super::functions::Functions;
 use super::keep::Keeper;
 use super::precision::Precision;
 use super::resting::Hold;
-use super::rubbing;
+use super::transitions;
 use super::wall::{self, Ends};
 use crate::arithmetic::digits::{Digits, Scale};
 use crate::arithmetic::{Real, Scalar};
@@ -232,7 +232,7 @@ impl<const W: usize> Motion<W> {
             match ends {
                 Some(Ends::Met(wall)) => wall::impact(self, wall)?,
                 Some(Ends::Let(wall)) => self.let_go(&[wall])?,
-                Some(Ends::Rubs(rub)) => self.rubs(rub)?,
+                Some(Ends::Changes(change)) => self.change_mode(change)?,
                 _ => {}
             }
             change.map_or(Ok(()), |event| self.change(event))?;
@@ -279,12 +279,12 @@ impl<const W: usize> Motion<W> {
                 None => {}
             }
             if !self.state.is_decided {
-                self.rub(Transition::default())?;
+                self.settle_modes(Transition::default())?;
                 continue;
             }
-            match rubbing::first(self, end.0.value())? {
-                Some((Ends::Rubs(rub), length)) if length <= Digits::ZERO => {
-                    self.rubs(rub)?;
+            match transitions::first(self, end.0.value())? {
+                Some((Ends::Changes(change), length)) if length <= Digits::ZERO => {
+                    self.change_mode(change)?;
                     continue;
                 }
                 Some((ends, length)) if length <= end.0 => end = (length, Some(ends)),
@@ -396,8 +396,9 @@ impl<const W: usize> Motion<W> {
 pub(super) fn coordinates_of<const W: usize>(mechanism: &ExactMechanism<Digits<W>>) -> Coordinates {
     let structure = &mechanism.structure;
     // Friction follows from the multipliers of motors, and what sticks is a row.
-    let rubs = !structure.frictions.is_empty() && (structure.sticking() > 0 || structure.partition.driven());
-    if structure.has_multipliers() || rubs { Coordinates::All } else { Coordinates::Independent }
+    let has_modes =
+        !structure.frictions.is_empty() && (structure.sticking() > 0 || structure.partition.driven());
+    if structure.has_multipliers() || has_modes { Coordinates::All } else { Coordinates::Independent }
 }
 
 /// A step with few bits, so that times have few: 2⁻²⁰ of its size is cut off.

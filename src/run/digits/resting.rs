@@ -300,7 +300,7 @@ impl<const W: usize> Motion<W> {
         touching: &[usize],
     ) -> Result<(), StepError> {
         let before = self.state.acting.clone();
-        self.rub_at(set, touching, Transition::default())?;
+        self.settle_modes_at(set, touching, Transition::default())?;
         let is_same = |(now, before): (&Mode<Digits<W>>, &Mode<Digits<W>>)| now.word() == before.word();
         let Acting { held, sliding, .. } = &self.state.acting;
         if *held != before.held || !sliding.iter().zip(&before.sliding).all(is_same) {
@@ -313,7 +313,7 @@ impl<const W: usize> Motion<W> {
             false => set.push(wall),
         }
         set.sort_unstable();
-        self.rub_at(&set, &set, Transition::default())
+        self.settle_modes_at(&set, &set, Transition::default())
     }
 
     /// Goes on with these points held, those of them that are not yet from these times on, and places with
@@ -377,11 +377,11 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Decides anew what places with friction do, where something else has changed.
-    pub(super) fn rub_again(&mut self) -> Result<(), StepError> {
+    pub(super) fn settle_modes_again(&mut self) -> Result<(), StepError> {
         if !self.has_friction() || !self.state.is_decided {
             return Ok(());
         }
-        self.rub(Transition::default())
+        self.settle_modes(Transition::default())
     }
 
     /// Lets the points of these walls go.
@@ -390,7 +390,7 @@ impl<const W: usize> Motion<W> {
         let set: Vec<usize> = held.filter(|wall| !walls.contains(wall)).collect();
         match set == self.state.acting.held {
             true => Ok(()),
-            false if self.has_friction() => self.rub_at(&set, &set, Transition::default()),
+            false if self.has_friction() => self.settle_modes_at(&set, &set, Transition::default()),
             false => self.hold(set, Vec::new(), &[], None),
         }
     }

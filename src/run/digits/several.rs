@@ -10,9 +10,9 @@
 //! friction: every set of walls that press is looked at, in the same order; equations and signs are in all
 //! digits.  Walls whose point does not approach have no restitution.
 
+use super::friction_impact;
 use super::motion::Motion;
 use super::resting::Unheld;
-use super::shock;
 use super::wall::{Jump, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -78,7 +78,7 @@ impl<const W: usize> Meeting<W> {
             return Err(motion.stop(Cause::Unsuited, 0.0, &what, "leave out walls that others imply"));
         }
         if self.walls.iter().any(|&wall| motion.mechanism.structure.friction_at(wall).is_some()) {
-            return Err(shock::beside_friction(motion, &names));
+            return Err(friction_impact::beside_friction(motion, &names));
         }
         let (t, posture) = (motion.state().t, motion.state_posture());
         // Points that stay on walls take part as all others that touch.

@@ -9,12 +9,12 @@
 //! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12
 //! of the length of a contact are not told from touching, but for those that begin so: see module `touch`.
 
+use super::friction_impact;
 use super::motion::Motion;
 use super::resting::{self, Released};
-use super::rubbing::Rub;
 use super::several::Meeting;
-use super::shock;
 use super::touch::Passage;
+use super::transitions::ModeChange;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::constraint::{Aim, ConstraintEquation, Measure, Posture};
@@ -41,7 +41,7 @@ pub enum Ends {
     /// It cannot begin: a point that touches this wall, or stays on it, is pressed or pulled otherwise now.
     Rests(usize),
     /// A place with friction begins to do something else.
-    Rubs(Rub),
+    Changes(ModeChange),
 }
 
 /// What ends a step of so many seconds, and the exact time up to it.
@@ -210,7 +210,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     }
     let jump = match several {
         Some(meeting) => meeting.jump(motion)?,
-        None if motion.has_friction() => shock::alone(motion, wall, &gap)?,
+        None if motion.has_friction() => friction_impact::alone(motion, wall, &gap)?,
         None => loop {
             let (jump, pulls) = alone(motion, wall, &gap);
             // A point that its wall would have to pull is let go.
@@ -222,7 +222,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     };
     jumped(motion, &jump);
     motion.let_leaving_go()?;
-    motion.rub_again()?;
+    motion.settle_modes_again()?;
     // What motors drive there no impulse turns back.
     let after = gap_rate(motion, wall).rate;
     let is_left = after < Digits::ZERO && (after / approach).log2() > motion.precision.rounding(SURE);

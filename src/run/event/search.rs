@@ -146,7 +146,11 @@ impl EventDetector {
         let is_behind = first == 0.0 || last.contains(&(event, part.begin));
         sides[event] = if is_behind { sign(next) } else { sign(first) };
         let off = is_of_laws.then_some(self.resolved * most);
-        self.zeros(part, event, (0.0, off), all);
+        // Of what begins to slide, whose velocity is zero there, rounding is no passage.
+        let begins =
+            (is_there && !is_of_laws).then_some((self.resolved.max(NO_VALUE) * most).max(first.abs()));
+        let from = begins.and_then(|off| clear(curve, 0.0, off)).unwrap_or(0.0);
+        self.zeros(part, event, (from, off), all);
     }
 
     /// Passages of the function of an event.

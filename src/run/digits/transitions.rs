@@ -22,7 +22,7 @@ use crate::stepping::{Cause, StepError};
 
 /// What a place does at the end of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Rub {
+pub enum ModeChange {
     /// The relative velocity of this place is zero.
     Arrives(usize),
     /// This place can stick no longer; the sign of the velocity it will have.
@@ -35,10 +35,10 @@ pub enum Rub {
 
 /// The first of what places with friction do within a step of so many seconds, and the exact time up to it.
 pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(Ends, Digits<W>)>, StepError> {
-    let mut found: Option<(Rub, Digits<W>)> = None;
-    let mut comes = |rub: Rub, time: Digits<W>| {
+    let mut found: Option<(ModeChange, Digits<W>)> = None;
+    let mut comes = |change: ModeChange, time: Digits<W>| {
         if found.as_ref().is_none_or(|(_, first)| time < *first) {
-            found = Some((rub, time));
+            found = Some((change, time));
         }
     };
     let (mut slides, mut sticks) = (motion.series.slides(), motion.series.sticks());
@@ -51,10 +51,10 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                 let Some(slides) = slides.next() else { continue };
                 let powers: Vec<_> = slides.speed.iter().map(|speed| speed.scale(sign)).collect();
                 if let Some(time) = passes(motion, &powers, motion.speed_unit(place), step) {
-                    comes(Rub::Arrives(place), time);
+                    comes(ModeChange::Arrives(place), time);
                 }
                 if let Some(time) = reverses(motion, place, slides.normal, slides.size, step)? {
-                    comes(Rub::Reverses, time);
+                    comes(ModeChange::Reverses, time);
                 }
             }
             Mode::Strained(strain) => {
@@ -62,10 +62,10 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                 if let Some(sign) = moves(motion, slides.speed, motion.speed_unit(place), step)
                     && strain == 0.0
                 {
-                    comes(Rub::Moves(place, sign), Digits::ZERO);
+                    comes(ModeChange::Moves(place, sign), Digits::ZERO);
                 }
                 if let Some(time) = reverses(motion, place, slides.normal, slides.size, step)? {
-                    comes(Rub::Reverses, time);
+                    comes(ModeChange::Reverses, time);
                 }
             }
             Mode::Stick(_) => {
@@ -78,12 +78,12 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                     let limbs = motion.precision.limbs;
                     let at = |sum: Digits<W>, power: &Digits<W>| (sum * time).shortened(limbs) + *power;
                     let force = tau.iter().rev().fold(Digits::ZERO, at);
-                    comes(Rub::Breaks(place, if force < Digits::ZERO { -1.0 } else { 1.0 }), time);
+                    comes(ModeChange::Breaks(place, if force < Digits::ZERO { -1.0 } else { 1.0 }), time);
                 }
             }
         }
     }
-    Ok(found.map(|(rub, time)| (Ends::Rubs(rub), time)))
+    Ok(found.map(|(change, time)| (Ends::Changes(change), time)))
 }
 
 /// When a function that is positive, or begins at zero, goes below zero; values are divided by `unit`.
@@ -170,26 +170,30 @@ fn grip<const W: usize>(
 
 impl<const W: usize> Motion<W> {
     /// Lets it take effect what a place with friction does.
-    pub(super) fn rubs(&mut self, rub: Rub) -> Result<(), StepError> {
+    pub(super) fn change_mode(&mut self, change: ModeChange) -> Result<(), StepError> {
         let held = self.state().acting.held.clone();
         let alone = |motion: &Self, place: usize, mode: Mode<Digits<W>>| {
             let mut modes = motion.state().acting.sliding.clone();
             modes[place] = mode;
             modes
         };
-        match rub {
+        match change {
             // How it goes on is told by the series of its velocity.
-            Rub::Arrives(place) if self.is_driven(place) => {
+            ModeChange::Arrives(place) if self.is_driven(place) => {
                 let modes = alone(self, place, Mode::Strained(0.0));
                 self.hold(held, modes, &[], None)
             }
-            Rub::Arrives(place) => self.rub(Transition { arrived: Some(place), breaks: None }),
-            Rub::Breaks(place, sign) => self.rub(Transition { arrived: None, breaks: Some((place, sign)) }),
-            Rub::Moves(place, sign) => {
+            ModeChange::Arrives(place) => {
+                self.settle_modes(Transition { arrived: Some(place), breaks: None })
+            }
+            ModeChange::Breaks(place, sign) => {
+                self.settle_modes(Transition { arrived: None, breaks: Some((place, sign)) })
+            }
+            ModeChange::Moves(place, sign) => {
                 let modes = alone(self, place, Mode::Slip(sign));
                 self.hold(held, modes, &[], None)
             }
-            Rub::Reverses => Ok(()),
+            ModeChange::Reverses => Ok(()),
         }
     }
 }
