@@ -32,14 +32,51 @@ pub fn shipped(name: &str) -> String {
     std::fs::read_to_string(path).expect("a shipped scene")
 }
 
-fn run(source: &Source, digits: usize) -> Box<dyn LongRun> {
+pub fn begun(source: &Source, digits: usize) -> Box<dyn LongRun> {
     let has_loops = source.mechanism.has_closed_loops();
     long_run(source, Precision::new(digits, has_loops)).expect("a run")
 }
 
 fn rows(source: &Source, digits: usize) -> Vec<Row> {
-    let mut run = run(source, digits);
+    let mut run = begun(source, digits);
     (0..=run.last_row()).map(|k| run.row(k, &mut || false).expect("a row").expect("no pause")).collect()
+}
+
+/// A whole run; one that goes on from any of its rows comes to the same bits.
+pub fn resumed(source: &Source) -> Box<dyn LongRun> {
+    let mut whole = begun(source, 30);
+    let mut saved = vec![whole.save()];
+    let rows: Vec<Row> = (0..=whole.last_row())
+        .map(|number| {
+            let row = whole.row(number, &mut || false).expect("a row").expect("there");
+            saved.push(whole.save());
+            row
+        })
+        .collect();
+    for (from, saved) in saved.iter().enumerate() {
+        let mut other = begun(source, 30);
+        assert!(other.resume(saved));
+        for expected in rows.iter().skip(from) {
+            let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
+            assert_eq!(format!("{found:?}"), format!("{expected:?}"));
+        }
+        assert_eq!(format!("{:?}", other.save()), format!("{:?}", whole.save()));
+    }
+    whole
+}
+
+/// Two runs with the digits forecast for agreement to 1e-15, which agree so far at every row.
+pub fn proved(source: &Source) -> Pair {
+    let forecast = forecast(source, 1e-15, false, &mut || false).expect("no error").expect("a forecast");
+    let mut pair = Pair::new(source, &[forecast.run, forecast.companion]).expect("two runs");
+    let mut least = f64::INFINITY;
+    while let Progress::Rows(rows) = pair.go(&|| false).expect("no stop") {
+        for (_, agreement) in rows {
+            least = least.min(agreement.expect("two runs"));
+        }
+    }
+    assert!(least > 15.0, "{least} of {forecast:?}");
+    pair
 }
 
 pub fn last(source: &Source, digits: usize) -> Row {
@@ -163,7 +200,7 @@ fn a_ball_bounces_as_its_parabolas() {
      "bars": [{"name": "ball", "mass": 0.3, "centre": [0, 0], "inertia": 0.01, "length": 0.1}],
      "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0.1], "normal": [0, 1]}, "restitution": 0.5}],
      "start": {"ball": {"phi": 0.3, "omega": 1.1, "origin": [0.2, 1.1], "velocity": [0.3, 0]}}, "until": 1, "every": 1}"#;
-    let mut run = run(&source(ball, &[], "1.2", "0.3"), 60);
+    let mut run = begun(&source(ball, &[], "1.2", "0.3"), 60);
     let rows: Vec<Row> =
         (0..=run.last_row()).map(|k| run.row(k, &mut || false).expect("a row").expect("there")).collect();
     // 0.4515… + 0.4515… + 0.2257…: between the third and the fourth impact.
@@ -241,10 +278,10 @@ fn a_run_goes_on_to_the_last_bit() {
     for name in ["spring", "wall"] {
         let source = source(&shipped(name), &[], "0.6", "0.1");
         let whole = rows(&source, 30);
-        let mut begun = run(&source, 30);
+        let mut paused = begun(&source, 30);
         let mut steps = 0;
         assert!(
-            begun
+            paused
                 .row(3, &mut || {
                     steps += 1;
                     steps == 2
@@ -252,9 +289,9 @@ fn a_run_goes_on_to_the_last_bit() {
                 .expect("no stop")
                 .is_none()
         );
-        let saved = begun.save();
-        let mut other = run(&source, 30);
-        assert!(other.resume(&saved) && !run(&source, 31).resume(&saved));
+        let saved = paused.save();
+        let mut other = begun(&source, 30);
+        assert!(other.resume(&saved) && !begun(&source, 31).resume(&saved));
         for expected in &whole[4..] {
             let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
             assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{name}");

@@ -3,10 +3,12 @@
 use super::common;
 use super::friction::{any_scene, rod};
 use super::friction_shared::linkage;
-use super::many_digits::{cosine, fixed, near, number, one, pi, shipped, source, times};
+use super::many_digits::{
+    begun, cosine, fixed, near, number, one, pi, proved, resumed, shipped, source, times,
+};
 use driftless::Mechanism;
 use driftless::arithmetic::Real;
-use driftless::run::digits::{LongRun, LongTurn, Pair, Precision, Progress, Row, Source, forecast, long_run};
+use driftless::run::digits::{LongTurn, Precision, Row, long_run};
 use driftless::run::{MethodId, Outcome, Request};
 use driftless::scene::parse_scene;
 use driftless::stepping::StepError;
@@ -26,11 +28,6 @@ fn sine(x: &BigInt) -> BigInt {
 
 fn square(x: &BigInt) -> BigInt {
     times(x, x)
-}
-
-fn begun(source: &Source, digits: usize) -> Box<dyn LongRun> {
-    let has_loops = source.mechanism.has_closed_loops();
-    long_run(source, Precision::new(digits, has_loops)).expect("a run")
 }
 
 /// The last row of a run of a scene, and its transitions.
@@ -522,40 +519,14 @@ fn a_run_goes_on_to_the_last_bit_while_places_stick_and_slide() {
     let text = block(["1", "0"], r#"{"kinetic": 0.2, "static": 0.25}"#, ["1", "0", "0", "0"], spring);
     for (text, until) in [(shipped("stick_slip"), "5"), (shipped("sliding_ball"), "1.8"), (text, "4")] {
         let source = source(&text, &[], until, "0.3");
-        let mut whole = begun(&source, 30);
-        let mut saved = vec![whole.save()];
-        let rows: Vec<Row> = (0..=whole.last_row())
-            .map(|number| {
-                let row = whole.row(number, &mut || false).expect("a row").expect("there");
-                saved.push(whole.save());
-                row
-            })
-            .collect();
-        assert!(whole.turns().len() > 1);
-        for (from, saved) in saved.iter().enumerate() {
-            let mut other = begun(&source, 30);
-            assert!(other.resume(saved));
-            for expected in rows.iter().skip(from) {
-                let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
-                assert_eq!(format!("{found:?}"), format!("{expected:?}"));
-            }
-            assert_eq!(format!("{:?}", other.save()), format!("{:?}", whole.save()));
-        }
+        assert!(resumed(&source).turns().len() > 1);
     }
 }
 
 #[test]
 fn a_horizon_beyond_transitions_is_forecast_and_proved() {
     let source = source(&shipped("stick_slip"), &[], "5", "0.5");
-    let forecast = forecast(&source, 1e-15, false, &mut || false).expect("no error").expect("a forecast");
-    let mut pair = Pair::new(&source, &[forecast.run, forecast.companion]).expect("two runs");
-    let mut least = f64::INFINITY;
-    while let Progress::Rows(rows) = pair.go(&|| false).expect("no stop") {
-        for (_, agreement) in rows {
-            least = least.min(agreement.expect("two runs"));
-        }
-    }
-    assert!(least > 15.0, "{least} of {forecast:?}");
+    let pair = proved(&source);
     let turns = pair.turns();
     assert!(turns.len() > 2 && turns.iter().all(|(_, digits)| digits.expect("two runs") > 15.0), "{turns:?}");
 }

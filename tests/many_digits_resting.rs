@@ -2,12 +2,10 @@
 //! runs in doubles.
 
 use super::common;
-use super::many_digits::{cosine, fixed, near, number, one, pi, source, times};
+use super::many_digits::{begun, cosine, fixed, near, number, one, pi, proved, resumed, source, times};
 use driftless::arithmetic::Real;
 use driftless::run::Request;
-use driftless::run::digits::{
-    LongEvent, LongHold, LongRun, Pair, Precision, Progress, Row, Source, forecast, long_run,
-};
+use driftless::run::digits::{LongEvent, LongHold, Row};
 use driftless::scene::parse_scene;
 use num_bigint::BigInt;
 
@@ -17,11 +15,6 @@ fn over(a: &BigInt, b: &BigInt) -> BigInt {
 
 fn root(x: &BigInt) -> BigInt {
     (x * one()).sqrt()
-}
-
-fn begun(source: &Source, digits: usize) -> Box<dyn LongRun> {
-    let has_loops = source.mechanism.has_closed_loops();
-    long_run(source, Precision::new(digits, has_loops)).expect("a run")
 }
 
 /// The last row of a run of a scene, and the times that points stayed on walls.
@@ -402,40 +395,14 @@ fn a_run_goes_on_to_the_last_bit_while_points_are_held() {
     let scenes = scenes();
     for (text, _) in [&scenes[0], &scenes[2], &scenes[3]] {
         let source = source(text, &[], "1.2", "0.1");
-        let mut whole = begun(&source, 30);
-        let mut saved = vec![whole.save()];
-        let rows: Vec<Row> = (0..=whole.last_row())
-            .map(|number| {
-                let row = whole.row(number, &mut || false).expect("a row").expect("there");
-                saved.push(whole.save());
-                row
-            })
-            .collect();
-        assert!(!whole.holds().is_empty());
-        for (from, saved) in saved.iter().enumerate() {
-            let mut other = begun(&source, 30);
-            assert!(other.resume(saved));
-            for expected in rows.iter().skip(from) {
-                let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
-                assert_eq!(format!("{found:?}"), format!("{expected:?}"));
-            }
-            assert_eq!(format!("{:?}", other.save()), format!("{:?}", whole.save()));
-        }
+        assert!(!resumed(&source).holds().is_empty());
     }
 }
 
 #[test]
 fn a_horizon_beyond_a_hold_is_forecast_and_proved() {
     let source = source(&scenes()[0].0, &[], "2", "0.5");
-    let forecast = forecast(&source, 1e-15, false, &mut || false).expect("no error").expect("a forecast");
-    let mut pair = Pair::new(&source, &[forecast.run, forecast.companion]).expect("two runs");
-    let mut least = f64::INFINITY;
-    while let Progress::Rows(rows) = pair.go(&|| false).expect("no stop") {
-        for (_, agreement) in rows {
-            least = least.min(agreement.expect("two runs"));
-        }
-    }
-    assert!(least > 15.0, "{least} of {forecast:?}");
+    let pair = proved(&source);
     assert!(
         !pair.holds().is_empty() && pair.holds().iter().all(|(_, digits)| digits.expect("two runs") > 15.0)
     );

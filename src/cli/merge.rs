@@ -115,11 +115,12 @@ fn part_folders(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(folders)
 }
 
-/// Whether a folder is one of a part, finished or not.
+/// What is in a folder.
 fn inside(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     fs::read_dir(folder)?.map(|entry| Ok(entry?.path())).collect()
 }
 
+/// Whether a folder is one of a part, finished or not.
 fn is_part(folder: &Path) -> bool {
     let name = folder.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     folder.is_dir()

@@ -108,10 +108,7 @@ impl<C: Copy> Mode<C> {
     }
 
     /// tau over N of what has its friction at the limit.
-    pub fn coefficient(self, friction: &Friction<C>) -> Option<C>
-    where
-        C: Real,
-    {
+    pub fn coefficient<F: Real>(self, friction: &Friction<F>) -> Option<F> {
         match self {
             Self::Open | Self::Stick(_) => None,
             Self::Slip(sign) => Some(friction.kinetic.scale(sign)),
@@ -185,10 +182,7 @@ pub(super) fn check_lines(frictions: &[Friction], contacts: &[Contact]) -> Resul
 impl<C: Real> Friction<C> {
     /// The relative displacement \[rad, m\] at these coordinates.
     pub fn displacement<T: Over<C>>(&self, phi: &[T], z: &[Complex<T>]) -> T {
-        match &self.tangent.measure {
-            Measure::Angle { body, base } => phi[*body] - base.map_or(T::ZERO, |base| phi[base]),
-            Measure::Place(place) => place.value(z),
-        }
+        self.tangent.measure.value(phi, z)
     }
 
     /// The row that keeps it at a displacement \[rad, m\].

@@ -81,6 +81,27 @@ pub enum Measure<C = f64> {
     Place(Quadratic<C>),
 }
 
+impl<C: Real> Measure<C> {
+    /// Its value \[rad, m\] at coordinates and elements.
+    pub fn value<T: Over<C>>(&self, phi: &[T], z: &[Complex<T>]) -> T {
+        match self {
+            Self::Angle { body, base } => base.map_or(phi[*body], |base| phi[*body] - phi[base]),
+            Self::Place(place) => place.value(z),
+        }
+    }
+
+    /// Its derivatives by coordinates at the elements `z`, one by one.
+    pub fn slopes<T: Over<C>>(&self, z: &[Complex<T>], mut each: impl FnMut(usize, T)) {
+        match self {
+            Self::Angle { body, base } => {
+                each(*body, T::ONE);
+                base.iter().for_each(|&base| each(base, -T::ONE));
+            }
+            Self::Place(place) => place.slopes(z, each),
+        }
+    }
+}
+
 /// The force a row exerts: -lambda direction on one body, the opposite on another.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Push<C = f64> {

@@ -127,14 +127,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             is_turned: false,
         };
         let all = || known.places.iter().zip(&mechanism.modes);
-        let sliding = all().filter_map(|(friction, mode)| {
-            let mode = match *mode {
-                Mode::Slip(sign) => Mode::Slip(sign),
-                Mode::Strained(sign) => Mode::Strained(sign),
-                Mode::Open | Mode::Stick(_) => return None,
-            };
-            Some(place(friction, mode.coefficient(friction)?))
-        });
+        let sliding = all().filter_map(|(friction, mode)| Some(place(friction, mode.coefficient(friction)?)));
         let places: Vec<Sliding<T>> = sliding.collect();
         let sticks = all().filter(|(_, mode)| T::HAS_CONSTANTS && matches!(mode, Mode::Stick(_)));
         let stuck: Vec<Sticking<T>> =

@@ -125,13 +125,7 @@ pub(super) fn gradient<const W: usize>(
     z: &[Complex<Digits<W>>],
 ) -> Vec<Digits<W>> {
     let mut gradient = vec![Digits::ZERO; z.len()];
-    match &row.measure {
-        Measure::Place(place) => place.slopes(z, |k, slope| gradient[k] += slope),
-        Measure::Angle { body, base } => {
-            gradient[*body] += Digits::ONE;
-            base.iter().for_each(|&base| gradient[base] -= Digits::ONE);
-        }
-    }
+    row.measure.slopes(z, |k, slope| gradient[k] += slope);
     gradient
 }
 

@@ -51,6 +51,13 @@ pub(in crate::run) struct EventMemory {
     pub slides: bool,
 }
 
+impl EventMemory {
+    /// True for an event of the moment at which one happened last.
+    fn has_happened(&self, event: usize) -> bool {
+        self.last.iter().any(|(last, _)| *last == event)
+    }
+}
+
 /// Detects the events of a run: those of the scene, those from outside, then the zeros of the conditions
 /// that choose the branches of the scene's laws.
 pub(in crate::run) struct EventDetector {
@@ -371,8 +378,7 @@ impl StepWatcher for EventDetector {
             let is_condition = is_friction || matches!(self.owner(event), Owner::Condition(..));
             // What was found near the beginning may be the zero that the last step ended with.
             self.memory.last.retain(|(_, before)| (t - *before).hi <= SAME * span);
-            let is_same = self.memory.last.iter().any(|(last, _)| *last == event);
-            if is_same && !is_condition {
+            if self.memory.has_happened(event) && !is_condition {
                 continue;
             }
             let landed = inside.landed(t).cloned();

@@ -79,10 +79,9 @@ fn clear(curve: &Chebyshev, share: f64, off: f64) -> Option<f64> {
     ahead.find(is_clear)
 }
 
-/// The value by which a curve that begins near zero leaves it: it may be back before the next node.
-fn soon(curve: &Chebyshev, first: f64, resolved: f64) -> Option<f64> {
-    let off = (resolved.max(NO_VALUE) * curve.most()).max(first.abs());
-    Some(curve.at(clear(curve, 0.0, off)?)[0])
+/// Where a curve that begins near zero has left it: it may be back before the next node.
+fn left(curve: &Chebyshev, first: f64, resolved: f64) -> Option<f64> {
+    clear(curve, 0.0, (resolved.max(NO_VALUE) * curve.most()).max(first.abs()))
 }
 
 impl EventDetector {
@@ -138,7 +137,8 @@ impl EventDetector {
         // have carried it across.
         let other = if mode { -1 } else { 1 };
         let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
-        if is_there && sign(soon(curve, first, self.resolved).unwrap_or(next)) == other {
+        let left = is_there.then(|| left(curve, first, self.resolved)).flatten();
+        if is_there && sign(left.map_or(next, |share| curve.at(share)[0])) == other {
             all.push(Passage { t: part.begin, event, rises: !mode, jumps: false });
         }
         let EventMemory { sides, largest, last, .. } = &mut self.memory;
@@ -147,9 +147,7 @@ impl EventDetector {
         sides[event] = if is_behind { sign(next) } else { sign(first) };
         let off = is_of_laws.then_some(self.resolved * most);
         // Of what begins to slide, whose velocity is zero there, rounding is no passage.
-        let begins =
-            (is_there && !is_of_laws).then_some((self.resolved.max(NO_VALUE) * most).max(first.abs()));
-        let from = begins.and_then(|off| clear(curve, 0.0, off)).unwrap_or(0.0);
+        let from = left.filter(|_| !is_of_laws).unwrap_or(0.0);
         self.zeros(part, event, (from, off), all);
     }
 
@@ -199,8 +197,8 @@ impl EventDetector {
         }
         // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
         let leaves = is_woken || begins || was_still && is_at_zero;
-        let off = (self.resolved.max(NO_VALUE) * most).max(first.abs());
-        let from = if leaves { clear(part.curve, 0.0, off).unwrap_or(0.0).max(LEAVES) } else { 0.0 };
+        let from =
+            if leaves { left(part.curve, first, self.resolved).unwrap_or(0.0).max(LEAVES) } else { 0.0 };
         if leaves {
             *side = sign(part.curve.at(from)[0]);
         }

@@ -7,7 +7,7 @@ use crate::arithmetic::tape::Slot;
 use crate::arithmetic::{Over, Real, Scalar};
 #[cfg(feature = "digits")]
 use crate::dynamics::configuration::{Configuration, Values};
-use crate::dynamics::constraint::{Measure, Posture};
+use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Constants;
 use crate::scene::Decimal;
@@ -19,17 +19,8 @@ impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
         let (z, n) = (self.elements(phi), phi.len());
         let rows = self.constraints.iter().zip(jacobian.chunks_exact_mut(n.max(1)));
         rows.map(|(row, jacobian)| {
-            let measured = match &row.measure {
-                Measure::Angle { body, base } => {
-                    jacobian[*body] += T::ONE;
-                    base.iter().for_each(|&base| jacobian[base] -= T::ONE);
-                    base.map_or(phi[*body], |base| phi[*body] - phi[base])
-                }
-                Measure::Place(place) => {
-                    place.slopes(&z, |k, slope| jacobian[k] += slope);
-                    place.value(&z)
-                }
-            };
+            let measured = row.measure.value(phi, &z);
+            row.measure.slopes(&z, |k, slope| jacobian[k] += slope);
             let phase = row.law.as_ref().map(|law| (T::law_value(law, t), T::phase(law, t).rate));
             let (mut wanted, mut rate) = phase.unwrap_or((T::ZERO, T::ZERO));
             if let Some(aim) = &row.aim {

@@ -19,7 +19,7 @@ impl EventDetector {
         let later = passages.iter().rev().filter(|passage| passage.t > t);
         for Passage { event, rises, t, .. } in later {
             // What has just happened was located to less than the others.
-            if *t > now || !self.memory.last.iter().any(|(last, _)| last == event) {
+            if *t > now || !self.memory.has_happened(*event) {
                 self.memory.sides[*event] = if *rises { -1 } else { 1 };
             }
         }
@@ -28,7 +28,7 @@ impl EventDetector {
         }
         let events = self.of_the_scene() + self.events.len();
         for (event, &side) in before.0.iter().enumerate().take(events).filter(|_| is_begin) {
-            if !self.memory.last.iter().any(|(last, _)| *last == event) {
+            if !self.memory.has_happened(event) {
                 self.memory.sides[event] = side;
             }
         }
@@ -43,9 +43,8 @@ impl EventDetector {
     pub(super) fn put_off(&mut self, later: &[Passage], t: Time, span: f64) {
         let is_now = |passage: &&Passage| (passage.t - t).hi <= SAME * span;
         for Passage { event, rises, .. } in later.iter().take_while(is_now) {
-            let is_done = self.memory.last.iter().any(|(last, _)| last == event);
             let is_event = matches!(self.owner(*event), Owner::Scene(..) | Owner::Outside(_));
-            if is_event && !is_done {
+            if is_event && !self.memory.has_happened(*event) {
                 self.memory.due.push((*event, *rises));
             }
         }
