@@ -1,6 +1,7 @@
 //! Dry friction in many digits: against closed forms in integer arithmetic, runs with other digits and runs in doubles.
 
 use super::common;
+use super::forces_at_points::{SLOPES, on_a_slope};
 use super::friction::{any_scene, rod};
 use super::friction_shared::linkage;
 use super::many_digits::{
@@ -464,6 +465,18 @@ fn compared(text: &str, until: &str) -> Option<Ran> {
     assert_eq!(few.turns.len(), many.turns.len(), "{text}");
     assert!(apart(&many, &plain) < 1e-5, "{:e}\n{text}", apart(&many, &plain));
     Some(many)
+}
+
+/// Friction in hinges that carry the force of a wall, which is a slope in one run and a curve in the other.
+#[test]
+fn a_slope_written_as_a_curve_brakes_hinges_as_the_slope() {
+    let [line, curve] = SLOPES.map(|wall| {
+        ran(&on_a_slope(wall, r#", "friction": {"kinetic": 0.3, "radius": 0.1}"#, ""), "0.8", 30)
+    });
+    for (line, curve) in line.row.bodies.iter().zip(&curve.row.bodies) {
+        line.iter().zip(curve).for_each(|(&line, &curve)| near(&number(line), &number(curve), 26));
+    }
+    assert!(line.impacts > 0 && line.turns.len() == 2 && curve.turns.len() == 2, "{:?}", line.turns);
 }
 
 /// Chains, carts, motors, floors, and linkages with springs, torques, motors, dwells and stops: of those that move in

@@ -41,6 +41,7 @@ mod falling_rod;
 #[cfg(feature = "fit")]
 mod fit;
 mod forces;
+mod forces_at_points;
 mod formulas;
 #[cfg(feature = "digits")]
 mod formulas_in_digits;

@@ -2,10 +2,11 @@
 //! against closed forms.
 
 use super::formulas::{adaptive, run, scene};
-use super::mechanisms::{Kind, scene_with};
+use super::mechanisms::{Dice, Kind, scene_with};
+use super::relations;
 use driftless::Simulation;
 use driftless::run::{MethodId, Outcome, Request};
-use driftless::scene::{Scene, parse_scene};
+use driftless::scene::{Output, Scene, parse_scene};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -385,13 +386,15 @@ fn as_formulas(text: &str, size: f64) -> String {
     scene.to_string()
 }
 
-/// Random mechanisms of all kinds with walls: whoever writes the walls as curves gets the same motion.
+/// Random mechanisms of all kinds with walls, some with dry friction in hinges: whoever writes the walls as curves
+/// gets the same motion, and the same forces in hinges.
 /// `SEEDS=2000 cargo test --test physics -- state_walls::random --nocapture`
 #[test]
 fn random_walls_written_as_curves_are_the_same_walls() {
     let count = std::env::var("SEEDS").ok().and_then(|text| text.parse().ok()).unwrap_or(80);
     let (mut kinds, mut impacts, mut holds, mut worst) = (BTreeMap::new(), 0, 0, 0.0_f64);
     let (mut compared, mut stopped, mut lost) = (0, 0, 0);
+    let (mut sliding, mut loads) = (0, [0; 2]);
     for seed in 0..count {
         let kind = [Kind::Wall, Kind::PlasticWall, Kind::ElasticWall, Kind::TouchingWall][seed as usize % 4];
         let other = Kind::ALL[seed as usize / 4 % Kind::ALL.len()];
@@ -402,6 +405,13 @@ fn random_walls_written_as_curves_are_the_same_walls() {
             let mut scene =
                 parse_scene(text, "random", &[]).unwrap_or_else(|error| panic!("{seed}: {error}\n{text}"));
             (scene.until, scene.every) = (horizon, horizon);
+            let mut dice = Dice::new(seed ^ 0x00f1_1c00);
+            if dice.chance(0.4) {
+                relations::with_friction(&mut scene, &mut dice, made.scales.length);
+            }
+            let hinges = scene.hinges[..scene.own_hinges()].iter();
+            let forces = hinges.flat_map(|hinge| ["fx", "fy"].map(|axis| format!("{}.{axis}", hinge.name)));
+            scene.outputs = forces.map(|name| Output::parse(&name)).collect();
             run(&scene, &adaptive(method, tolerance))
         };
         let method = [MethodId::Dp8, MethodId::Taylor, MethodId::Radau(5)][seed as usize / 3 % 3];
@@ -439,6 +449,19 @@ fn random_walls_written_as_curves_are_the_same_walls() {
             let [one, other] = [&curves, &tight].map(struck);
             assert_eq!(one, other, "{seed} {method} {:?} {:?}\n{}", curves.impacts, tight.impacts, made.text);
         }
+        sliding += usize::from(tight.last.friction > 0.0);
+        let apart = |one: &Outcome| {
+            let pairs = one.last.outputs.iter().zip(&tight.last.outputs);
+            pairs.map(|(one, other)| (one - other).abs() / made.scales.force).fold(0.0_f64, f64::max)
+        };
+        // What rests on friction and walls may share its load in many ways.
+        let rests = tight.last.omega.iter().all(|rate| rate.abs() < 1e-6);
+        if apart(&loose) < 1e-4 && !(rests && tight.friction_count > 0) {
+            let is_held = tight.holds.iter().any(|held| held.until.is_none());
+            loads[usize::from(is_held)] += 1;
+            let (here, most) = (apart(&curves), 10.0 * apart(&loose) + 1e-5);
+            assert!(here < most, "{seed} {method}: forces {here:e} {most:e}\n{}", made.text);
+        }
         let lost = (curves.impact_loss - tight.impact_loss).abs();
         let energy = made.scales.force * made.scales.length;
         assert!(lost < most.sqrt() * energy, "{seed} {method}: {lost:e} J\n{}", made.text);
@@ -451,5 +474,6 @@ fn random_walls_written_as_curves_are_the_same_walls() {
     println!(
         "{compared} compared, {stopped} stopped, {lost} lost; {impacts} impacts, {holds} holds, {worst:.2} of the bound; {kinds:?}"
     );
-    assert!(compared > count * 2 / 3 && impacts > count / 2);
+    println!("{sliding} with friction; forces of {loads:?}, the latter on walls");
+    assert!(compared > count * 2 / 3 && impacts > count / 2 && sliding > 5 && loads[1] > 5);
 }

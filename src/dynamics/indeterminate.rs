@@ -69,7 +69,8 @@ impl Mechanism {
         // Orthonormal lists of joint forces that move nothing, each with its mu and its hinge forces.
         let mut units: Vec<Unit> = Vec::new();
         for mu in self.idle(t, kernel, phi, omega, open) {
-            let hinges = self.transmitted(&kernel.z, &mu, vec![Complex::ZERO; self.bodies.len()]);
+            let at = Posture { phi, z: &kernel.z, omega };
+            let hinges = self.transmitted(t, at, &mu, vec![Complex::ZERO; self.bodies.len()]);
             let mut unit = (self.listed(&hinges, &mu), mu, hinges);
             for _ in 0..2 {
                 for other in &units {

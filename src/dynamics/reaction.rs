@@ -19,15 +19,25 @@ use super::{Mechanism, Time};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 
 impl<C: Real> ConstraintEquation<C> {
-    /// Adds what bodies need against the force of this row with this multiplier.
-    pub(super) fn add_force<T: Over<C>>(&self, z: &[Complex<T>], multiplier: T, needed: &mut [Complex<T>]) {
-        let Some(push) = &self.push else { return };
-        let force = push.direction(z).times(multiplier);
-        if let Some(body) = push.on {
-            needed[body] += force;
+    /// Adds what bodies need against the forces of this row with this multiplier, at a time \[s\].
+    pub(super) fn add_force<T: Over<C>>(
+        &self,
+        time: T,
+        at: Posture<T>,
+        multiplier: T,
+        needed: &mut [Complex<T>],
+    ) {
+        if let Some(push) = &self.push {
+            let force = push.direction(at.z).times(multiplier);
+            if let Some(body) = push.on {
+                needed[body] += force;
+            }
+            if let Some(body) = push.from {
+                needed[body] -= force;
+            }
         }
-        if let Some(body) = push.from {
-            needed[body] -= force;
+        if let Some(points) = self.aim.as_ref().and_then(|aim| aim.at_points.as_ref()) {
+            points.forces(time, at, |body, force| needed[body] += force.times(multiplier));
         }
     }
 }
@@ -87,25 +97,19 @@ impl Mechanism {
         needed: &mut [Complex<f64>],
         forces: &mut Vec<Complex<f64>>,
     ) {
-        self.turn_into_needed(t, Posture { phi, z: &kernel.z, omega }, needed);
+        let at = Posture { phi, z: &kernel.z, omega };
+        self.turn_into_needed(t, at, needed);
         for ((friction, _), &tau) in self.sliding().zip(&kernel.friction) {
-            friction.tangent.add_force(&kernel.z, tau, needed);
+            friction.tangent.add_force(moment(t), at, tau, needed);
         }
         forces.clear();
-        self.transmit(&kernel.z, &kernel.multiplier, needed, forces);
+        self.transmit(t, at, &kernel.multiplier, needed, forces);
     }
 
     /// The force \[N\] that every body needs from its joints and constraints at these accelerations.
-    pub(super) fn needed_forces<T: Real>(
-        &self,
-        t: Time,
-        z: &[Complex<T>],
-        phi: &[T],
-        omega: &[T],
-        alpha: &[T],
-    ) -> Vec<Complex<T>> {
-        let mut needed = self.centre_accelerations(z, omega, alpha);
-        self.turn_into_needed(t, Posture { phi, z, omega }, &mut needed);
+    pub(super) fn needed_forces<T: Real>(&self, t: Time, at: Posture<T>, alpha: &[T]) -> Vec<Complex<T>> {
+        let mut needed = self.centre_accelerations(at.z, at.omega, alpha);
+        self.turn_into_needed(t, at, &mut needed);
         needed
     }
 
@@ -142,27 +146,29 @@ impl Mechanism {
 
     /// The forces of the hinges and welds under which each body gets the force \[N\] it needs, less what rows
     /// with these multipliers push it with.
-    pub(super) fn transmitted<T: Scalar>(
+    pub(super) fn transmitted<T: Real>(
         &self,
-        z: &[Complex<T>],
+        t: Time,
+        at: Posture<T>,
         multipliers: &[T],
         mut needed: Vec<Complex<T>>,
     ) -> Vec<Complex<T>> {
         let mut forces = Vec::with_capacity(self.joints.len());
-        self.transmit(z, multipliers, &mut needed, &mut forces);
+        self.transmit(t, at, multipliers, &mut needed, &mut forces);
         forces
     }
 
     /// Appends them; what each body passes on takes the place of what it needs.
-    fn transmit<T: Scalar>(
+    fn transmit<T: Real>(
         &self,
-        z: &[Complex<T>],
+        t: Time,
+        at: Posture<T>,
         multipliers: &[T],
         carried: &mut [Complex<T>],
         forces: &mut Vec<Complex<T>>,
     ) {
         for (row, &multiplier) in self.constraints.iter().zip(multipliers) {
-            row.add_force(z, multiplier, carried);
+            row.add_force(moment(t), at, multiplier, carried);
         }
         self.pass_on(multipliers, carried, forces);
     }

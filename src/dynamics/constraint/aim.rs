@@ -15,6 +15,7 @@ use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::configuration::{Configuration, Source};
+use crate::dynamics::force::UserForce;
 use std::cell::RefCell;
 
 /// What a formula of time and place asks for.
@@ -49,6 +50,9 @@ pub struct Aim<C = f64> {
     pub angles: Vec<usize>,
     /// True where it depends on time.
     pub is_timed: bool,
+    /// The forces at the points that it asks for, were it a potential energy: where a row acts with a
+    /// multiplier of -1.  By the slopes the motion feels them; joints carry them.
+    pub(in crate::dynamics) at_points: Option<Box<UserForce<C>>>,
 }
 
 impl<C: Real> Aim<C> {
@@ -56,7 +60,7 @@ impl<C: Real> Aim<C> {
     /// where it depends on rates.
     pub(in crate::dynamics) fn record(
         angles: &[usize],
-        formula: impl FnOnce(&Configuration<Symbol, C>) -> Symbol,
+        formula: impl Fn(&Configuration<Symbol, C>) -> Symbol,
     ) -> Option<Self> {
         let recorder = Recorder::<C>::default();
         let (mut coordinates, mut has_rates, mut is_timed) = (Vec::new(), false, false);
@@ -83,6 +87,7 @@ impl<C: Real> Aim<C> {
             slopes: coordinates.into_iter().zip(slots[3..].iter().copied()).collect(),
             angles: angles.to_vec(),
             is_timed,
+            at_points: UserForce::at_points(formula).map(Box::new),
             tape,
             inputs,
         })
@@ -120,6 +125,8 @@ impl Aim {
             slopes: self.slopes.iter().map(|&(k, slope)| (k, at(slope))).collect(),
             angles: self.angles.clone(),
             is_timed: self.is_timed,
+            // Lanes ask for no forces of joints.
+            at_points: None,
             tape,
             inputs,
             numbers,

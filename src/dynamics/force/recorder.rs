@@ -135,6 +135,35 @@ impl UserForce {
 }
 
 impl<C: Real> UserForce<C> {
+    /// Records the forces at points of bodies alone of what has this potential, which may depend on time;
+    /// `None` where it asks for no such point.
+    pub(in crate::dynamics) fn at_points(
+        potential: impl FnOnce(&Configuration<Symbol, C>) -> Symbol,
+    ) -> Option<Self> {
+        let recorder = Recorder::default();
+        let mut pulls = Recorded::default();
+        let [recorded] = Symbol::record(|| {
+            for (number, slope) in potential(&Configuration::new(&recorder)).gradient() {
+                let input = recorder.inputs.borrow()[number as usize];
+                if matches!(input, Input::X(_) | Input::Y(_)) {
+                    pulls.add(&recorder, input, -slope);
+                }
+            }
+            [pulls.symbols()]
+        });
+        let of_forces = |part: Part| Self {
+            name: String::new(),
+            may_be_flat: part.tape.may_be_flat(),
+            parts: [part, Part::default()],
+            span: None,
+            potential: None,
+            inputs: recorder.inputs.into_inner(),
+            sites: recorder.sites.into_inner(),
+            numbers: recorder.numbers.into_inner(),
+        };
+        (!pulls.forces.is_empty()).then(|| of_forces(pulls.part(recorded)))
+    }
+
     /// Records what has this potential, and applies this beside.
     ///
     /// # Errors

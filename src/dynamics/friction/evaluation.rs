@@ -1,6 +1,7 @@
 //! Friction in an evaluation of the equations: the forces of what slides, and the normal forces.
 
 use super::super::constraint::Posture;
+use super::super::energy::moment;
 use super::super::kernel::{Kernel, dot};
 use super::super::{Mechanism, Time, tree};
 use super::{Friction, Mode, Normal, forces, size};
@@ -31,13 +32,13 @@ impl<T: Real> Kernel<T> {
         for ((friction, _), row) in sliding.iter().zip(self.friction_rows.chunks_exact_mut(n)) {
             friction.tangent.differentiate(t, at, row);
         }
-        let needed = mechanism.needed_forces(t, &self.z, phi, omega, &self.load);
-        let carried = mechanism.transmitted(&self.z, &self.multiplier, needed);
+        let needed = mechanism.needed_forces(t, at, &self.load);
+        let carried = mechanism.transmitted(t, at, &self.multiplier, needed);
         let start: Vec<Complex<T>> = (sliding.iter())
             .map(|(friction, _)| mechanism.normal_force(friction, &self.multiplier, &carried))
             .collect();
         let responses: Vec<Response<T>> =
-            (0..sliding.len()).map(|j| self.response(mechanism, &sliding, j)).collect();
+            (0..sliding.len()).map(|j| self.response(mechanism, t, at, &sliding, j)).collect();
         let places: Vec<(Normal, T)> =
             (sliding.iter()).map(|&(friction, coefficient)| (friction.normal, T::of(coefficient))).collect();
         self.regularity = forces(&places, &start, |j, k| responses[k].normal[j], &mut self.friction);
@@ -52,7 +53,14 @@ impl<T: Real> Kernel<T> {
     }
 
     /// What a unit of tau at the j-th place that slides does to accelerations, multipliers and normal forces.
-    fn response(&self, mechanism: &Mechanism, sliding: &[(&Friction, f64)], j: usize) -> Response<T> {
+    fn response(
+        &self,
+        mechanism: &Mechanism,
+        t: Time,
+        at: Posture<T>,
+        sliding: &[(&Friction, f64)],
+        j: usize,
+    ) -> Response<T> {
         let (n, rows) = (self.z.len(), mechanism.constraints.len());
         let mut acceleration: Vec<T> = self.friction_rows[j * n..(j + 1) * n].iter().map(|&d| -d).collect();
         tree::solve::<T, 0>(n, &self.mass, &self.pivot, &mut acceleration);
@@ -65,8 +73,8 @@ impl<T: Real> Kernel<T> {
             }
         }
         let mut needed = mechanism.inertia_forces(&self.z, &acceleration);
-        sliding[j].0.tangent.add_force(&self.z, T::ONE, &mut needed);
-        let carried = mechanism.transmitted(&self.z, &multiplier, needed);
+        sliding[j].0.tangent.add_force(moment(t), at, T::ONE, &mut needed);
+        let carried = mechanism.transmitted(t, at, &multiplier, needed);
         let normal = (sliding.iter())
             .map(|(friction, _)| mechanism.normal_force(friction, &multiplier, &carried))
             .collect();
@@ -77,11 +85,12 @@ impl<T: Real> Kernel<T> {
     /// normal forces \[N\] of all places; zeros for those that are open.  After
     /// [`accelerate`](Kernel::accelerate).
     pub fn friction_forces(&self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> Vec<[T; 2]> {
-        let mut needed = mechanism.needed_forces(t, &self.z, phi, omega, &self.load);
+        let at = Posture { phi, z: &self.z, omega };
+        let mut needed = mechanism.needed_forces(t, at, &self.load);
         for ((friction, _), &tau) in mechanism.sliding().zip(&self.friction) {
-            friction.tangent.add_force(&self.z, tau, &mut needed);
+            friction.tangent.add_force(moment(t), at, tau, &mut needed);
         }
-        let carried = mechanism.transmitted(&self.z, &self.multiplier, needed);
+        let carried = mechanism.transmitted(t, at, &self.multiplier, needed);
         let mut slid = self.friction.iter();
         let mut stuck = self.multiplier[mechanism.constraints.len() - mechanism.sticking()..].iter();
         (mechanism.frictions.iter().zip(&mechanism.modes))

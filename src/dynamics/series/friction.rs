@@ -24,13 +24,16 @@
 //! [`Series::pressing`] tells where.  From there on n of a rail is turned, and N of a joint begins at zero:
 //! what rounding has left of it has no direction.
 
+mod at_points;
 mod told;
 
+use self::at_points::PointForces;
 pub use self::told::Slides;
 use super::Series;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::copy;
 use super::rows::{RowSeries, turning_terms};
+use super::user::At;
 use crate::arithmetic::{Complex, Over, Real};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Body;
@@ -54,6 +57,8 @@ pub struct FrictionSeries<T: SeriesNumber> {
     centres: Vec<Point<T::Constant>>,
     /// Forces applied to every body at the present power \[N/s^m\].
     pub applied: Vec<Complex<T>>,
+    /// What rows push points with.
+    at_points: PointForces<T>,
     /// N of place j by tau of place k.
     response: Vec<Complex<T>>,
     /// R and u of the present power before tau is in them.
@@ -139,6 +144,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             stuck,
             centres: known.bodies.iter().enumerate().map(centre).collect(),
             applied: vec![Complex::ZERO; mechanism.bodies.len()],
+            at_points: PointForces::new(terms, order),
             response: vec![Complex::ZERO; f * f],
             rest: vec![Complex::ZERO; n],
             bend: vec![Complex::ZERO; n],
@@ -217,6 +223,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         for place in &self.places {
             add(&place.friction.tangent.push, &|l| place.force[l]);
         }
+        self.at_points.add(terms, m, rows, &mut needed);
         let mut carried = Vec::with_capacity(mechanism.joints.len());
         mechanism.pass_on(rows.multipliers(m), &mut needed, &mut carried);
         let normal = |friction: &Friction<T::Constant>| {
@@ -358,6 +365,8 @@ impl<T: SeriesNumber> Series<T> {
             place.size.push(T::ZERO);
             place.normal.push(Complex::ZERO);
         }
+        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        friction.at_points.advance(terms, m, at, &self.factors.scale);
         self.solve::<0>(terms, m);
         if f > 0 {
             self.find_forces(terms, m, &mut friction);

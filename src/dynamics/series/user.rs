@@ -89,6 +89,15 @@ impl<T: SeriesNumber> UserSeries<T> {
         self.0.iter().all(Powers::is_sound)
     }
 
+    /// Finds power m of its forces and torques.
+    #[inline(always)]
+    pub fn advance(&mut self, force: &UserForce<T::Constant>, m: usize, at: At<T>, scale: &Scale<T>) {
+        for (part, series) in force.parts.iter().zip(&mut self.0) {
+            let input = |number: u32| at.power(force, force.inputs[number as usize], m);
+            series.advance(&part.tape, m, scale, input);
+        }
+    }
+
     /// Takes power m of the forces off the elements' balance, and adds that of torques to `load`.
     #[inline(always)]
     pub fn act(
@@ -99,9 +108,8 @@ impl<T: SeriesNumber> UserSeries<T> {
         (rest, load): (&mut [Complex<T>], &mut [T]),
         scale: &Scale<T>,
     ) {
-        for (part, series) in force.parts.iter().zip(&mut self.0) {
-            let input = |number: u32| at.power(force, force.inputs[number as usize], m);
-            series.advance(&part.tape, m, scale, input);
+        self.advance(force, m, at, scale);
+        for (part, series) in force.parts.iter().zip(&self.0) {
             for &(site, [x, y]) in &part.forces {
                 force.sites[site]
                     .point
