@@ -173,3 +173,29 @@ fn a_number_that_does_nothing_to_the_data_is_refused() {
     assert!(error.contains("the data do not depend on bars.bar1.density"), "{error}");
     assert_eq!(refusal("bars.bar2.length"), Ok(()));
 }
+
+/// What an event has switched, or set, is not told by the place where the next part begins.
+#[test]
+fn what_events_switch_or_set_is_refused_in_segments_and_fitted_whole() {
+    for does in [r#""off": ["push"]"#, r#""set": {"k": 0}"#] {
+        let text = std::fs::read_to_string("examples/scenes/free.json").expect("a shipped scene").replacen(
+            '{',
+            &format!(
+                r#"{{"parameters": {{"k": 2}}, "torques": [{{"name": "push", "body": "bar1", "torque": "k"}}],
+                "events": [{{"name": "e", "when": "t - 0.3", {does}}}],"#
+            ),
+            1,
+        );
+        let known = |set: &[&str]| {
+            let set: Vec<_> = set.iter().map(|set| set.parse().expect("an override")).collect();
+            Template::new(text.clone(), "scene.json".into(), &set)
+        };
+        let data = data(&known(&[]), 1.0, 0.02, 0.0, 1);
+        let guess = known(&["parameters.k=2.1"]);
+        let request = |segments| FitRequest { vary: vec!["k".into()], segments, ..FitRequest::default() };
+        let refused = fit(&guess, &data, &request(2), &mut || false).map(|_| ()).expect_err("no fit");
+        assert!(refused.to_string().contains("switched or set by events"), "{refused}");
+        let found = fit(&guess, &data, &request(1), &mut || false).expect("a fit");
+        assert!((found.numbers[0].value - 2.0).abs() < 1e-9, "{:?}", found.numbers);
+    }
+}

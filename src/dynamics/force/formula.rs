@@ -139,6 +139,11 @@ pub(crate) struct FormulaEvent<C = f64> {
 }
 
 impl<C> FormulaEvent<C> {
+    /// True where other parts, or numbers, act from then on.
+    pub fn changes_what_acts(&self) -> bool {
+        !self.on.is_empty() || !self.off.is_empty() || !self.set.is_empty()
+    }
+
     /// The parameters it sets, by number.
     pub fn parameters(&self) -> impl Iterator<Item = usize> {
         self.set.iter().map(|(number, _)| *number)

@@ -102,8 +102,8 @@ impl Mechanism {
         Room::new(self, at, contacts, &others)
     }
 
-    /// Relative velocities of all places, zero of those at closed contacts that are held there: the speed with
-    /// which a point has come to its wall, and moves along it as well, is taken off.
+    /// Relative velocities of all places, zero of those that closed contacts hold: the speed with which a point
+    /// has come to its wall, and with it other places move, is taken off.
     pub(super) fn rates_beside(
         &self,
         evidence: &dyn Evidence,
@@ -113,8 +113,9 @@ impl Mechanism {
     ) -> Vec<f64> {
         let mut rates = rates.to_vec();
         let may_stand = |(number, rate): (usize, &f64)| match self.frictions[number].normal {
-            Normal::Contact(contact) if closed.contains(&contact) && *rate != 0.0 => Some(number),
-            _ => None,
+            _ if closed.is_empty() || *rate == 0.0 => None,
+            Normal::Contact(contact) if !closed.contains(&contact) => None,
+            _ => Some(number),
         };
         let may_stand: Vec<usize> = rates.iter().enumerate().filter_map(may_stand).collect();
         if may_stand.is_empty() {

@@ -219,7 +219,8 @@ impl<'a> Problem<'a> {
         let from = state.map(|state| (part.span[0], state));
         let times = &self.times[part.rows.clone()];
         let mut pause = self.pause.borrow_mut();
-        pass(study, from, &directions, (times, part.span[1]), &mut **pause)
+        let is_one_of_several = self.parts.len() > 1;
+        pass(study, from, &directions, (times, part.span[1]), is_one_of_several, &mut **pause)
     }
 
     /// Residuals of the rows of a part, with their slopes by the numbers and by its state.

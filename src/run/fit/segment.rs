@@ -41,7 +41,8 @@ pub(super) struct Passed {
 }
 
 /// Integrates from `from` (time and state; from the scene's start where there is none) to `until` \[s\],
-/// looking at `times`, with columns for the numbers of a study and then for these directions of the start.
+/// looking at `times`, with columns for the numbers of a study and then for these directions of the start; one of
+/// several parts is to leave nothing but a state.
 ///
 /// # Errors
 /// Why there is no such motion, or no derivatives.
@@ -50,6 +51,7 @@ pub(super) fn pass(
     from: Option<(f64, &Place)>,
     directions: &[Vec<f64>],
     (times, until): (&[f64], f64),
+    is_one_of_several: bool,
     pause: &mut Pause,
 ) -> Result<Passed, Lost> {
     let mut plan = study.plan.clone();
@@ -89,14 +91,14 @@ pub(super) fn pass(
     if let Some(lost) = variation.lost {
         return Err(lost.into());
     }
-    let is_part = from.is_some() || !directions.is_empty();
+    let events = study.mechanism.laws.iter().flat_map(|laws| &laws.formulas.events);
+    let mut changes = events.filter(|event| event.changes_what_acts());
     let is_known = variation.mechanism.frictions.is_empty()
         && variation.mechanism.held.is_empty()
-        && !variation.set.is_set.contains(&true);
-    if is_part && !is_known {
-        return Err(
-            "what sticks, rests on a wall or is set by events does not go on from a place alone".into()
-        );
+        && !changes.any(|event| outcome.events.iter().any(|happened| happened.name == event.name));
+    if is_one_of_several && !is_known {
+        let what = "what sticks, rests on a wall, or is switched or set by events, does not go on from a place alone: leave --segments out";
+        return Err(what.into());
     }
     let end = sampler.end.ok_or("the motion ends before the data")?;
     let place = [

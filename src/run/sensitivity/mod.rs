@@ -11,7 +11,7 @@
 //! ```text
 //! dy/dp = Y_x δ + Y_p       of an output Y(t, x; p)       δ  the column of p
 //! dt/dp = -(g_x δ + g_p)/g'  of the time of g = 0          extremes: as of an output at their own time, which counts
-//!                                                           only where an event has ended the run: dy/dp + y' dt/dp
+//!                                                           at corners, jumps and the end of a run: dy/dp + y' dt/dp
 //! ```
 
 mod collocation;
@@ -61,6 +61,8 @@ struct Asked {
     output: Option<usize>,
     /// When it is taken \[s\], where that is known, or why never.
     t: Result<f64, String>,
+    /// Its value, of an extreme: on which side of a jump that is.
+    value: f64,
     /// The bar that turns over, or the event, by number.
     number: usize,
     /// True where an extreme is taken as the run ends, and the event that ends it.
@@ -200,7 +202,8 @@ impl Study {
                 position(&known, name, "wall")?;
             }
             let t = Ok(self.plan.until);
-            Ok(Asked { measure: measure.clone(), output, t, number, is_end: false, ended_by: None })
+            let value = f64::NAN;
+            Ok(Asked { measure: measure.clone(), output, t, value, number, is_end: false, ended_by: None })
         };
         request.of.iter().map(asked).collect()
     }
@@ -238,8 +241,12 @@ impl Study {
             let extreme = asked.output.and_then(|output| extremes.get(output));
             let nothing = |what: &str| format!("{what} up to {} s", self.plan.until);
             asked.t = match &asked.measure {
-                Measure::Max(_) => extreme.map(|found| found.max[1]).ok_or_else(|| nothing("no extreme")),
-                Measure::Min(_) => extreme.map(|found| found.min[1]).ok_or_else(|| nothing("no extreme")),
+                Measure::Max(_) | Measure::Min(_) => {
+                    let is_max = matches!(asked.measure, Measure::Max(_));
+                    let found = extreme.map(|found| if is_max { found.max } else { found.min });
+                    asked.value = found.map_or(f64::NAN, |[value, _]| value);
+                    found.map(|[_, t]| t).ok_or_else(|| nothing("no extreme"))
+                }
                 Measure::Flip => match driver.flips.as_ref().and_then(|flips| flips.flip) {
                     Some(flip) => {
                         asked.number = flip.bar;
@@ -374,8 +381,16 @@ fn taken(
         let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
         return Ok((t, t, slopes));
     };
-    let Derived { values, slopes, rates } = &at.derived;
     let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
+    if let Some((behind, late)) = at.behind.as_ref().filter(|_| is_extreme) {
+        // At a jump or a corner, whose time moves: on the side that has the extreme.
+        let off = |side: &Derived| (side.values[output] - asked.value).abs();
+        let Derived { values, slopes, rates } =
+            if off(behind) < off(&at.derived) { behind } else { &at.derived };
+        let slopes = slopes[output].iter().zip(late).map(|(slope, late)| slope + rates[output] * late);
+        return Ok((t, values[output], slopes.collect()));
+    }
+    let Derived { values, slopes, rates } = &at.derived;
     let is_end = asked.is_end || t == 0.0;
     let size = values[output].abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
     if is_extreme && !is_end && rates[output].abs() > CORNER * size {

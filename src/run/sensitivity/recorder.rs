@@ -2,12 +2,14 @@
 
 use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
 use super::{Asked, Look, Variation};
-use crate::dynamics::Motion;
+use crate::dynamics::{Motion, Time};
 
 /// What was seen at one time.
 pub(super) struct Seen {
     pub t: f64,
     pub derived: Derived,
+    /// The same behind what happens at that time, and how that time moves.
+    pub behind: Option<(Derived, Vec<f64>)>,
     /// Derivatives of times, by the number of their measure.
     pub times: Vec<(usize, Vec<f64>)>,
 }
@@ -43,6 +45,14 @@ impl Look for Recorder<'_> {
                 _ => {}
             }
         }
-        self.seen.push(Seen { t: time, derived: outputs(variation, motion), times });
+        self.seen.push(Seen { t: time, derived: outputs(variation, motion), behind: None, times });
+    }
+
+    fn crossed(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        let is_moved = |(at, late): (Time, Vec<f64>)| (at.hi == time).then_some(late);
+        let Some(seen) = self.seen.last_mut().filter(|seen| seen.t == time) else { return };
+        if let Some(late) = variation.moment.clone().and_then(is_moved) {
+            seen.behind = Some((outputs(variation, motion), late));
+        }
     }
 }

@@ -99,6 +99,9 @@ pub(in crate::run) trait Look {
     /// At such a time.
     fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64);
 
+    /// Behind an impact, an event or a transition, of which [`Look::at`] shows the near side.
+    fn crossed(&mut self, _variation: &mut Variation, _motion: &Motion, _time: f64) {}
+
     /// At the end of every step.
     fn stepped(&mut self, _variation: &mut Variation, _motion: &Motion, _time: f64) {}
 }
@@ -340,8 +343,8 @@ impl Variation {
         self.lost.get_or_insert_with(|| format!("{why}, at t = {} s", self.now));
     }
 
-    /// Takes what happened since the last step.
-    fn catch_up(&mut self) {
+    /// Takes what happened since the last step; true where anything did.
+    fn catch_up(&mut self) -> bool {
         let jumps = self.jumps.take();
         for jumps in jumps.chunk_by(|one, other| one.before.time == other.before.time) {
             if self.lost.is_none()
@@ -350,6 +353,7 @@ impl Variation {
                 self.lose(&why);
             }
         }
+        !jumps.is_empty()
     }
 }
 
@@ -369,9 +373,12 @@ struct Beside<'a, 'b> {
 impl Observer for Beside<'_, '_> {
     fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
         let Self { variation, look, until } = self;
-        variation.catch_up();
+        let has_crossed = variation.catch_up();
         let (begin, end) = (step.begin(), step.end().min(*until));
         variation.now = begin;
+        if has_crossed && variation.lost.is_none() {
+            look.crossed(variation, step.at(begin), begin);
+        }
         while let Some(time) = look.next().filter(|&time| time <= end) {
             if variation.lost.is_some() || !variation.advance(step, time) {
                 return ControlFlow::Break(());
