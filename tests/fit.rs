@@ -172,6 +172,12 @@ fn a_number_that_does_nothing_to_the_data_is_refused() {
     let error = refusal("bars.bar1.density").expect_err("no fit");
     assert!(error.contains("the data do not depend on bars.bar1.density"), "{error}");
     assert_eq!(refusal("bars.bar2.length"), Ok(()));
+    // Nor does it carry the search away beside a number whose guess is not right yet.
+    let vary = ["bars.bar1.density", "bars.bar2.length"].map(str::to_owned).to_vec();
+    let guess = self::template("motor", &["bars.bar2.length=0.9"]);
+    let error = fit(&guess, &data, &FitRequest { vary, ..FitRequest::default() }, &mut || false);
+    let error = error.map(|_| ()).expect_err("no fit").to_string();
+    assert!(error.contains("the data do not depend on bars.bar1.density"), "{error}");
 }
 
 /// What an event has switched, or set, is not told by the place where the next part begins.

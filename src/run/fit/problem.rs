@@ -329,7 +329,7 @@ impl<'a> Problem<'a> {
         match &self.found {
             Err(Lost::Interrupted) => return Err(Lost::Interrupted),
             Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}").into()),
-            Ok(_) => {}
+            Ok(found) => self.acting(columns, &found.jacobian)?,
         }
         let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
         let (mut problem, report) = search.minimize(self);
@@ -380,18 +380,23 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
+    /// Refuses a number that does nothing to the columns: no step of it is too large for the search.
+    fn acting(&self, columns: &[FittedColumn], jacobian: &DMatrix<f64>) -> Result<(), Lost> {
+        let most = |column: &FittedColumn| {
+            column.measured.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs())) / column.sigma
+        };
+        let size = columns.iter().map(most).fold(0.0, f64::max);
+        let mut idle = (0..self.variables.len()).filter(|&k| jacobian.column(k).amax() < NOTHING * size);
+        let error = |k: usize| Err(format!("the data do not depend on {}", self.variables[k].path).into());
+        idle.next().map_or(Ok(()), error)
+    }
+
     /// The covariance of the numbers at the minimum.
     pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, Lost> {
         self.take(columns);
         let jacobian = self.evaluate()?.jacobian;
         let count = self.variables.len();
-        let most = |column: &FittedColumn| {
-            column.measured.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs())) / column.sigma
-        };
-        let size = columns.iter().map(most).fold(0.0, f64::max);
-        if let Some(k) = (0..count).find(|&k| jacobian.column(k).amax() < NOTHING * size) {
-            return Err(format!("the data do not depend on {}", self.variables[k].path).into());
-        }
+        self.acting(columns, &jacobian)?;
         let svd = jacobian.svd(false, true);
         let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
         let least = f64::EPSILON * values.amax() * values.len() as f64;
