@@ -85,6 +85,21 @@ fn an_oscillator_loses_the_same_amplitude_every_half_turn_and_sticks() {
     }
 }
 
+/// A disc on a shaft that turns at 0.5 rad/s, held back by a torsion spring, without weight: it begins to slide with
+/// no force to tell which way, and swings by 0.5 sin(w t)/w.
+#[test]
+fn without_a_load_there_is_no_friction() {
+    let text = std::fs::read_to_string("examples/scenes/stick_slip.json").expect("a shipped scene");
+    let text = text.replace(r#""until": 12"#, r#""until": 1.7"#);
+    for gravity in ["0", "-1e-30", "-1e-9"] {
+        for outcome in runs(&text.replace("-9.81", gravity)) {
+            let w = 10.0_f64.sqrt();
+            near(outcome.last.phi[1], 0.5 * (w * 1.7).sin() / w, "angle");
+            assert!(outcome.last.friction < 1e-8 && outcome.friction_count <= 2, "{:?}", outcome.frictions);
+        }
+    }
+}
+
 #[test]
 fn a_block_on_a_slope_stays_up_to_the_angle_of_friction() {
     let friction = r#"{"kinetic": 0.3, "static": 0.4}"#;

@@ -137,6 +137,16 @@ fn a_block_on_a_spring_loses_the_same_amplitude_every_half_period_and_sticks() {
     }
 }
 
+/// A disc on a shaft that turns at 0.5 rad/s, held back by a torsion spring, without weight: 0.5 sin(w t)/w.
+#[test]
+fn without_a_load_there_is_no_friction() {
+    let text = shipped("stick_slip").replace("-9.81", "0");
+    let found = ran(&text, "1.7", 30);
+    let w = root(&fixed("10"));
+    near(&number(found.row.bodies[1][0]), &(over(&sine(&times(&w, &fixed("1.7"))), &w) / 2), 27);
+    found.lost(&fixed("0"), 30);
+}
+
 /// The hinge carries 19.62 N at 0.05 m, which holds 0.2943 N m: loose at 0.73575 s, against 0.1962 N m from then on.
 #[test]
 fn a_disc_breaks_loose_where_the_torque_is_what_friction_holds() {

@@ -22,6 +22,10 @@ const KEPT: usize = 1000;
 /// Velocity over the sum of the magnitudes of its parts and the mechanism's own up to which what others hold
 /// rests: they may begin to move it.
 const AT_REST: f64 = 1e-11;
+/// A moment, over the mechanism's own time.
+const A_MOMENT: f64 = 1e-6;
+/// How many times a force is to grow within it for its sign to count as that of rounding.
+const NO_FORCE: f64 = 100.0;
 /// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
 const REGULAR: f64 = 0.3;
 
@@ -142,17 +146,33 @@ impl FrictionWatch {
         values
     }
 
+    /// The force by which a place that sticks breaks loose; where it has none, as without a load, that of a
+    /// moment later.
+    fn breaking_force(&self, place: usize, motion: &Motion) -> f64 {
+        let mechanism = &*self.mechanism;
+        let kernel = &mut *self.kernel.borrow_mut();
+        let mut force = |time: Time, phi: &[f64], omega: &[f64]| {
+            kernel.accelerate::<0>(mechanism, time, phi, omega, Bias::default());
+            (kernel.friction_forces(mechanism, time, phi, omega)[place][0], kernel.load.clone())
+        };
+        let mut phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+        let mut omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let (now, accelerations) = force(motion.time, &phi, &omega);
+        let h = A_MOMENT * mechanism.units.time;
+        for ((phi, omega), acceleration) in phi.iter_mut().zip(&mut omega).zip(accelerations) {
+            *phi += h * (*omega + 0.5 * h * acceleration);
+            *omega += h * acceleration;
+        }
+        let (later, _) = force(motion.time + h, &phi, &omega);
+        if later.abs() > NO_FORCE * now.abs() { later } else { now }
+    }
+
     /// What happens to the modes at the zero of a function, at a motion.
     fn transition(&self, function: usize, motion: &Motion) -> Option<Transition> {
         let mode = self.mechanism.modes.get(function)?;
         Some(match mode {
             Mode::Stick(_) => {
-                self.values(motion);
-                let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-                let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
-                let kernel = self.kernel.borrow();
-                let forces = kernel.friction_forces(&self.mechanism, motion.time, &phi, &omega);
-                let sign = if forces[function][0] < 0.0 { -1.0 } else { 1.0 };
+                let sign = if self.breaking_force(function, motion) < 0.0 { -1.0 } else { 1.0 };
                 Transition { arrived: None, breaks: Some((function, sign)) }
             }
             // It moves already.

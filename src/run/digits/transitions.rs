@@ -15,7 +15,7 @@ use super::motion::Motion;
 use super::touch::{self, Passage};
 use super::wall::{Ends, in_shares, refined};
 use crate::arithmetic::digits::Digits;
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::friction::{Mode, Normal, Transition};
 use crate::stepping::search::{Curve, Powers};
 use crate::stepping::{Cause, StepError};
@@ -75,10 +75,7 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                 row += 1;
                 let (grip, unit) = grip(friction.stiction, friction.normal, normals, &tau, step);
                 if let Some(time) = passes(motion, &grip, unit, step) {
-                    let limbs = motion.precision.limbs;
-                    let at = |sum: Digits<W>, power: &Digits<W>| (sum * time).shortened(limbs) + *power;
-                    let force = tau.iter().rev().fold(Digits::ZERO, at);
-                    comes(ModeChange::Breaks(place, if force < Digits::ZERO { -1.0 } else { 1.0 }), time);
+                    comes(ModeChange::Breaks(place, side(motion, &tau, time, step)), time);
                 }
             }
         }
@@ -130,6 +127,20 @@ fn reverses<const W: usize>(
         return Err(motion.stop(Cause::Friction, 0.0, &what, hint));
     }
     Ok(time)
+}
+
+/// The sign of the force by which a place breaks loose; where there is none, as without a load, that of a moment
+/// later.
+fn side<const W: usize>(motion: &Motion<W>, tau: &[Digits<W>], time: Digits<W>, step: f64) -> f64 {
+    let limbs = motion.precision.limbs;
+    let at = |sum: Digits<W>, power: &Digits<W>| (sum * time).shortened(limbs) + *power;
+    let force = tau.iter().rev().fold(Digits::ZERO, at);
+    let unit = weight(tau, step).max(f64::MIN_POSITIVE);
+    let is_there = force.log2() - libm::log2(unit) > motion.precision.rounding(SURE);
+    let later =
+        || Powers { powers: &in_shares(tau, 1.0 / unit, step), end: 1.0 }.at(time.value() / step + LEAVES)[0];
+    let is_negative = if is_there { force < Digits::ZERO } else { later() < 0.0 };
+    if is_negative { -1.0 } else { 1.0 }
 }
 
 /// The sign of a velocity that begins at zero, where it leaves it within a step.
