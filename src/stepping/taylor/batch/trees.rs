@@ -394,4 +394,12 @@ impl Team for TreeTeam {
         }
         (self.start(lane, body) + angle * after, rate)
     }
+
+    fn start_of(&self, lane: usize, coordinate: usize) -> Option<f64> {
+        Some(self.before[coordinate].0[lane])
+    }
+
+    fn power_of(&self, lane: usize, coordinate: usize, k: usize) -> f64 {
+        self.series.rates()[k * self.coordinates + coordinate].0[lane]
+    }
 }
