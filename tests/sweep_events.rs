@@ -1,4 +1,5 @@
-//! Sweeps of scenes whose events end points, with outputs: points in lanes against single runs and closed forms.
+//! Sweeps of scenes whose events end points, with outputs and with walls beside bodies that float: points in
+//! lanes against single runs and closed forms.
 
 use crate::mechanisms::{Kind, scene as random_scene, scene_with};
 use crate::sweep::points;
@@ -122,6 +123,40 @@ fn lanes_alone_refuse_what_an_event_ends() {
     assert_eq!((stopped, members[0].state.time), (Some(Cause::Unsuited), Time::from(0.0)));
 }
 
+/// A plate that is thrown and bounces on a floor below its centre of mass; its spin has no say.
+#[test]
+fn what_floats_bounces_as_in_the_closed_form() {
+    let text = r#"{"name": "ball", "gravity": [0, -10],
+        "bars": [{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 1}],
+        "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0.8,
+            "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "outputs": ["ball.y", "floor.gap"],
+        "start": {"ball": {"phi": 0, "omega": 3, "origin": [0, 1], "velocity": [0.5, 2]}},
+        "until": 3, "every": 3}"#;
+    let template = Template::new(text.into(), "ball".into(), &[]);
+    let plan = planned(&template, "start.ball.velocity[1]=-1..4:12", &by_taylor(3.0, 1e-12));
+    assert!(Batch::takes_alike(plan.mechanism()));
+    for point in points(&plan, 1) {
+        let (mut y, mut vy, mut left, mut most): (f64, f64, f64, f64) = (1.0, point.values[0], 3.0, 1.0);
+        loop {
+            let way = (vy + (vy * vy + 20.0 * y).sqrt()) / 10.0;
+            most = most.max(if vy > 0.0 && vy < 10.0 * left { y + vy * vy / 20.0 } else { y });
+            if way > left {
+                break;
+            }
+            (y, vy, left) = (0.0, 0.8 * (10.0 * way - vy), left - way);
+        }
+        let exact = [0.5 * 3.0, y + vy * left - 5.0 * left * left];
+        for (found, exact) in point.phi[1..].iter().zip(exact) {
+            assert!((found - exact).abs() < 1e-11, "{point:?}: {exact}");
+        }
+        assert!((point.omega[2] - (vy - 10.0 * left)).abs() < 1e-11, "{point:?}");
+        let [height, gap] = [point.extremes[0], point.extremes[1]];
+        assert!(height[0].abs() < 1e-12 && (height[1] - most).abs() < 1e-12, "{point:?}: {most}");
+        assert!(gap.iter().zip(height).all(|(a, b)| (a - b).abs() < 1e-12), "{point:?}");
+    }
+}
+
 /// A random scene with outputs, and in every other one an event that ends it on the way; how long it is
 /// looked at \[s\], and what kinds of parts it has.
 fn random(seed: u64) -> Option<(Template, f64, Vec<Kind>)> {
@@ -194,4 +229,5 @@ fn random_scenes_with_outputs_and_ends_agree_with_single_runs() {
         10 * whole < scenes && scenes > 20 && ended > 10 && impacts > 5 && seen.len() > 25,
         "{scenes} {ended} {impacts}"
     );
+    assert!(seen.contains_key("floats true walls true"), "{seen:?}");
 }

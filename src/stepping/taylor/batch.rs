@@ -188,8 +188,7 @@ impl Batch {
     /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off their
     /// axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls, all by
     /// smooth formulas or without, and no friction; and the same with closed loops, sliders, gears and cams,
-    /// their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).  Bodies that float
-    /// have no walls beside them.
+    /// their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         !mechanism.has_stops() && Self::takes_alike_with_stops(mechanism)
     }

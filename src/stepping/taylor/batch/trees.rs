@@ -68,7 +68,6 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.contacts.iter().all(clearance::takes)
         && mechanism.frictions.is_empty()
         && mechanism.vibration.is_none()
-        && (mechanism.coordinates() == mechanism.bodies.len() || mechanism.contacts.is_empty())
         && (is_tree(mechanism) || is_looped(mechanism))
 }
 
@@ -303,7 +302,7 @@ impl Team for TreeTeam {
         }
         let length = wanted.min(slot.left);
         let step = StepFrom { lane, time: slot.time, order, length };
-        match self.clearance.of(self.mechanism.bodies.len(), &*self.series, step) {
+        match self.clearance.of(&self.mechanism, &*self.series, step) {
             Some(clear) if clear < length => clear,
             Some(_) => wanted,
             None => {
