@@ -10,7 +10,7 @@ pub(super) struct Interior {
     /// False until something is asked about a step.
     is_known: bool,
     /// Coordinates at the start \[rad, m\]; powers of their rates, and of the ways gone over the time that
-    /// has passed, power by power; empty where they are no polynomials.
+    /// has passed, coordinate by coordinate; no coordinates where they are no polynomials.
     start: Vec<f64>,
     rates: Vec<f64>,
     ways: Vec<f64>,
@@ -51,17 +51,18 @@ impl Interior {
         if f == 0 {
             team.inside(step.order, step.lane, after, member.mechanism, state);
         } else {
-            let (places, ends) = state.y.split_at_mut(f);
-            let ends = &mut ends[..f];
-            places.fill(0.0);
-            ends.fill(0.0);
-            for (rates, ways) in rates.chunks_exact(f).zip(ways.chunks_exact(f)).rev() {
-                for c in 0..f {
-                    ends[c] = ends[c] * after + rates[c];
-                    places[c] = places[c] * after + ways[c];
+            let count = step.order + 1;
+            for c in 0..f {
+                let (rates, ways) = (&rates[c * count..(c + 1) * count], &ways[c * count..(c + 1) * count]);
+                let (mut rate, mut way, mut k) = (0.0, 0.0, count);
+                // Without iterators, which not every build puts in line.
+                while k > 0 {
+                    k -= 1;
+                    rate = rate * after + rates[k];
+                    way = way * after + ways[k];
                 }
+                (state.y[c], state.y[f + c]) = (start[c] + way * after, rate);
             }
-            places.iter_mut().zip(start).for_each(|(place, start)| *place = *start + *place * after);
         }
         state.time = step.from + after;
         state.wrap();
@@ -104,7 +105,8 @@ impl Interior {
             start.push(place);
             for k in 0..=order {
                 let power = team.power_of(lane, c, k);
-                (rates[k * f + c], ways[k * f + c]) = (power, power / (k + 1) as f64);
+                let at = c * (order + 1) + k;
+                (rates[at], ways[at]) = (power, power / (k + 1) as f64);
             }
         }
     }
