@@ -43,7 +43,9 @@ mod resume;
 mod stress;
 mod sweep;
 mod sweep_couplings;
+mod sweep_events;
 mod sweep_loops;
+mod sweep_outputs;
 mod sweep_walls;
 mod trust;
 #[cfg(feature = "charts")]

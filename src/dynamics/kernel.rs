@@ -172,6 +172,14 @@ impl<T: Real> Kernel<T> {
         kernel
     }
 
+    /// The elements of [`Kernel::accelerate`], and nothing else of it.
+    pub fn place(&mut self, mechanism: &Mechanism, phi: &[T]) {
+        match &self.bodywise {
+            Some(bodywise) => bodywise.unit_vectors(phi, &mut self.z),
+            None => self.unit_vectors::<0>(mechanism, phi),
+        }
+    }
+
     /// M, its twist and the whole load b (velocity terms, gravity, springs, dampers, applied forces) at the
     /// elements in `z`.
     #[inline(always)]

@@ -35,6 +35,8 @@ pub(crate) struct Outputs {
     needs_forces: bool,
     /// True where accelerations of points are.
     needs_accelerations: bool,
+    /// True where any acceleration or joint force is.
+    needs_equations: bool,
 }
 
 /// What the outputs of one moment share, and room for it.
@@ -60,7 +62,8 @@ pub(crate) struct Moment<'a> {
     pub winding: &'a [f64],
     /// Rates \[rad/s, m/s\].
     pub omega: &'a [f64],
-    /// After [`Kernel::accelerate`] and [`Mechanism::spread_multipliers`].
+    /// After [`Kernel::accelerate`] and [`Mechanism::spread_multipliers`], or [`Kernel::place`] where no
+    /// output [needs](Outputs::needs_equations) more.
     pub kernel: &'a Kernel<f64>,
 }
 
@@ -118,10 +121,18 @@ impl Outputs {
             |source: &Source<Site>| matches!(source, Source::Carried(Quantity::Acceleration(..)));
         let named = list.iter().map(|output| &output.expression).chain(&signals);
         let sources = named.flat_map(|expression| &expression.sources);
+        let is_turning =
+            |source: &Source<Site>| matches!(source, Source::Carried(Quantity::AngularAcceleration(_)));
         let needs_forces = !sources.clone().all(is_state);
         let needs_accelerations = sources.clone().any(is_acceleration);
+        let needs_equations = needs_forces || needs_accelerations || sources.clone().any(is_turning);
         let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
-        Ok(Some(Self { list, signals, parameters, needs_forces, needs_accelerations }))
+        Ok(Some(Self { list, signals, parameters, needs_forces, needs_accelerations, needs_equations }))
+    }
+
+    /// False where places and rates are all that the outputs are made of.
+    pub fn needs_equations(&self) -> bool {
+        self.needs_equations
     }
 
     /// Names and units, in order.

@@ -200,9 +200,13 @@ impl ExtremesDetector {
         }
         winding.clear();
         winding.extend((0..phi.len()).map(|k| motion.unwrapped(k)));
-        kernel.accelerate::<0>(mechanism, motion.time, phi, omega, Bias::default());
-        mechanism.spread_multipliers(kernel);
         let Some(outputs) = &mechanism.outputs else { return };
+        if outputs.needs_equations() {
+            kernel.accelerate::<0>(mechanism, motion.time, phi, omega, Bias::default());
+            mechanism.spread_multipliers(kernel);
+        } else {
+            kernel.place(mechanism, phi);
+        }
         outputs.evaluate(
             &Moment { mechanism, time: motion.time, phi, winding, omega, kernel },
             scratch,

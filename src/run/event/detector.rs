@@ -336,6 +336,14 @@ impl EventDetector {
         }
     }
 
+    /// True where a function that is not kept at zero is within this share of its largest value from it.
+    pub fn is_beside_zero(&self, motion: &Motion, share: f64) -> bool {
+        let EventMemory { largest, still, .. } = &self.memory;
+        let values = self.values(motion);
+        let mut values = values.iter().zip(largest).enumerate();
+        values.any(|(event, (value, largest))| value.abs() <= share * largest && !still.contains(&event))
+    }
+
     /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
         let mut values: Vec<f64> = self.mechanism.seen(motion, |at| {

@@ -48,6 +48,8 @@ const CLOSED_AGAIN: f64 = 1e-8;
 /// Multipliers that differ from magnitude 1 by less, times the root of the largest entry of DP, do so by
 /// rounding: a double root is known to half the digits.
 const ROUNDING: f64 = 1e-4;
+/// Most steps of a run, which near a collision would take them without end.
+const STEPS_MOST: usize = 20_000;
 /// Periods that the scene's start is left to settle for.
 const SETTLING: usize = 50;
 
@@ -257,8 +259,11 @@ fn course(
     let driver = build(mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(mechanism), driver);
     driver.meet(&mut outcome).map_err(|stop| stop.what)?;
+    let mut steps = 0..STEPS_MOST;
     let mut at = |time: f64| -> Result<[Vec<f64>; 2], String> {
-        driver.go(Time::from(time), &mut outcome, &mut || false).map_err(|stop| stop.what)?;
+        let is_over = &mut || steps.next().is_none();
+        let is_there = driver.go(Time::from(time), &mut outcome, is_over).map_err(|stop| stop.what)?;
+        is_there.then_some(()).ok_or("it takes too many steps")?;
         let motion = driver.motion();
         let turned = motion.phi.iter().zip(&motion.turns).map(|(phi, turns)| phi.hi + TAU * *turns as f64);
         Ok([turned.collect(), motion.omega.iter().map(|omega| omega.hi).collect()])

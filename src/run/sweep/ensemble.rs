@@ -1,14 +1,15 @@
 //! Trajectories in lanes, and alone where these do not take them.
 //!
-//! A trajectory [leaves](BatchMember::has_left) the lanes near a singular position, and where it may come to a
-//! wall.  It goes on by `taylor` as a single run would from there, with projection or through the impact,
-//! until it is past, and comes back.
+//! A trajectory [leaves](BatchMember::has_left) the lanes near a singular position, where it may come to a
+//! wall, and where an event may end it.  It goes on by `taylor` as a single run would from there, with
+//! projection, through the impact or to the event, until it is past, and comes back.
 
 mod impacts;
 mod singular;
 
 use self::impacts::ThroughImpacts;
 use self::singular::PastSingular;
+use super::watching::Watching;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
@@ -16,7 +17,7 @@ use crate::dynamics::{Mechanism, Time};
 use crate::run::build::Problem;
 use crate::run::plan::Plan;
 use crate::stepping::StepError;
-use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage, Watch};
+use crate::stepping::taylor::batch::{Batch, BatchMember, BatchObserver, Going, Passage, Watch};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -31,14 +32,15 @@ pub(super) struct Ensemble {
     batch: Batch,
     plan: Plan,
     alone: Vec<Option<Alone>>,
+    watching: Vec<Watching>,
 }
 
 impl Ensemble {
-    /// For so many trajectories, by a method in lanes that has the tolerance of a plan.
-    pub(super) fn new(batch: Batch, plan: &Plan, count: usize) -> Self {
+    /// For trajectories watched by these, by a method in lanes that has the tolerance of a plan.
+    pub(super) fn new(batch: Batch, plan: &Plan, watching: Vec<Watching>) -> Self {
         let mut alone = Vec::new();
-        alone.resize_with(count, || None);
-        Self { batch, plan: plan.clone(), alone }
+        alone.resize_with(watching.len(), || None);
+        Self { batch, plan: plan.clone(), alone, watching }
     }
 
     /// Integrates trajectories, those from number `first` on, to `until`, as [`Batch::integrate`] does.
@@ -49,14 +51,20 @@ impl Ensemble {
         until: Time,
         watch: &mut Watch,
     ) {
-        let Self { batch, plan, alone } = self;
-        batch.integrate_with(members, until, watch, &mut |number, member, watch| {
-            let watch = &mut |passage: &Passage| watch(number, passage);
-            take_on(&mut alone[first + number], batch, plan, member, until, watch).unwrap_or_else(|stop| {
-                member.stopped = Some(stop);
-                Going::Enough
-            })
-        });
+        let Self { batch, plan, alone, watching } = self;
+        let (alone, watching) = (&mut alone[first..], &mut watching[first..]);
+        batch.integrate_with(members, until, &mut Watched { batch, plan, until, alone, watching, watch });
+    }
+
+    /// True where an event has ended a trajectory.
+    pub(super) fn has_ended(&self, number: usize) -> bool {
+        self.watching[number].has_ended
+    }
+
+    /// What the outputs of a trajectory came to.
+    pub(super) fn extremes(&self, number: usize) -> Vec<[f64; 4]> {
+        let extremes = self.watching[number].extremes().into_iter();
+        extremes.map(|one| [one.min[0], one.max[0], one.mean, one.rms]).collect()
     }
 
     /// What impacts have changed so far of a trajectory's energy less the work its state tells of \[J\].
@@ -70,28 +78,63 @@ impl Ensemble {
     /// Forgets a trajectory, whose number the last one gets.
     pub(super) fn swap_remove(&mut self, number: usize) {
         self.alone.swap_remove(number);
+        self.watching.swap_remove(number);
+    }
+}
+
+/// What is asked of trajectories under way.
+struct Watched<'a, 'b> {
+    batch: &'a Batch,
+    plan: &'a Plan,
+    until: Time,
+    alone: &'a mut [Option<Alone>],
+    watching: &'a mut [Watching],
+    watch: &'a mut Watch<'b>,
+}
+
+impl BatchObserver for Watched<'_, '_> {
+    fn ahead(&mut self, number: usize, step: &Passage) -> bool {
+        self.watching[number].ahead(step)
+    }
+
+    fn step(&mut self, number: usize, step: &Passage) -> Going {
+        self.watching[number].step(step);
+        (self.watch)(number, step)
+    }
+
+    fn alone(&mut self, number: usize, member: &mut BatchMember) -> Going {
+        let Self { batch, plan, until, alone, watching, watch } = self;
+        let watching = &mut watching[number];
+        watching.go_back();
+        let watch = &mut |passage: &Passage| watch(number, passage);
+        let way = (*batch, *plan, *until);
+        take_on(&mut alone[number], way, member, (watching, watch)).unwrap_or_else(|stop| {
+            member.stopped = Some(stop);
+            Going::Enough
+        })
     }
 }
 
 fn take_on(
     alone: &mut Option<Alone>,
-    batch: &Batch,
-    plan: &Plan,
+    (batch, plan, until): (&Batch, &Plan, Time),
     member: &mut BatchMember,
-    until: Time,
-    watch: &mut dyn FnMut(&Passage) -> Going,
+    (watching, watch): (&mut Watching, &mut dyn FnMut(&Passage) -> Going),
 ) -> Result<Going, StepError> {
     let alone = match alone {
         Some(alone) => alone,
-        None => alone.insert(match member.mechanism.contacts.is_empty() {
+        None => alone.insert(match member.mechanism.contacts.is_empty() && watching.events.is_none() {
             true => Alone::PastSingular(Box::new(PastSingular::new(batch, member))),
-            false => Alone::ThroughImpacts(Box::new(ThroughImpacts::new(plan, member)?)),
+            false => Alone::ThroughImpacts(Box::new(ThroughImpacts::new(plan, member, watching)?)),
         }),
     };
     member.has_left = false;
     match alone {
-        Alone::PastSingular(alone) => alone.go(member, until, watch),
-        Alone::ThroughImpacts(alone) => alone.go(member, until, watch),
+        Alone::PastSingular(alone) => alone.go(member, until, &mut |passage| {
+            watching.step(passage);
+            watch(passage)
+        }),
+        Alone::ThroughImpacts(alone) => alone.go(member, until, (watching, watch)),
     }
 }
 

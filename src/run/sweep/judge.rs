@@ -8,6 +8,7 @@
 
 use super::ensemble::Ensemble;
 use super::point::Ready;
+use super::watching::Watching;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{State, Time};
 use crate::run::drift::larger;
@@ -68,7 +69,11 @@ impl<'a> Judge<'a> {
         let tolerance = Tolerance { relative: finer, absolute: finer };
         let plan = Plan { tolerance: Some(tolerance), ..plan.clone() };
         Self {
-            ensemble: Ensemble::new(Batch::new(tolerance).with_order(ORDER), &plan, ready.len()),
+            ensemble: Ensemble::new(
+                Batch::new(tolerance).with_order(ORDER),
+                &plan,
+                ready.iter().map(|_| Watching::default()).collect(),
+            ),
             members: ready.iter().map(|ready| ready.member(2)).collect(),
             known: vec![Known::default(); ready.len()],
         }

@@ -4,13 +4,13 @@ use super::point::{Point, Ready, Status};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::{BodyAngles, Mechanism, Motion, State};
+use crate::dynamics::{BodyAngles, Mechanism, Motion};
 use crate::run::allowance::{Allowance, EnergyLimit, Moment};
 use crate::run::drift::larger;
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip;
 use crate::run::plan::Plan;
-use crate::stepping::taylor::batch::{BatchMember, Passage};
+use crate::stepping::taylor::batch::{BatchMember, Passage, read};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
 
@@ -137,17 +137,6 @@ impl Lane {
         }
         true
     }
-}
-
-/// Reads angles and rates of all bodies; tells how many coordinates the state has.
-fn read(mechanism: &Mechanism, state: &State, motion: &mut Motion) -> usize {
-    let (n, partition) = (mechanism.coordinates(), &mechanism.partition);
-    if mechanism.has_multipliers() {
-        motion.follow(state, n);
-        return n;
-    }
-    partition.read(state, motion);
-    partition.count()
 }
 
 /// The largest violation of any constraint so far, at position and velocity level, at the motion's unit

@@ -36,6 +36,7 @@ pub mod table;
 #[cfg(feature = "threads")]
 mod threads;
 mod totals;
+mod watching;
 
 pub use execute::{PointObserver, sweep, sweep_on};
 pub use grid::{Grid, Vary, VaryError};
@@ -170,7 +171,7 @@ impl Sweep {
             && request.step.is_none()
             && !request.extended
             && request.stabilize.is_none_or(|kind| kind == Stabilization::Elimination)
-            && Batch::takes(&mechanism);
+            && Batch::takes_with_stops(&mechanism);
         let mut plan = Plan::new(&scene, &mechanism, &timed(&request, &scene))?;
         // Stiff scenes stay with the implicit method that was chosen.
         if in_lanes && !matches!(plan.method, MethodId::Radau(_)) {
@@ -330,7 +331,7 @@ impl Sweep {
 
     /// True where a mechanism of the points can be in lanes.
     fn has_lanes_for(&self, mechanism: &Mechanism) -> bool {
-        Batch::takes(mechanism) || self.is_many && Batch::takes_alike(mechanism)
+        Batch::takes_with_stops(mechanism) || self.is_many && Batch::takes_alike_with_stops(mechanism)
     }
 
     /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.

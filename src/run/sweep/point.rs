@@ -3,6 +3,7 @@
 use super::ensemble::{Ensemble, form_in_lanes};
 use super::judge::{Judge, PointTrust};
 use super::lane::Lane;
+use super::watching::Watching;
 use super::{Sweep, timed};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
@@ -150,7 +151,6 @@ impl Sweep {
                 Stabilization::Elimination => true,
                 Stabilization::Baumgarte => false,
             }
-            && ready.mechanism.outputs.is_none()
             && self.has_lanes_for(&ready.mechanism)
     }
 
@@ -285,7 +285,8 @@ impl Sweep {
             let reference = ready.mechanism.energy(&mut kernel, &ready.start.phi, &ready.start.omega).total();
             lanes.push(Lane::new(ready, reference));
         }
-        let mut ensemble = Ensemble::new(batch, &plan, members.len());
+        let watching = ready.iter().map(|ready| Watching::of(&ready.mechanism, &plan)).collect();
+        let mut ensemble = Ensemble::new(batch, &plan, watching);
         let mut judge = (self.trust != Level::Off).then(|| Judge::new(&ready, &plan));
         let mut found = Vec::with_capacity(ready.len());
         let mut motion = Motion::default();
@@ -310,7 +311,8 @@ impl Sweep {
             let mut number = 0;
             while number < lanes.len() {
                 let (lane, member) = (&mut lanes[number], &members[number]);
-                let over = row == plan.rows || (self.ends_at_flips && lane.point.flip.is_some());
+                let has_flipped = self.ends_at_flips && lane.point.flip.is_some();
+                let over = row == plan.rows || has_flipped || ensemble.has_ended(number);
                 let moved = ensemble.energy_of_impacts(number);
                 let limit = self.limits.energy;
                 if lane.measure(member, moved, &mut motion, &mut kernel, limit, &plan) && !over {
@@ -319,6 +321,7 @@ impl Sweep {
                 }
                 let mut point = lanes.swap_remove(number).point;
                 point.trust = judge.as_mut().map(|judge| judge.remove(number));
+                point.extremes = ensemble.extremes(number);
                 found.push(point);
                 members.swap_remove(number);
                 ensemble.swap_remove(number);

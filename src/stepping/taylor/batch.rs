@@ -10,6 +10,7 @@ mod clearance;
 mod driven;
 mod formulas;
 mod free;
+mod interior;
 mod laws;
 mod looped;
 mod passage;
@@ -24,6 +25,7 @@ use self::driven::DrivenTeam;
 use self::free::FreeTeam;
 use self::looped::LoopTeam;
 pub use self::passage::Passage;
+pub(crate) use self::passage::read;
 use self::slots::{LaneSlot, LaneSlots};
 use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
@@ -95,8 +97,35 @@ impl<'a> BatchMember<'a> {
 /// Sees a step of the trajectory of a number.
 pub type Watch<'a> = dyn FnMut(usize, &Passage) -> Going + 'a;
 
-/// Takes on a trajectory that has left, and is shown as many steps as it takes.
-pub(crate) type Alone<'a> = dyn FnMut(usize, &mut BatchMember, &mut Watch) -> Going + 'a;
+/// What trajectories in lanes are shown to, each by its number, and what takes those on that leave.
+pub(crate) trait BatchObserver {
+    /// Shown a step that a trajectory is about to make, as its series have it, where events may end the
+    /// motion; true where it is not to be made in a lane.
+    fn ahead(&mut self, number: usize, step: &Passage) -> bool;
+
+    /// Shown a step that was made.
+    fn step(&mut self, number: usize, step: &Passage) -> Going;
+
+    /// Takes on a trajectory that has left from where it stands, and is shown as many steps as that takes.
+    fn alone(&mut self, number: usize, member: &mut BatchMember) -> Going;
+}
+
+/// A function that sees steps; what leaves stays where it is.
+struct StepsAlone<'a, 'b>(&'a mut Watch<'b>);
+
+impl BatchObserver for StepsAlone<'_, '_> {
+    fn ahead(&mut self, _: usize, _: &Passage) -> bool {
+        false
+    }
+
+    fn step(&mut self, number: usize, step: &Passage) -> Going {
+        (self.0)(number, step)
+    }
+
+    fn alone(&mut self, _: usize, _: &mut BatchMember) -> Going {
+        Going::Enough
+    }
+}
 
 /// Whether a trajectory goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,8 +170,14 @@ impl Batch {
 
     /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
     /// beside gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or
-    /// two bodies without springs, one of them driven from the ground by a law that is no formula.
+    /// two bodies without springs, one of them driven from the ground by a law that is no formula.  No event
+    /// ends the motion.
     pub fn takes(mechanism: &Mechanism) -> bool {
+        !mechanism.has_stops() && Self::takes_with_stops(mechanism)
+    }
+
+    /// The same with events that end the motion, which [`BatchObserver::ahead`] looks for.
+    pub(crate) fn takes_with_stops(mechanism: &Mechanism) -> bool {
         let springs = mechanism.springs.len();
         let is_of_few = (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS;
         goes_on(mechanism)
@@ -153,9 +188,13 @@ impl Batch {
     /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off their
     /// axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls, all by
     /// smooth formulas or without, and no friction; and the same with closed loops, sliders, gears and cams,
-    /// their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).  Bodies that float
-    /// have no walls beside them.
+    /// their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
+        !mechanism.has_stops() && Self::takes_alike_with_stops(mechanism)
+    }
+
+    /// The same with events that end the motion, which [`BatchObserver::ahead`] looks for.
+    pub(crate) fn takes_alike_with_stops(mechanism: &Mechanism) -> bool {
         goes_on(mechanism) && trees::fits(mechanism)
     }
 
@@ -173,18 +212,34 @@ impl Batch {
     /// unsuited; those with loops may [leave](BatchMember::has_left) on the way.  The result of each does not
     /// depend on the others.
     pub fn integrate(&self, members: &mut [BatchMember], until: Time, watch: &mut Watch) {
-        self.integrate_with(members, until, watch, &mut |_, _, _| Going::Enough);
+        let mut is_done = vec![false; members.len()];
+        for (member, is_done) in members.iter_mut().zip(&mut is_done) {
+            if member.mechanism.has_stops() {
+                (member.stopped, *is_done) = (Some(unsuited(member)), true);
+            }
+        }
+        self.integrate_rest(members, until, &mut StepsAlone(watch), is_done);
     }
 
-    /// The same with what takes those on that leave: where it says so, they come back.
+    /// The same with an observer that looks for events and takes those on that leave: where it says so, they
+    /// come back.
     pub(crate) fn integrate_with(
         &self,
         members: &mut [BatchMember],
         until: Time,
-        watch: &mut Watch,
-        alone: &mut Alone,
+        observer: &mut dyn BatchObserver,
     ) {
-        let mut is_done = vec![false; members.len()];
+        let is_done = vec![false; members.len()];
+        self.integrate_rest(members, until, observer, is_done);
+    }
+
+    fn integrate_rest(
+        &self,
+        members: &mut [BatchMember],
+        until: Time,
+        observer: &mut dyn BatchObserver,
+        mut is_done: Vec<bool>,
+    ) {
         members.iter_mut().for_each(|member| member.has_left = false);
         while let Some(next) = is_done.iter().position(|is_done| !is_done) {
             let like = members[next].mechanism;
@@ -195,10 +250,10 @@ impl Batch {
                             let is_same = std::ptr::eq(one.mechanism, like);
                             is_same || goes_on(one.mechanism) && <$team>::fits(one, &members[next])
                         };
-                        let fits: Vec<bool> = members.iter().map(fits).collect();
+                        let fits: Vec<bool> =
+                            members.iter().zip(&is_done).map(|(one, is_done)| !is_done && fits(one)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
-                        let watched = (&mut *watch, &mut *alone);
-                        self.integrate_those::<$team>(next, &fits, members, until, watched);
+                        self.integrate_those::<$team>(next, &fits, members, until, observer);
                         continue;
                     }
                 )*};
@@ -206,9 +261,7 @@ impl Batch {
             try_teams!(FreeTeam<1, false>, FreeTeam<2, false>, FreeTeam<3, false>, FreeTeam<4, false>);
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
             try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
-            let (member, hint) = (&mut members[next], "integrate it by `taylor`");
-            let what = "lanes take hinge trees and loops without friction and events that act".into();
-            member.stopped = Some(stop(Cause::Unsuited, &member.state, 0.0, what, hint));
+            members[next].stopped = Some(unsuited(&members[next]));
             is_done[next] = true;
         }
     }
@@ -220,18 +273,23 @@ impl Batch {
         fits: &[bool],
         members: &mut [BatchMember],
         until: Time,
-        (watch, alone): (&mut Watch, &mut Alone),
+        observer: &mut dyn BatchObserver,
     ) {
         let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
         let lanes = LaneSlots::new(T::new(&members[like], self.order, vectors), self.order, until);
-        vectors.run(Integration::<T> { lanes, fits, batch: self, members, until, watch, alone });
+        vectors.run(Integration::<T> { lanes, fits, batch: self, members, until, observer });
     }
 }
 
-/// True where no event ends a motion or changes what acts, and nothing has branches: what is in lanes looks
-/// for none.
+/// True where no event changes what acts, and nothing has branches.
 fn goes_on(mechanism: &Mechanism) -> bool {
-    !mechanism.is_switched() && !mechanism.has_stops()
+    !mechanism.is_switched()
+}
+
+/// Why a trajectory is not in lanes.
+fn unsuited(member: &BatchMember) -> StepError {
+    let what = "lanes take hinge trees and loops without friction and events that act".into();
+    stop(Cause::Unsuited, &member.state, 0.0, what, "integrate it by `taylor`")
 }
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
@@ -288,6 +346,27 @@ trait Team {
     /// Angle \[rad\], continued from that at the start in [-π, π], and rate \[rad/s\] of a body `after` \[s\]
     /// from the start of the step last expanded.
     fn at(&self, order: usize, lane: usize, body: usize, after: f64) -> (f64, f64);
+
+    /// A coordinate where the step last expanded begins \[rad, m\], where its rate is a polynomial there.
+    fn start_of(&self, _lane: usize, _coordinate: usize) -> Option<f64> {
+        None
+    }
+
+    /// Power `k` of that rate.
+    fn power_of(&self, _lane: usize, _coordinate: usize, _k: usize) -> f64 {
+        0.0
+    }
+
+    /// Writes coordinates and rates \[rad, m, rad/s, m/s\] of a mechanism's state `after` \[s\] from the
+    /// start of that step, where they are no polynomials.
+    fn inside(&self, order: usize, lane: usize, after: f64, mechanism: &Mechanism, state: &mut State) {
+        let is_all = mechanism.has_multipliers();
+        let count = if is_all { mechanism.coordinates() } else { mechanism.partition.count() };
+        for c in 0..count {
+            let body = if is_all { c } else { mechanism.partition.independent[c] };
+            (state.y[c], state.y[count + c]) = self.at(order, lane, body, after);
+        }
+    }
 }
 
 struct Integration<'a, 'b, T> {
@@ -297,8 +376,7 @@ struct Integration<'a, 'b, T> {
     batch: &'a Batch,
     members: &'a mut [BatchMember<'b>],
     until: Time,
-    watch: &'a mut Watch<'a>,
-    alone: &'a mut Alone<'a>,
+    observer: &'a mut dyn BatchObserver,
 }
 
 impl<T: Team> WideCode for Integration<'_, '_, T> {
@@ -314,10 +392,11 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
             }
             self.lanes.team.begin::<W>(&self.lanes.slots);
             self.lanes.team.expand::<W>(order);
-            let taken = self.lanes.choose_steps::<W>(order, self.batch.tolerance);
+            let mut taken = self.lanes.choose_steps::<W>(order, self.batch.tolerance);
+            self.lanes.look_ahead(order, self.members, &mut taken, self.observer);
             self.lanes.team.finish::<W>(order, &taken);
-            self.lanes.arrive(order, self.members, self.until, self.watch);
-            self.lanes.bring_back(self.batch, self.members, self.until, (self.watch, self.alone));
+            self.lanes.arrive(order, self.members, self.until, self.observer);
+            self.lanes.bring_back(self.batch, self.members, self.until, self.observer);
         }
     }
 }

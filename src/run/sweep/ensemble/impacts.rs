@@ -1,6 +1,7 @@
-//! A trajectory that may come to a wall: the loop of a single run, with its impacts and its lasting contacts.
+//! A trajectory that may come to a wall or to its end: the loop of a single run, with its impacts, its
+//! lasting contacts and its events.
 
-use super::{form_in_lanes, whole_turns};
+use super::{Watching, form_in_lanes, whole_turns};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Motion, Time};
 use crate::run::build::{Problem, build};
@@ -28,7 +29,7 @@ pub(super) struct ThroughImpacts {
 
 impl ThroughImpacts {
     /// For a trajectory that leaves for the first time: what touches a wall and moves into it is struck.
-    pub(super) fn new(plan: &Plan, member: &BatchMember) -> Result<Self, StepError> {
+    pub(super) fn new(plan: &Plan, member: &BatchMember, watching: &mut Watching) -> Result<Self, StepError> {
         let mechanism = Arc::new(member.mechanism.clone());
         let mut form = form_in_lanes(Arc::clone(&mechanism));
         let (mut motion, mut plan) = (Motion::default(), plan.clone());
@@ -37,7 +38,10 @@ impl ThroughImpacts {
         let mut outcome = Outcome::begun(&mechanism, plan);
         let mut contact_driver = ContactDriver::new(mechanism, driver);
         contact_driver.sampler.refer(Some(DoubleDouble::ZERO));
-        contact_driver.meet(&mut outcome)?;
+        contact_driver.events = watching.events.take();
+        let met = contact_driver.meet(&mut outcome);
+        watching.events = contact_driver.events.take();
+        met?;
         Ok(Self { contact_driver, outcome, form, goes_on: true, work: [DoubleDouble::ZERO; 2] })
     }
 
@@ -52,7 +56,7 @@ impl ThroughImpacts {
         &mut self,
         member: &mut BatchMember,
         until: Time,
-        watch: &mut dyn FnMut(&Passage) -> Going,
+        (watching, watch): (&mut Watching, &mut dyn FnMut(&Passage) -> Going),
     ) -> Result<Going, StepError> {
         let Self { contact_driver, outcome, form, goes_on, work } = self;
         let mut motion = Motion::default();
@@ -62,6 +66,7 @@ impl ThroughImpacts {
             let [before, last] = *work;
             *work = [before + last, DoubleDouble::ZERO];
         }
+        (contact_driver.extremes, contact_driver.events) = (watching.extremes.take(), watching.events.take());
         let before = contact_driver.statistics();
         let spent = member.statistics.evaluations.saturating_sub(before.evaluations);
         contact_driver.driver.allow(member.statistics.max_evaluations.saturating_sub(spent));
@@ -74,9 +79,13 @@ impl ThroughImpacts {
                 break gone;
             }
         };
-        let has_enough = adapter.has_enough;
-        contact_driver.ended_by = None;
+        watching.has_ended = contact_driver.ended_by.take().is_some();
+        let has_enough = adapter.has_enough || watching.has_ended;
         *goes_on = !contact_driver.holding().held.is_empty();
+        (watching.extremes, watching.events) = (contact_driver.extremes.take(), contact_driver.events.take());
+        if let Some(extremes) = &mut watching.extremes {
+            extremes.hold(contact_driver.holding());
+        }
         contact_driver.look(&mut motion);
         member.state = form.state(&motion);
         if !form.mechanism().has_work_integral() {
@@ -104,7 +113,8 @@ impl Observer for Shown<'_> {
             (angle, rate)
         };
         let ends = |body: usize| [&from, &to].map(|motion| angle_and_rate(motion, &from, body));
-        match (self.watch)(&Passage::new(Time::from(begin), end - begin, &ends, &series)) {
+        let motion = |after: f64, motion: &mut Motion| motion.clone_from(step.borrow_mut().at(begin + after));
+        match (self.watch)(&Passage::new(Time::from(begin), end - begin, &ends, &series, &motion)) {
             Going::Enough => ControlFlow::Break(()),
             Going::On => ControlFlow::Continue(()),
         }

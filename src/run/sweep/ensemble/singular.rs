@@ -3,10 +3,10 @@
 use super::whole_turns;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::NEAR;
-use crate::dynamics::{State, Time};
+use crate::dynamics::{Motion, State, Time};
 use crate::run::build::{Problem, tangent_form};
 use crate::stabilization::Projected;
-use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage, read};
 use crate::stepping::{Integrator, StepError, Taylor};
 use std::cell::RefCell;
 use std::f64::consts::TAU;
@@ -39,6 +39,7 @@ impl PastSingular {
     ) -> Result<Going, StepError> {
         let Self { problem, method, kernel } = self;
         let n = member.mechanism.coordinates();
+        let room = RefCell::new(State::default());
         method.get_mut().begin(&mut **problem.get_mut(), &mut member.state, until)?;
         loop {
             let from = member.state.clone();
@@ -54,7 +55,18 @@ impl PastSingular {
             let start = |body: usize| angle_and_rate(&from, &from, n, body);
             let ends =
                 |body: usize| [start(body), angle_and_rate(state, &from, n, body)].map(<[f64; 2]>::from);
-            let passage = Passage::new(from.time, (state.time - from.time).hi, &ends, &series);
+            let span = (state.time - from.time).hi;
+            let motion = |after: f64, motion: &mut Motion| {
+                if after >= span {
+                    read(mechanism, state, motion);
+                    return;
+                }
+                let (mut problem, mut method) = (problem.borrow_mut(), method.borrow_mut());
+                let inside = &mut *room.borrow_mut();
+                method.interpolate(&mut **problem, &from, from.time + after, inside);
+                read(mechanism, inside, motion);
+            };
+            let passage = Passage::new(from.time, span, &ends, &series, &motion);
             if watch(&passage) == Going::Enough {
                 return Ok(Going::Enough);
             }

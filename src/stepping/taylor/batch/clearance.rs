@@ -5,6 +5,13 @@
 //! w = Σ |w_m| h^m,  a = Σ m |w_m| h^(m-1)                                 bounds of rates and accelerations in a step h
 //! ```
 //!
+//! Where a body floats its place x is an element as unit vectors are, of length |x| + w h, with |x'| <= w and
+//! |x''| <= a by the norms of those of its coordinates:
+//!
+//! ```text
+//! |(h z_j·z_k)''| <= |h| (|z_j''| |z_k| + 2 |z_j'| |z_k'| + |z_j| |z_k''|)
+//! ```
+//!
 //! The right side is concave, so that its ends tell.  Where it says nothing halves of the step are asked, each
 //! from the motion at its beginning.  Up to a part that may hold an impact the step is clear; where that is
 //! next to nothing the trajectory is left to code that finds the moment of an impact and what it does.
@@ -28,7 +35,7 @@ const LEAST: f64 = 0.2;
 #[derive(Debug, Default)]
 pub(super) struct Clearance {
     contacts: [Vec<Contact>; LANES],
-    /// Bounds of the rate and the acceleration of every body in the step \[rad/s, rad/s²\].
+    /// Bounds of the rate and the acceleration of every coordinate in the step \[rad/s, rad/s², m/s, m/s²\].
     most: Vec<[f64; 2]>,
     /// Bounds of the second derivatives of the gaps over their lengths \[1/s²\].
     bends: Vec<f64>,
@@ -54,15 +61,20 @@ impl Clearance {
         self.contacts[lane].clone_from(&mechanism.contacts);
     }
 
-    /// Of a step of so many bodies as much as no point can come to a wall in, where that is worth a step
-    /// \[s\].
-    pub(super) fn of(&mut self, bodies: usize, series: &dyn SeriesInLanes, step: StepFrom) -> Option<f64> {
-        self.bound(bodies, series, step);
+    /// Of a step of a mechanism as much as no point can come to a wall in, where that is worth a step \[s\].
+    pub(super) fn of(
+        &mut self,
+        mechanism: &Mechanism,
+        series: &dyn SeriesInLanes,
+        step: StepFrom,
+    ) -> Option<f64> {
+        let angles = mechanism.bodies.len();
+        self.bound([angles, mechanism.coordinates()], series, step);
         // Part by part, the larger first.
         let (mut from, mut part) = (0, PARTS);
         while from < PARTS {
             let length = |parts: usize| step.length * (parts as f64 / PARTS as f64);
-            if self.is_clear(series, step, [length(from), length(part)]) {
+            if self.is_clear(angles, series, step, [length(from), length(part)]) {
                 from += part;
                 // The largest part that begins here.
                 part = 1 << from.trailing_zeros();
@@ -77,24 +89,38 @@ impl Clearance {
     }
 
     /// Bounds of rates and accelerations in a step, and of what gaps make of them.
-    fn bound(&mut self, bodies: usize, series: &dyn SeriesInLanes, step: StepFrom) {
+    fn bound(&mut self, [angles, coordinates]: [usize; 2], series: &dyn SeriesInLanes, step: StepFrom) {
         let StepFrom { lane, order, length, time } = step;
         self.most.clear();
-        self.most.extend((0..bodies).map(|body| {
+        self.most.extend((0..coordinates).map(|coordinate| {
             (0..=order).rev().fold([0.0, 0.0], |[rate, slope], m| {
-                [rate * length + series.rate_of(m, body, lane).abs(), slope * length + rate]
+                [rate * length + series.rate_of(m, coordinate, lane).abs(), slope * length + rate]
             })
         }));
         let most = &self.most;
+        // Bounds of an element and its first two derivatives, where it is the place of a body that floats.
+        let moving = |x: usize| {
+            let ([one, one_slope], [other, other_slope]) = (most[x], most[x + 1]);
+            let rate = libm::hypot(one, other);
+            let place = series.unit_of(x, lane).norm_squared().sqrt() + rate * length;
+            [place, rate, libm::hypot(one_slope, other_slope)]
+        };
+        let element = |k: usize| match most[k] {
+            [rate, slope] if k < angles => [1.0, rate, slope + rate * rate],
+            _ => moving(k),
+        };
         let norm = |g: Complex<f64>| g.norm_squared().sqrt();
         let bend = |contact: &Contact| {
             let Measure::Place(place) = &contact.row.measure else { return f64::INFINITY };
             let law = contact.row.law.as_ref().map_or(0.0, |law| law.bounds(time.hi + length)[1]);
-            let single = place.linear.iter().fold(law, |sum, &(k, g)| {
-                let [rate, acceleration] = most[k];
-                sum + norm(g) * (acceleration + rate * rate)
-            });
+            let single = place.linear.iter().fold(law, |sum, &(k, g)| sum + norm(g) * element(k)[2]);
             let all = place.bilinear.iter().fold(single, |sum, &(j, k, h)| {
+                if j.max(k) >= angles {
+                    let ([one, one_rate, one_bend], [other, other_rate, other_bend]) =
+                        (element(j), element(k));
+                    return sum
+                        + norm(h) * (one_bend * other + 2.0 * one_rate * other_rate + one * other_bend);
+                }
                 let ([one, one_slope], [other, other_slope]) = (most[j], most[k]);
                 sum + norm(h) * (one_slope + (one + other) * (one + other) + other_slope)
             });
@@ -105,18 +131,34 @@ impl Clearance {
     }
 
     /// True where no point can come to a wall in a part of the step, so long from its beginning on \[s\].
-    fn is_clear(&self, series: &dyn SeriesInLanes, step: StepFrom, [after, length]: [f64; 2]) -> bool {
+    fn is_clear(
+        &self,
+        angles: usize,
+        series: &dyn SeriesInLanes,
+        step: StepFrom,
+        [after, length]: [f64; 2],
+    ) -> bool {
         let StepFrom { lane, order, .. } = step;
-        let element = |body: usize| {
-            if after == 0.0 {
-                return turning(series.unit_of(body, lane), series.rate_of(0, body, lane));
-            }
-            let (mut angle, mut rate) = (0.0, 0.0);
+        // How far a coordinate has gone, and its rate.
+        let moved = |coordinate: usize| {
+            let (mut way, mut rate) = (0.0, 0.0);
             for m in (0..=order).rev() {
-                let power = series.rate_of(m, body, lane);
-                (angle, rate) = (angle * after + power / (m + 1) as f64, rate * after + power);
+                let power = series.rate_of(m, coordinate, lane);
+                (way, rate) = (way * after + power / (m + 1) as f64, rate * after + power);
             }
-            turning(series.unit_of(body, lane) * Complex::unit(angle * after), rate)
+            (way * after, rate)
+        };
+        let element = |k: usize| {
+            let start = series.unit_of(k, lane);
+            if k >= angles {
+                let ((x, x_rate), (y, y_rate)) = (moved(k), moved(k + 1));
+                return [start + Complex::new(x, y), Complex::new(x_rate, y_rate)];
+            }
+            if after == 0.0 {
+                return turning(start, series.rate_of(0, k, lane));
+            }
+            let (angle, rate) = moved(k);
+            turning(start * Complex::unit(angle), rate)
         };
         let at = Along { time: step.time + after, step_size: 1.0, y: &[], slope: &[] };
         self.contacts[lane].iter().zip(&self.bends).all(|(contact, bend)| {

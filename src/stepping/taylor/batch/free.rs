@@ -183,4 +183,12 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
         }
         (start + angle * after, rate)
     }
+
+    fn start_of(&self, lane: usize, coordinate: usize) -> Option<f64> {
+        Some(self.before[coordinate].0[lane])
+    }
+
+    fn power_of(&self, lane: usize, coordinate: usize, k: usize) -> f64 {
+        self.powers[k].v[coordinate].0[lane]
+    }
 }

@@ -1,6 +1,6 @@
 //! What is shown of a step of a trajectory.
 
-use crate::dynamics::Time;
+use crate::dynamics::{Mechanism, Motion, State, Time};
 
 /// A step just taken, which can be looked at anywhere.
 pub struct Passage<'a> {
@@ -10,17 +10,20 @@ pub struct Passage<'a> {
     pub step: f64,
     ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
     series: &'a dyn Fn(usize, f64) -> (f64, f64),
+    motion: &'a dyn Fn(f64, &mut Motion),
 }
 
 impl<'a> Passage<'a> {
-    /// A step from a time on, so long \[s\], with what [`Passage::ends`] and [`Passage::at`] tell of it.
+    /// A step from a time on, so long \[s\], with what [`Passage::ends`], [`Passage::at`] and
+    /// [`Passage::motion`] tell of it.
     pub(crate) fn new(
         from: Time,
         step: f64,
         ends: &'a dyn Fn(usize) -> [[f64; 2]; 2],
         series: &'a dyn Fn(usize, f64) -> (f64, f64),
+        motion: &'a dyn Fn(f64, &mut Motion),
     ) -> Self {
-        Self { from, step, ends, series }
+        Self { from, step, ends, series, motion }
     }
 
     /// Angle \[rad\] and rate \[rad/s\] of a body `after` \[s\] from the step's start, the angle continued
@@ -34,4 +37,22 @@ impl<'a> Passage<'a> {
     pub fn ends(&self, body: usize) -> [[f64; 2]; 2] {
         (self.ends)(body)
     }
+
+    /// Writes the motion of all coordinates `after` \[s\] from the step's start, without its work; at the end
+    /// that which the integration has.
+    pub fn motion(&self, after: f64, motion: &mut Motion) {
+        (self.motion)(after, motion);
+    }
+}
+
+/// Reads angles and rates of all bodies from a state of those in lanes; tells how many coordinates the state
+/// has.
+pub(crate) fn read(mechanism: &Mechanism, state: &State, motion: &mut Motion) -> usize {
+    if mechanism.has_multipliers() {
+        let n = mechanism.coordinates();
+        motion.follow(state, n);
+        return n;
+    }
+    mechanism.partition.read(state, motion);
+    mechanism.partition.count()
 }

@@ -1,12 +1,14 @@
 //! The lanes, what they do, and which trajectories are in them.
 
-use super::{Alone, Batch, BatchMember, Going, JUDGES, Passage, Team, Watch};
+use super::interior::{InLane, Interior};
+use super::{Batch, BatchMember, BatchObserver, Going, JUDGES, Passage, Team};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
-use crate::dynamics::{State, Time};
+use crate::dynamics::{Motion, State, Time};
 use crate::stepping::taylor::step_size::{self, StepSize};
 use crate::stepping::taylor::stop;
 use crate::stepping::{Cause, Statistics, StepError};
+use std::cell::RefCell;
 
 /// What a lane is doing.
 #[derive(Clone, Debug)]
@@ -21,6 +23,10 @@ pub(super) struct LaneSlot {
     pub(super) left: f64,
     pub(super) wanted: f64,
     pub(super) taken: f64,
+    /// True where events may end the motion.
+    has_stops: bool,
+    /// True where one is in the step, which is not taken: the trajectory leaves.
+    is_leaving: bool,
 }
 
 impl LaneSlot {
@@ -44,6 +50,8 @@ impl LaneSlot {
 pub(super) struct LaneSlots<T> {
     pub(super) slots: [LaneSlot; LANES],
     pub(super) team: Box<T>,
+    /// Room for motions inside a step.
+    inside: RefCell<Interior>,
 }
 
 impl<T: Team> LaneSlots<T> {
@@ -57,8 +65,11 @@ impl<T: Team> LaneSlots<T> {
             left: 0.0,
             wanted: 0.0,
             taken: 0.0,
+            has_stops: false,
+            is_leaving: false,
         };
-        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(team) }
+        let inside = RefCell::default();
+        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(team), inside }
     }
 
     /// Puts trajectories that wait into the free lanes.
@@ -90,6 +101,7 @@ impl<T: Team> LaneSlots<T> {
         let slot = &mut self.slots[lane];
         slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
         (slot.time, slot.unit) = (member.state.time, unit);
+        slot.has_stops = member.mechanism.has_stops();
     }
 
     /// True where no lane has a trajectory.
@@ -117,19 +129,46 @@ impl<T: Team> LaneSlots<T> {
         taken
     }
 
+    /// Shows the steps about to be taken where events may end a motion, and takes none with one in it.
+    pub(super) fn look_ahead(
+        &mut self,
+        order: usize,
+        members: &[BatchMember],
+        taken: &mut Octet,
+        observer: &mut dyn BatchObserver,
+    ) {
+        let Self { slots, team, inside } = self;
+        for (lane, (slot, taken)) in slots.iter_mut().zip(&mut taken.0).enumerate() {
+            slot.is_leaving = false;
+            let Some(index) = slot.member.filter(|_| slot.has_stops && slot.taken > 0.0) else { continue };
+            let member = &members[index];
+            let (from, step) = (slot.time, slot.taken);
+            let series = |body: usize, after: f64| team.at(order, lane, body, after);
+            let ends = |body: usize| [0.0, step].map(|after| series(body, after).into());
+            inside.borrow_mut().forget();
+            let motion = |after: f64, motion: &mut Motion| {
+                inside.borrow_mut().look::<T>(team, member, InLane { order, lane, from }, after, motion);
+            };
+            slot.is_leaving = observer.ahead(index, &Passage::new(from, step, &ends, &series, &motion));
+            if slot.is_leaving {
+                (slot.taken, *taken) = (0.0, 0.0);
+            }
+        }
+    }
+
     /// Records the steps just taken, and frees the lanes of trajectories that have ended.
     pub(super) fn arrive(
         &mut self,
         order: usize,
         members: &mut [BatchMember],
         until: Time,
-        watch: &mut Watch,
+        observer: &mut dyn BatchObserver,
     ) {
         for lane in 0..LANES {
             let slot = &mut self.slots[lane];
             let Some(index) = slot.member else { continue };
             let member = &mut members[index];
-            if self.team.is_leaving(lane) {
+            if slot.is_leaving || self.team.is_leaving(lane) {
                 (member.has_left, member.state.time) = (true, slot.time);
                 self.team.leave(lane, &mut member.state);
                 continue;
@@ -146,9 +185,18 @@ impl<T: Team> LaneSlots<T> {
             let time = slot.time;
             let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
             let ends = |body: usize| self.team.ends(lane, body);
-            let passage = Passage::new(from, step, &ends, &series);
+            self.inside.get_mut().forget();
+            let motion = |after: f64, motion: &mut Motion| {
+                let mut inside = self.inside.borrow_mut();
+                if after >= step {
+                    inside.end::<T>(&self.team, member, lane, time, motion);
+                } else {
+                    inside.look::<T>(&self.team, member, InLane { order, lane, from }, after, motion);
+                }
+            };
+            let passage = Passage::new(from, step, &ends, &series, &motion);
             let is_over =
-                member.stopped.is_some() || watch(index, &passage) == Going::Enough || time >= until;
+                member.stopped.is_some() || observer.step(index, &passage) == Going::Enough || time >= until;
             self.team.wrap(lane, &mut member.state.turns);
             if is_over {
                 self.team.leave(lane, &mut member.state);
@@ -166,7 +214,7 @@ impl<T: Team> LaneSlots<T> {
         batch: &Batch,
         members: &mut [BatchMember],
         until: Time,
-        (watch, alone): (&mut Watch, &mut Alone),
+        observer: &mut dyn BatchObserver,
     ) {
         for lane in 0..LANES {
             let Some(index) = self.slots[lane].member else { continue };
@@ -175,7 +223,7 @@ impl<T: Team> LaneSlots<T> {
                 continue;
             }
             self.slots[lane].member = None;
-            if alone(index, member, watch) == Going::On && member.state.time < until {
+            if observer.alone(index, member) == Going::On && member.state.time < until {
                 self.slots[lane].member = Some(index);
                 self.take_in(lane, batch, member);
             }

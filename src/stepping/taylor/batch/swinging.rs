@@ -332,4 +332,12 @@ impl Team for SwingingTeam {
         }
         (start.0[lane] + angle * after, rate)
     }
+
+    fn start_of(&self, lane: usize, _: usize) -> Option<f64> {
+        Some(self.before.0[lane])
+    }
+
+    fn power_of(&self, lane: usize, _: usize, k: usize) -> f64 {
+        self.powers[k].v.0[lane]
+    }
 }

@@ -43,8 +43,8 @@ fn ends(vectors: Vectors) -> Vec<State> {
     let team = FreeTeam::<2, false>::new(&members[0], batch.order, vectors);
     let lanes = LaneSlots::new(team, batch.order, until);
     let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
-    let alone: &mut Alone = &mut |_, _, _| Going::Enough;
-    vectors.run(Integration { lanes, fits, batch, members: members_here, until, watch: &mut watch, alone });
+    let observer = &mut StepsAlone(&mut watch);
+    vectors.run(Integration { lanes, fits, batch, members: members_here, until, observer });
     members.into_iter().map(|member| member.state).collect()
 }
 

@@ -68,7 +68,6 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.contacts.iter().all(clearance::takes)
         && mechanism.frictions.is_empty()
         && mechanism.vibration.is_none()
-        && (mechanism.coordinates() == mechanism.bodies.len() || mechanism.contacts.is_empty())
         && (is_tree(mechanism) || is_looped(mechanism))
 }
 
@@ -303,7 +302,7 @@ impl Team for TreeTeam {
         }
         let length = wanted.min(slot.left);
         let step = StepFrom { lane, time: slot.time, order, length };
-        match self.clearance.of(self.mechanism.bodies.len(), &*self.series, step) {
+        match self.clearance.of(&self.mechanism, &*self.series, step) {
             Some(clear) if clear < length => clear,
             Some(_) => wanted,
             None => {
@@ -393,5 +392,13 @@ impl Team for TreeTeam {
             angle = angle * after + v / (k + 1) as f64;
         }
         (self.start(lane, body) + angle * after, rate)
+    }
+
+    fn start_of(&self, lane: usize, coordinate: usize) -> Option<f64> {
+        Some(self.before[coordinate].0[lane])
+    }
+
+    fn power_of(&self, lane: usize, coordinate: usize, k: usize) -> f64 {
+        self.series.rates()[k * self.coordinates + coordinate].0[lane]
     }
 }
