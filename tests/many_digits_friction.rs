@@ -137,6 +137,19 @@ fn a_block_on_a_spring_loses_the_same_amplitude_every_half_period_and_sticks() {
     }
 }
 
+/// A bar turned by a motor: the force of its hinge is a root, and converges later than the motion.
+#[test]
+fn what_a_driven_bar_loses_does_not_hang_on_digits() {
+    let text = r#"{"name": "driven", "gravity": [0, -9.81],
+        "bars": [{"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.05, "length": 0.6}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}],
+            "friction": {"radius": 0.05, "kinetic": 0.3}}],
+        "motors": [{"name": "M", "body": "b", "law": {"start": 0, "rate": 6}}], "start": {}, "until": 9, "every": 9}"#;
+    let [few, many] = [25, 40].map(|digits| ran(text, "3", digits).row.friction.expect("friction"));
+    near(&number(few), &number(many), 20);
+    assert!((many.value() - 3.507_451_6).abs() < 1e-6, "{}", many.value());
+}
+
 /// A disc on a shaft that turns at 0.5 rad/s, held back by a torsion spring, without weight: 0.5 sin(w t)/w.
 #[test]
 fn without_a_load_there_is_no_friction() {

@@ -140,6 +140,7 @@ pub(crate) struct FormulaEvent<C = f64> {
 
 impl<C> FormulaEvent<C> {
     /// True where other parts, or numbers, act from then on.
+    #[cfg(feature = "fit")]
     pub fn changes_what_acts(&self) -> bool {
         !self.on.is_empty() || !self.off.is_empty() || !self.set.is_empty()
     }

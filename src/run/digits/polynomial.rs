@@ -28,15 +28,17 @@ impl<const W: usize> Motion<W> {
             }
             least = least.min((self.precision.tolerance() + first - size) / k as f64);
         }
+        // The work of a force is a product, and may converge later than its factors; a force of friction has the
+        // root of a normal force in it.
+        let allowed = self.precision.tolerance() + WORK + libm::log2(self.mechanism.structure.energy_scale);
+        let allows = |least: f64, powers: &[Digits<W>]| {
+            let last = powers.iter().enumerate().skip(order - JUDGES);
+            last.fold(least, |least, (k, power)| least.min((allowed - power.log2()) / (k + 1) as f64))
+        };
         if self.mechanism.structure.has_work_integral() {
-            // The work of a force is a product, and may converge later than its factors.
-            let energy = libm::log2(self.mechanism.structure.energy_scale);
-            let allowed = self.precision.tolerance() + WORK + energy;
-            let last = self.series.power.iter().enumerate().skip(order - JUDGES);
-            least =
-                last.fold(least, |least, (k, power)| least.min((allowed - power.log2()) / (k + 1) as f64));
+            least = allows(least, &self.series.power);
         }
-        libm::exp2(least)
+        libm::exp2(allows(least, self.series.lost()))
     }
 
     /// True where no power was kept to fewer limbs than it weighs in a step of this length.

@@ -258,7 +258,7 @@ impl Measured {
         } else if until >= t && trust.record.len() > 1 || t == 0.0 {
             (trust.how, trust.error_estimate) = (How::ReferenceSolution, Some(printed(error)));
         } else if let Some(power) = power(&trust.record, &history) {
-            trust.how = How::Extrapolated(until);
+            (trust.how, trust.is_upper_bound) = (How::Extrapolated(until), false);
             let base = error.max(LEAST);
             let ahead = base * libm::pow(t / until, power);
             if ahead > HORIZON {
@@ -290,11 +290,11 @@ pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
 }
 
 /// The power of time with which the error of a regular motion grew over the last three quarters of the
-/// logarithm of time; `None` where it is not known to be regular.
+/// logarithm of time; `None` where it is not known to be regular, over half of that way at least.
 fn power(record: &[[f64; 2]], history: &[[f64; 2]]) -> Option<f64> {
     let (last, end) = (history.last()?, record.last()?);
     let half = history.iter().rev().find(|point| point[0] <= 0.5 * last[0])?;
-    if !last[1].is_finite() || last[1] - half[1] > REGULAR {
+    if !last[1].is_finite() || last[1] - half[1] > REGULAR || last[0] < 0.5 * end[0] {
         return None;
     }
     let first = record.iter().find(|point| point[0] > 0.0)?;
@@ -317,6 +317,16 @@ fn power(record: &[[f64; 2]], history: &[[f64; 2]]) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn nothing_is_carried_on_where_growth_was_followed_in_the_beginning_only() {
+        let record: Vec<[f64; 2]> = (1..=20).map(|k| [0.1 * f64::from(k), 1e-9 * f64::from(k)]).collect();
+        let followed = |until: f64| -> Vec<[f64; 2]> {
+            (0..=8).map(|k| [until * f64::from(k) / 8.0, 0.05 * f64::from(k)]).collect()
+        };
+        assert!(power(&record, &followed(1.5)).is_some_and(|power| (power - 1.0).abs() < 0.1));
+        assert_eq!(power(&record, &followed(0.5)), None);
+    }
 
     #[test]
     fn the_horizon_lies_where_the_error_passes_it() {

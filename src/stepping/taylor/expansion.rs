@@ -147,13 +147,19 @@ impl<T: Coefficient> Expansion<T> {
     }
 
     /// The same of the work over the energy scale: the power of motors, dampers and applied forces may fall
-    /// more slowly than the rates, and where all is driven there are no rates.
+    /// more slowly than the rates, and where all is driven there are no rates.  So may that of dry friction
+    /// alone, whose force has the root of a normal force in it, and which motors make up for.
     fn work_allows(&self) -> f64 {
         let (order, scale) = (self.series.order(), self.mechanism.energy_scale);
-        (order + 1 - JUDGES..=order).fold(f64::INFINITY, |least, k| {
-            let size = (self.series.power[k - 1].value() / (k as f64 * scale)).abs();
-            if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
-        })
+        let allows = |powers: &[T]| {
+            (order + 1 - JUDGES..=order).fold(f64::INFINITY, |least, k| {
+                let size = (powers[k - 1].value() / (k as f64 * scale)).abs();
+                if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
+            })
+        };
+        let lost = self.series.lost();
+        let all = allows(&self.series.power);
+        if lost.is_empty() { all } else { all.min(allows(lost)) }
     }
 
     /// Sums no further than to the power that is the smallest at `h` \[s\].
