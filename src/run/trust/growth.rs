@@ -53,6 +53,11 @@ impl Nature {
         Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes && !remembers, rate: tangent.rate() }
     }
 
+    /// True where a motion has shown what it is like by this time \[s\].
+    pub fn has_shown(self, t: f64) -> bool {
+        self.rate * t >= SHORT
+    }
+
     /// The growth that a history of times \[s\] and logarithms shows.
     pub fn judge(self, history: &[[f64; 2]]) -> Growth {
         let mut growth = Growth::default();
@@ -74,10 +79,7 @@ impl Nature {
             late >= CHAOTIC && late <= ALIKE * early && early <= ALIKE * late && line.rest < power.rest;
         if grows && !self.is_planar {
             growth.lyapunov = Some(exponent(history, at));
-        } else if self.rate * (end - begin) >= SHORT
-            && power.slope < REGULAR
-            && (self.is_planar || late < CHAOTIC)
-        {
+        } else if self.has_shown(end - begin) && power.slope < REGULAR && (self.is_planar || late < CHAOTIC) {
             // Where growth is slow both lines fit.
             let is_steady = power.slope < 0.5 || power.rest <= line.rest;
             growth.power = (is_steady && power.slope.is_finite()).then_some(power.slope.max(0.0));

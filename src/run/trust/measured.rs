@@ -219,8 +219,20 @@ impl Measured {
         }
         let input_error =
             self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
-        let Self { name, shared, until, error, mut record, horizon, lost, why, history, no_growth, .. } =
-            self;
+        let Self {
+            name,
+            shared,
+            until,
+            error,
+            mut record,
+            horizon,
+            lost,
+            why,
+            history,
+            no_growth,
+            nature,
+            ..
+        } = self;
         if record.last().is_some_and(|last| last[0] < until) {
             record.push([until, error]);
         }
@@ -257,7 +269,7 @@ impl Measured {
             (rate, torque) = beside;
         } else if until >= t && trust.record.len() > 1 || t == 0.0 {
             (trust.how, trust.error_estimate) = (How::ReferenceSolution, Some(printed(error)));
-        } else if let Some(power) = power(&trust.record, &history) {
+        } else if let Some(power) = power(&trust.record, &history, nature) {
             (trust.how, trust.is_upper_bound) = (How::Extrapolated(until), false);
             let base = error.max(LEAST);
             let ahead = base * libm::pow(t / until, power);
@@ -290,11 +302,12 @@ pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
 }
 
 /// The power of time with which the error of a regular motion grew over the last three quarters of the
-/// logarithm of time; `None` where it is not known to be regular, over half of that way at least.
-fn power(record: &[[f64; 2]], history: &[[f64; 2]]) -> Option<f64> {
+/// logarithm of time; `None` where it is not known to be regular, over many turns or half of that way at least.
+fn power(record: &[[f64; 2]], history: &[[f64; 2]], nature: Nature) -> Option<f64> {
     let (last, end) = (history.last()?, record.last()?);
     let half = history.iter().rev().find(|point| point[0] <= 0.5 * last[0])?;
-    if !last[1].is_finite() || last[1] - half[1] > REGULAR || last[0] < 0.5 * end[0] {
+    let is_known = nature.has_shown(last[0]) || last[0] >= 0.5 * end[0];
+    if !is_known || !last[1].is_finite() || last[1] - half[1] > REGULAR {
         return None;
     }
     let first = record.iter().find(|point| point[0] > 0.0)?;
@@ -324,8 +337,9 @@ mod tests {
         let followed = |until: f64| -> Vec<[f64; 2]> {
             (0..=8).map(|k| [until * f64::from(k) / 8.0, 0.05 * f64::from(k)]).collect()
         };
-        assert!(power(&record, &followed(1.5)).is_some_and(|power| (power - 1.0).abs() < 0.1));
-        assert_eq!(power(&record, &followed(0.5)), None);
+        let power = |until: f64| power(&record, &followed(until), Nature::default());
+        assert!(power(1.5).is_some_and(|power| (power - 1.0).abs() < 0.1));
+        assert_eq!(power(0.5), None);
     }
 
     #[test]
