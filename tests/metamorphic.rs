@@ -21,7 +21,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Scenes for each relation where nobody says how many.
-const USUAL: u64 = 120;
+const USUAL: u64 = 84;
 /// Evaluations allowed to a run.
 const MAX_EVALUATIONS: u64 = 400_000;
 /// Agreement that is asked for in any case: of angles \[rad\], and of places over the scene's length.

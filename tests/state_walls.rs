@@ -391,7 +391,7 @@ fn as_formulas(text: &str, size: f64) -> String {
 /// `SEEDS=2000 cargo test --test physics -- state_walls::random --nocapture`
 #[test]
 fn random_walls_written_as_curves_are_the_same_walls() {
-    let count = std::env::var("SEEDS").ok().and_then(|text| text.parse().ok()).unwrap_or(80);
+    let count = std::env::var("SEEDS").ok().and_then(|text| text.parse().ok()).unwrap_or(48);
     let (mut kinds, mut impacts, mut holds, mut worst) = (BTreeMap::new(), 0, 0, 0.0_f64);
     let (mut compared, mut stopped, mut lost) = (0, 0, 0);
     let (mut sliding, mut loads) = (0, [0; 2]);
