@@ -370,7 +370,7 @@ mod tests {
         let record: Vec<[f64; 2]> = times.iter().map(|&t| [t, 1e-12 * t.powf(1.5)]).collect();
         let regular: Vec<[f64; 2]> = times.iter().map(|&t| [t, (1.0 + t).ln()]).collect();
         let chaotic: Vec<[f64; 2]> = times.iter().map(|&t| [t, t]).collect();
-        assert!((power(&record, &regular).expect("regular") - 1.5).abs() < 1e-9);
-        assert_eq!(power(&record, &chaotic), None);
+        assert!((power(&record, &regular, Nature::default()).expect("regular") - 1.5).abs() < 1e-9);
+        assert_eq!(power(&record, &chaotic, Nature::default()), None);
     }
 }
