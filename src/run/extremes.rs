@@ -61,6 +61,11 @@ pub struct Extremes {
 }
 
 impl Extremes {
+    /// Least and largest value, mean and rms: what a sweep keeps of it.
+    pub(super) fn figures(&self) -> [f64; 4] {
+        [self.min[0], self.max[0], self.mean, self.rms]
+    }
+
     /// The value of the largest magnitude, and when it was taken \[s\].
     pub fn peak(&self) -> [f64; 2] {
         if self.min[0].abs() > self.max[0].abs() { self.min } else { self.max }

@@ -6,6 +6,7 @@
 
 use super::contact::ContactDriver;
 use super::running::Outcome;
+use super::saltation::plain;
 use crate::arithmetic::Complex;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::friction::modes::{HINT, JAMS, Modes};
@@ -110,8 +111,7 @@ impl FrictionWatch {
     /// begins, and everywhere where it is near zero.
     pub fn values(&self, motion: &Motion) -> Vec<f64> {
         let mechanism = &*self.mechanism;
-        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let [phi, omega] = plain(motion);
         let is_sticking = mechanism.sticking() > 0;
         if let Some(regularity) = self.regularity.get() {
             let mut values = self.sliding(motion.time, &phi, &omega);
@@ -155,8 +155,7 @@ impl FrictionWatch {
             kernel.accelerate::<0>(mechanism, time, phi, omega, Bias::default());
             (kernel.friction_forces(mechanism, time, phi, omega)[place][0], kernel.load.clone())
         };
-        let mut phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        let mut omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let [mut phi, mut omega] = plain(motion);
         let (now, accelerations) = force(motion.time, &phi, &omega);
         let h = A_MOMENT * mechanism.units.time;
         for ((phi, omega), acceleration) in phi.iter_mut().zip(&mut omega).zip(accelerations) {
@@ -205,8 +204,7 @@ impl ContactDriver {
             return Ok((staying, Vec::new()));
         }
         let motion = self.motion();
-        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let [phi, omega] = plain(&motion);
         let z: Vec<Complex<f64>> = self.free.elements(&phi);
         let at = Moment { t: motion.time, phi: &phi, z: &z, omega: &omega };
         let found = self.free.modes_at(at, &self.mechanism.modes, [&staying, touching], transition);

@@ -125,7 +125,7 @@ impl Aim {
             slopes: self.slopes.iter().map(|&(k, slope)| (k, at(slope))).collect(),
             angles: self.angles.clone(),
             is_timed: self.is_timed,
-            // Lanes ask for no forces of joints.
+            // Series in lanes ask for no forces of joints.
             at_points: None,
             tape,
             inputs,

@@ -5,6 +5,7 @@ use super::super::impact_monitor;
 use super::super::impact_monitor::Claim;
 use super::super::methods::Stabilization;
 use super::super::running::Outcome;
+use super::super::saltation::plain;
 use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
@@ -295,8 +296,7 @@ impl ContactDriver {
         let before = self.sampler.balance(motion);
         let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
         if self.mechanism.sliding().any(|(friction, _)| is_new(friction.normal)) {
-            let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-            let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+            let [phi, omega] = plain(motion);
             if let Some(omega) = self.mechanism.without_normal_rates(motion.time, &phi, &omega) {
                 motion.omega = omega.into_iter().map(DoubleDouble::from).collect();
             }

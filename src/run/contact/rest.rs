@@ -10,6 +10,7 @@
 //! height of the last one.
 
 use super::super::running::Outcome;
+use super::super::saltation::plain;
 use super::{ContactDriver, NO_SPEED, in_modes};
 use crate::dynamics::Motion;
 use crate::dynamics::constraint::Posture;
@@ -27,8 +28,7 @@ impl ContactDriver {
         modes: &[Mode],
         motion: &Motion,
     ) -> f64 {
-        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
+        let [phi, omega] = plain(motion);
         let z = self.free.elements(&phi);
         let wall = &self.free.contacts[contact];
         let speed = wall.gap_rate(motion.time, &phi, &z, &omega);

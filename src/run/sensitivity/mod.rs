@@ -382,28 +382,28 @@ fn taken(
         return Ok((t, t, slopes));
     };
     let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
-    if let Some((behind, late)) = at.behind.as_ref().filter(|_| is_extreme) {
-        // At a jump or a corner, whose time moves: on the side that has the extreme.
-        let off = |side: &Derived| (side.values[output] - asked.value).abs();
-        let Derived { values, slopes, rates } =
-            if off(behind) < off(&at.derived) { behind } else { &at.derived };
-        let slopes = slopes[output].iter().zip(late).map(|(slope, late)| slope + rates[output] * late);
-        return Ok((t, values[output], slopes.collect()));
-    }
-    let Derived { values, slopes, rates } = &at.derived;
-    let is_end = asked.is_end || t == 0.0;
-    let size = values[output].abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
-    if is_extreme && !is_end && rates[output].abs() > CORNER * size {
+    let off = |side: &Derived| (side.values[output] - asked.value).abs();
+    let (Derived { values, slopes, rates }, late) = match &at.behind {
+        // A jump or a corner moves in time: on the side that has the extreme.
+        Some((behind, late)) if is_extreme => {
+            (if off(behind) < off(&at.derived) { behind } else { &at.derived }, Some(late))
+        }
+        _ if asked.ended_by.is_some() => {
+            // So does the end, with the event.
+            let late = at.times.iter().find(|(measure, _)| *measure == number);
+            let late = late.ok_or("the function of the event that ends the run only touches zero")?;
+            (&at.derived, Some(&late.1))
+        }
+        _ => (&at.derived, None),
+    };
+    let (value, rate, mut slopes) = (values[output], rates[output], slopes[output].clone());
+    let size = value.abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
+    let stays = late.is_none() && !asked.is_end && t != 0.0;
+    if is_extreme && stays && rate.abs() > CORNER * size {
         return Err(format!("the extreme at {t} s is a corner of the curve, at an impact or an event"));
     }
-    let mut slopes = slopes[output].clone();
-    if asked.ended_by.is_some() {
-        // The end moves with the event.
-        let times = at.times.iter().find(|(measure, _)| *measure == number);
-        let times = &times.ok_or("the function of the event that ends the run only touches zero")?.1;
-        slopes.iter_mut().zip(times).for_each(|(slope, time)| *slope += rates[output] * time);
-    }
-    Ok((t, values[output], slopes))
+    slopes.iter_mut().zip(late.into_iter().flatten()).for_each(|(slope, late)| *slope += rate * late);
+    Ok((t, value, slopes))
 }
 
 fn position(known: &[&str], name: &str, what: &str) -> Result<usize, SensitivityError> {

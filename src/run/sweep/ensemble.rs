@@ -15,6 +15,7 @@ use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Mechanism, Time};
 use crate::run::build::Problem;
+use crate::run::extremes::Extremes;
 use crate::run::plan::Plan;
 use crate::stepping::StepError;
 use crate::stepping::taylor::batch::{Batch, BatchMember, BatchObserver, Going, Passage, Watch};
@@ -63,8 +64,7 @@ impl Ensemble {
 
     /// What the outputs of a trajectory came to.
     pub(super) fn extremes(&self, number: usize) -> Vec<[f64; 4]> {
-        let extremes = self.watching[number].extremes().into_iter();
-        extremes.map(|one| [one.min[0], one.max[0], one.mean, one.rms]).collect()
+        self.watching[number].extremes().iter().map(Extremes::figures).collect()
     }
 
     /// What impacts have changed so far of a trajectory's energy less the work its state tells of \[J\].

@@ -9,6 +9,7 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::larger;
+use crate::run::extremes::Extremes;
 use crate::run::flip::Flip;
 use crate::run::methods::{MethodId, Stabilization};
 use crate::run::plan::{Plan, Request};
@@ -263,8 +264,7 @@ impl Sweep {
                 point.steps = outcome.statistics.steps;
                 point.flip = outcome.flip;
                 point.trust = outcome.trust.as_ref().map(PointTrust::from);
-                let extremes = outcome.extremes.iter();
-                point.extremes = extremes.map(|one| [one.min[0], one.max[0], one.mean, one.rms]).collect();
+                point.extremes = outcome.extremes.iter().map(Extremes::figures).collect();
                 point.status = outcome.stop.map_or(Status::Done, Status::Stopped);
             }
             Err(error) => point.status = Status::Refused(error.to_string()),

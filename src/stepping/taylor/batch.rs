@@ -25,6 +25,7 @@ use self::driven::DrivenTeam;
 use self::free::FreeTeam;
 use self::looped::LoopTeam;
 pub use self::passage::Passage;
+use self::passage::coordinates;
 pub(crate) use self::passage::read;
 use self::slots::{LaneSlot, LaneSlots};
 use self::swinging::SwingingTeam;
@@ -360,10 +361,9 @@ trait Team {
     /// Writes coordinates and rates \[rad, m, rad/s, m/s\] of a mechanism's state `after` \[s\] from the
     /// start of that step, where they are no polynomials.
     fn inside(&self, order: usize, lane: usize, after: f64, mechanism: &Mechanism, state: &mut State) {
-        let is_all = mechanism.has_multipliers();
-        let count = if is_all { mechanism.coordinates() } else { mechanism.partition.count() };
+        let count = coordinates(mechanism);
         for c in 0..count {
-            let body = if is_all { c } else { mechanism.partition.independent[c] };
+            let body = if mechanism.has_multipliers() { c } else { mechanism.partition.independent[c] };
             (state.y[c], state.y[count + c]) = self.at(order, lane, body, after);
         }
     }

@@ -1,5 +1,6 @@
 //! Motions inside the step of a lane.
 
+use super::passage::coordinates;
 use super::{BatchMember, Team, read};
 use crate::dynamics::{Motion, State, Time};
 
@@ -89,11 +90,7 @@ impl Interior {
     /// Takes the polynomials of a step.
     fn take_in<T: Team>(&mut self, team: &T, member: &BatchMember, InLane { order, lane, .. }: InLane) {
         let Self { start, rates, ways, .. } = self;
-        let mechanism = member.mechanism;
-        let f = match mechanism.has_multipliers() {
-            true => mechanism.coordinates(),
-            false => mechanism.partition.count(),
-        };
+        let f = coordinates(member.mechanism);
         start.clear();
         rates.resize((order + 1) * f, 0.0);
         ways.resize((order + 1) * f, 0.0);

@@ -45,14 +45,19 @@ impl<'a> Passage<'a> {
     }
 }
 
+/// How many coordinates a state of those in lanes has.
+pub(super) fn coordinates(mechanism: &Mechanism) -> usize {
+    if mechanism.has_multipliers() { mechanism.coordinates() } else { mechanism.partition.count() }
+}
+
 /// Reads angles and rates of all bodies from a state of those in lanes; tells how many coordinates the state
 /// has.
 pub(crate) fn read(mechanism: &Mechanism, state: &State, motion: &mut Motion) -> usize {
+    let count = coordinates(mechanism);
     if mechanism.has_multipliers() {
-        let n = mechanism.coordinates();
-        motion.follow(state, n);
-        return n;
+        motion.follow(state, count);
+    } else {
+        mechanism.partition.read(state, motion);
     }
-    mechanism.partition.read(state, motion);
-    mechanism.partition.count()
+    count
 }
