@@ -327,3 +327,40 @@ fn a_hinged_bar_comes_to_rest_on_a_rough_wall() {
     }
     assert!(ends.iter().all(|end| (end - ends[2]).abs() < 2e-9), "{ends:?}");
 }
+
+/// A block that bounces on a cart, which slides along a rough rail of the ground: until the bounces have ended the
+/// rail carries the cart alone.
+#[test]
+fn a_joint_rubs_as_in_flight_until_infinitely_many_bounces_have_ended() {
+    let (cart, block, mu, height, speed, until) = (1.0, 9.0, 0.5, 0.1_f64, 10.0, 2.0);
+    let total = cart + block;
+    for e in [0.5_f64, 0.8, 0.9] {
+        let text = format!(
+            r#"{{"name": "cart", "gravity": [0, -{G}], "until": {until}, "every": {until},
+            "bars": [{{"name": "cart", "mass": {cart}, "centre": [0, 0], "inertia": 0.1}},
+                {{"name": "block", "mass": {block}, "centre": [0, 0], "inertia": 0.1}}],
+            "sliders": [{{"name": "rail", "point": {{"body": "cart", "point": [0, 0]}},
+                    "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked", "friction": {{"kinetic": {mu}}}}},
+                {{"name": "post", "point": {{"body": "block", "point": [0, 0]}},
+                    "rail": {{"body": "cart", "point": [0, 0], "direction": [0, 1]}}, "angle": "locked"}}],
+            "walls": [{{"name": "deck", "body": "block", "point": [0, 0], "restitution": {e},
+                "line": {{"body": "cart", "through": [0, 0], "normal": [0, 1]}}}}],
+            "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{speed}, 0]}},
+                "block": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{speed}, 0]}}}}}}"#
+        );
+        let end = (2.0 * height / G).sqrt() * (1.0 + e) / (1.0 - e);
+        let (flying, held) = (mu * G * cart / total, mu * G);
+        let left = until - end;
+        let met = speed - flying * end;
+        let v = met - held * left;
+        let x = 0.5 * (speed + met) * end + 0.5 * (met + v) * left;
+        let lost = 0.5 * total * (speed * speed - v * v);
+        for outcome in runs(&text) {
+            near(0.1 * outcome.last.omega[2], 0.1 * v, "rate of the cart");
+            near(0.1 * outcome.last.phi[2], 0.1 * x, "place of the cart");
+            near(1e-2 * outcome.last.friction, 1e-2 * lost, "energy lost in friction");
+            near(1e-2 * outcome.impact_loss, 1e-2 * block * G * height, "energy lost in impacts");
+            near(outcome.holds[0].t, end, "end of the bounces");
+        }
+    }
+}

@@ -316,3 +316,76 @@ fn what_breaks_away_makes_events_of_its_direction_alone() {
         }
     }
 }
+
+/// A body meets the floor off its centre; a lock that closes with its rebound takes its spin back, with which a rotor's
+/// torque has begun.
+#[test]
+fn what_an_impact_makes_happen_is_not_taken_back_by_what_happens_with_it() {
+    let events = [
+        r#"{"name": "brake", "when": "p.vy", "direction": "rising", "on": ["lock"]}"#,
+        r#"{"name": "begin", "when": "a.omega - 0.1", "direction": "rising", "set": {"k": 1}}"#,
+    ];
+    let (met, until) = (0.2_f64.sqrt(), 0.6);
+    for [one, other] in [[0, 1], [1, 0]] {
+        let text = format!(
+            r#"{{"name": "spin", "gravity": [0, -10], "parameters": {{"k": 0}}, "until": {until}, "every": {until},
+            "bars": [{{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+                {{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 2}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [3, 0]}}, {{"body": "rotor", "point": [0, 0]}}]}}],
+            "points": [{{"name": "p", "body": "a", "point": [0.3, 0]}}],
+            "torques": [{{"name": "T", "body": "rotor", "torque": "k"}}],
+            "walls": [{{"name": "floor", "body": "a", "point": [0.3, 0], "restitution": 0.5,
+                "line": {{"through": [0, 0], "normal": [0, 1]}}}}],
+            "locks": [{{"name": "lock", "body": "a"}}], "inactive": ["lock"],
+            "events": [{}, {}],
+            "start": {{"a": {{"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "rotor": {{"phi": 0, "omega": 0}}}}}}"#,
+            events[one], events[other]
+        );
+        let found = scene(&text);
+        let rotor = found.bars.iter().position(|bar| bar.name == "rotor").expect("a rotor");
+        for request in methods() {
+            let outcome = run(&found, &request);
+            assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+            for name in ["brake", "begin"] {
+                let happened = times(&outcome, name);
+                assert_eq!(happened.len(), 1, "{:?}: {name} at {happened:?}", request.method);
+                assert_near(happened[0], met, 1e-9, name);
+            }
+            assert_near(
+                outcome.last.phi[rotor],
+                0.25 * (until - met) * (until - met),
+                1e-9,
+                "angle of the rotor",
+            );
+        }
+    }
+}
+
+/// Three events at the end of the run: the second one changes what the third sees.
+#[test]
+fn all_events_at_the_end_of_a_run_happen() {
+    let text = |until: f64| {
+        format!(
+            r#"{{"name": "end", "gravity": [0, 0], "parameters": {{"k": 1}}, "until": {until}, "every": 0.25,
+            "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "torques": [{{"name": "T", "body": "b", "torque": "k"}}, {{"name": "T0", "body": "b", "torque": 2}}],
+            "events": [{{"name": "e0", "when": "t - 1", "set": {{"k": 5}}}}, {{"name": "e1", "when": "1*t - 1", "off": ["T0"]}},
+                {{"name": "e2", "when": "2*t - 2"}}],
+            "outputs": {{"a": "b.alpha"}}, "start": {{"b": {{"phi": 0, "omega": 0}}}}}}"#
+        )
+    };
+    for request in methods() {
+        for until in [1.0, 1.5] {
+            let outcome = run(&scene(&text(until)), &request);
+            assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+            let names: Vec<&str> = outcome.events.iter().map(|event| event.name.as_str()).collect();
+            assert_eq!(names, ["e0", "e1", "e2"], "{:?} to {until}", request.method);
+            // 3 rad/s² for a second, then 5.
+            let rest = until - 1.0;
+            assert_near(outcome.last.omega[0], 3.0 + 5.0 * rest, 1e-9, "rate");
+            assert_near(outcome.last.phi[0], 1.5 + 3.0 * rest + 2.5 * rest * rest, 1e-9, "angle");
+            assert_near(outcome.last.outputs[0], 5.0, 1e-9, "acceleration");
+        }
+    }
+}

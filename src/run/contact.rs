@@ -258,6 +258,12 @@ impl ContactDriver {
             self.record_events(outcome);
             let impacts_before = outcome.impact_count;
             match halt {
+                Ok(Halt::Until) if until == horizon && self.are_due(outcome) => {
+                    self.act(outcome, lent(&mut monitor))?;
+                    if self.ended_by.is_some() {
+                        return Ok(true);
+                    }
+                }
                 Ok(Halt::Until) => return Ok(true),
                 Ok(Halt::Cut) => {
                     self.act(outcome, lent(&mut monitor))?;
@@ -300,6 +306,14 @@ impl ContactDriver {
         let hint = "shorten the output interval, lower the restitution, or look for a point that motors squeeze \
                     between walls";
         Err(self.stopped(&outcome.plan, what, hint))
+    }
+
+    /// True where something is to be done at an event that is due at the end of the run.
+    fn are_due(&mut self, outcome: &mut Outcome) -> bool {
+        let motion = self.motion();
+        let are_due = self.events.as_mut().is_some_and(|events| events.happen_at_end(&motion));
+        self.record_events(outcome);
+        are_due
     }
 
     /// The present motion.

@@ -6,6 +6,7 @@ use super::super::impact_monitor::Claim;
 use super::super::methods::Stabilization;
 use super::super::running::Outcome;
 use super::super::saltation::plain;
+use super::rest::Flight;
 use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
@@ -240,18 +241,18 @@ impl ContactDriver {
         let before = self.jumps.is_some().then(|| motion.clone());
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
         let new: Vec<usize> = contacts.iter().copied().filter(|c| !self.mechanism.held.contains(c)).collect();
-        let bounces: Vec<f64> =
-            new.iter().map(|&contact| self.bounces_last(contact, &contacts, &modes, &motion)).collect();
+        let flight = |&contact: &usize| Some((contact, self.flight(contact, &contacts, &modes, &motion)?));
+        let flights: Vec<(usize, Flight)> = new.iter().filter_map(flight).collect();
         self.record(&contacts, motion.time.hi, outcome);
-        for (&contact, last) in new.iter().zip(bounces) {
-            self.begin_later(contact, last, outcome);
+        for (contact, flight) in &flights {
+            self.begin_later(*contact, flight.last, outcome);
         }
         self.record_modes(&modes, motion.time.hi, outcome);
         let mut plan = outcome.plan.clone();
         self.mechanism = in_modes(&self.free, &contacts, &modes);
         if self.mechanism.constraints.len() > self.free.constraints.len() {
             plan.stabilization = Stabilization::Projection;
-            self.put_on(&mut motion, &new, outcome)?;
+            self.put_on(&mut motion, &new, &flights, outcome)?;
         }
         if let Some(events) = &mut self.events {
             events.watch_friction(&self.mechanism);
@@ -286,16 +287,20 @@ impl ContactDriver {
     }
 
     /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to
-    /// rebound with, at the walls that are held anew with the friction of their impulses.
-    pub(super) fn put_on(
+    /// rebound with, at the walls that are held anew with the friction of their impulses, and after flights that
+    /// are left out.
+    fn put_on(
         &mut self,
         motion: &mut Motion,
         new: &[usize],
+        flights: &[(usize, Flight)],
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let before = self.sampler.balance(motion);
         let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
-        if self.mechanism.sliding().any(|(friction, _)| is_new(friction.normal)) {
+        if !flights.is_empty() && self.mechanism.sliding().any(|(friction, _)| !is_new(friction.normal)) {
+            self.fly(flights.iter().map(|(_, flight)| flight), motion);
+        } else if self.mechanism.sliding().any(|(friction, _)| is_new(friction.normal)) {
             let [phi, omega] = plain(motion);
             if let Some(omega) = self.mechanism.without_normal_rates(motion.time, &phi, &omega) {
                 motion.omega = omega.into_iter().map(DoubleDouble::from).collect();

@@ -278,6 +278,18 @@ impl EventDetector {
         }
     }
 
+    /// Records an event, and tells what is to be done.
+    fn happen(&mut self, event: usize, t: Time, motion: &Motion) -> Action {
+        self.count += 1;
+        self.found.push(EventRecord {
+            name: self.name(event).into(),
+            t: t.hi,
+            phi: (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect(),
+            omega: motion.omega.iter().map(|omega| omega.hi).collect(),
+        });
+        self.action(event, motion)
+    }
+
     /// Moves what was found to a list, which keeps so many; returns how many there were.
     pub fn take_found(&mut self, list: &mut Vec<EventRecord>) -> u64 {
         let room = KEPT.saturating_sub(list.len());
@@ -294,8 +306,9 @@ impl EventDetector {
     }
 
     /// Remembers the events whose functions a jump of the rates has carried across zero: they happen where the
-    /// next step begins, unless another jump at this moment carries them back.
+    /// next step begins, unless another jump at this moment carries them back before any of them has happened.
     pub fn jump(&mut self, [before, after]: [&Motion; 2]) {
+        let has_begun = self.memory.last.iter().any(|(_, t)| *t == after.time);
         let [before, after] =
             [before, after].map(|motion| self.mechanism.seen(motion, |at| self.event_values(at)));
         let EventMemory { largest, resting, due, .. } = &mut self.memory;
@@ -306,6 +319,7 @@ impl EventDetector {
             }
             let rises = after > 0.0;
             match due.iter().position(|due| *due == (event, !rises)) {
+                Some(_) if has_begun => {}
                 Some(place) => drop(due.remove(place)),
                 None => due.push((event, rises)),
             }
@@ -404,14 +418,7 @@ impl StepWatcher for EventDetector {
                 self.cut(&all, t, (begin, span), &before);
                 return Some(t);
             }
-            self.count += 1;
-            self.found.push(EventRecord {
-                name: self.name(event).into(),
-                t: t.hi,
-                phi: (0..motion.phi.len()).map(|k| motion.unwrapped(k)).collect(),
-                omega: motion.omega.iter().map(|omega| omega.hi).collect(),
-            });
-            let action = self.action(event, &motion);
+            let action = self.happen(event, t, &motion);
             if action != Action::Record {
                 // What acts from then on may drive a motion back that has just flipped a condition.
                 self.memory.flipped.clear();

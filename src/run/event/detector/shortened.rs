@@ -1,7 +1,8 @@
-//! Steps that an event cuts short: what of them has not happened, and what happens where the next one begins.
+//! Steps that an event cuts short: what of them has not happened, and what happens where the next one begins, or
+//! would begin.
 
-use super::{EventDetector, Owner, SAME};
-use crate::dynamics::Time;
+use super::{Action, EventDetector, Owner, SAME};
+use crate::dynamics::{Motion, Time};
 use crate::run::event::search::Passage;
 
 impl EventDetector {
@@ -48,5 +49,28 @@ impl EventDetector {
                 self.memory.due.push((*event, *rises));
             }
         }
+    }
+
+    /// The events that are due at the end of a run, which no step follows, up to one at which something is to
+    /// be done; false where there is none.
+    pub fn happen_at_end(&mut self, motion: &Motion) -> bool {
+        if self.memory.pending.is_some() {
+            // Located behind the end by less than a bit of its time.
+            return true;
+        }
+        self.memory.due.sort_by_key(|due| due.0);
+        while !self.memory.due.is_empty() {
+            let (event, rises) = self.memory.due.remove(0);
+            if !self.counts(event, rises) {
+                continue;
+            }
+            self.memory.last.push((event, motion.time));
+            let action = self.happen(event, motion.time, motion);
+            if action != Action::Record {
+                self.memory.pending = Some((event, action));
+                return true;
+            }
+        }
+        false
     }
 }
