@@ -71,6 +71,8 @@ mod many_digits_events;
 #[cfg(feature = "digits")]
 mod many_digits_friction;
 #[cfg(feature = "digits")]
+mod many_digits_impacts;
+#[cfg(feature = "digits")]
 mod many_digits_resting;
 #[cfg(feature = "digits")]
 mod many_digits_switched;

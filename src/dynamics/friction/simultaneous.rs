@@ -13,6 +13,7 @@
 //! combination.  Among those that fit, points that slide on come before those that stop, and those that stick
 //! before those that turn.  A wall whose point does not approach has no restitution.  Impulses that the
 //! motion does not determine, as at two corners of one body that both stick, are shared in any way that fits.
+//! It is written over the scalar: numbers of many digits have a rounding of their own.
 //!
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), sections 8.2 and
 //! 8.3.
@@ -20,26 +21,30 @@
 use super::super::constraint::Posture;
 use super::super::contact::metric::{Gradient, Metric};
 use super::super::{Mechanism, Time};
+use crate::arithmetic::Real;
 use nalgebra::DVector;
 
 /// Combinations that are looked at.
 const MOST: usize = 20_000;
-/// Share of the largest velocity, impulse or entry of A that rounding makes.
+/// Share of the largest velocity, impulse or entry of A that rounding makes, in doubles.
 const ROUNDING: f64 = 1e-11;
 
-/// What the impulses at several walls are decided by.
+/// What the impulses at several walls are decided by; or, of points that rest, their forces, with
+/// accelerations for velocities.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shocks {
+pub struct Shocks<T = f64> {
     /// A \[1/kg\], row by row: velocities that unit impulses make (2k, 2k).
-    pub response: Vec<f64>,
+    pub response: Vec<T>,
     /// v⁻ \[m/s\] (2k).
-    pub velocity: Vec<f64>,
+    pub velocity: Vec<T>,
     /// e (k), without those of points that do not approach.
-    pub restitution: Vec<f64>,
+    pub restitution: Vec<T>,
     /// mu and mu0 (k); zeros without friction.
-    pub coefficients: Vec<[f64; 2]>,
+    pub coefficients: Vec<[T; 2]>,
     /// True for Newton's law of impact, else Poisson's.
     pub is_newton: bool,
+    /// Share of the largest velocity, impulse or entry of A that rounding makes.
+    pub rounding: T,
 }
 
 /// What the impulse at one wall does.
@@ -51,38 +56,52 @@ struct Way {
     slides: f64,
 }
 
-impl Shocks {
+impl<T: Real> Shocks<T> {
     /// Normal and tangential impulses \[N·s\] of all walls; `None` where no combination fits, or there are
     /// too many.
-    pub fn impulses(&self) -> Option<Vec<[f64; 2]>> {
+    pub fn impulses(&self) -> Option<Vec<[T; 2]>> {
         let count = self.restitution.len();
-        let nothing = vec![0.0; count];
+        let nothing = vec![T::ZERO; count];
         let first = if self.is_newton {
-            let rebound: Vec<f64> =
-                self.restitution.iter().zip(&self.velocity).map(|(e, v)| -e * v).collect();
+            let rebound: Vec<T> =
+                self.restitution.iter().zip(&self.velocity).map(|(&e, &v)| -e * v).collect();
             self.phase(&self.velocity, &nothing, &rebound)?
         } else {
             self.phase(&self.velocity, &nothing, &nothing)?
         };
         let mut all = first.clone();
-        if !self.is_newton && self.restitution.iter().any(|&e| e != 0.0) {
-            let least: Vec<f64> = self.restitution.iter().zip(&first).map(|(e, n)| e * n).collect();
+        if !self.is_newton && self.restitution.iter().any(|&e| e != T::ZERO) {
+            let least: Vec<T> = self.restitution.iter().zip(&first).map(|(&e, &n)| e * n).collect();
             let second = self.phase(&self.after(&self.velocity, &first), &least, &nothing)?;
             all.iter_mut().zip(second).for_each(|(all, more)| *all += more);
         }
         Some((0..count).map(|i| [all[i], all[count + i]]).collect())
     }
 
+    /// The impulses of compression alone (2k), after which no point goes into its wall.
+    pub fn compression(&self) -> Option<Vec<T>> {
+        let nothing = vec![T::ZERO; self.restitution.len()];
+        self.phase(&self.velocity, &nothing, &nothing)
+    }
+
+    /// The impulses after which the points of these walls do not move along their normals, whatever the
+    /// others do; without friction.
+    pub fn pressed(&self, walls: &[usize]) -> Option<Vec<T>> {
+        let nothing = vec![T::ZERO; self.restitution.len()];
+        let way = |i| Way { is_pressed: walls.contains(&i), slides: 0.0 };
+        let ways: Vec<Way> = (0..nothing.len()).map(way).collect();
+        self.impulses_of(&self.velocity, &nothing, &nothing, &ways)
+    }
+
     /// Velocities after impulses.
-    fn after(&self, velocity: &[f64], impulse: &[f64]) -> Vec<f64> {
+    pub fn after(&self, velocity: &[T], impulse: &[T]) -> Vec<T> {
         let rows = self.response.chunks_exact(velocity.len());
-        rows.zip(velocity)
-            .map(|(row, v)| v + row.iter().zip(impulse).map(|(a, p)| a * p).sum::<f64>())
-            .collect()
+        let change = |row: &[T]| row.iter().zip(impulse).map(|(&a, &p)| a * p).reduce(|sum, term| sum + term);
+        rows.zip(velocity).map(|(row, &v)| v + change(row).unwrap_or(T::ZERO)).collect()
     }
 
     /// The impulses of a phase from these velocities on.
-    fn phase(&self, from: &[f64], least: &[f64], rebound: &[f64]) -> Option<Vec<f64>> {
+    fn phase(&self, from: &[T], least: &[T], rebound: &[T]) -> Option<Vec<T>> {
         let ways: Vec<Vec<Way>> = (0..least.len()).map(|i| self.ways(i, from, least[i])).collect();
         let total = ways.iter().try_fold(1_usize, |all, of| all.checked_mul(of.len()));
         let total = total.filter(|&total| total <= MOST)?;
@@ -99,35 +118,41 @@ impl Shocks {
         })
     }
 
+    /// A velocity that is rounding.
+    fn still(&self) -> T {
+        self.rounding * largest(&self.velocity)
+    }
+
     /// What a wall may do, first what changes least.
-    fn ways(&self, i: usize, from: &[f64], least: f64) -> Vec<Way> {
+    fn ways(&self, i: usize, from: &[T], least: T) -> Vec<Way> {
         let ahead = from[from.len() / 2 + i];
-        let still = ROUNDING * self.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let still = self.still();
         let slides: &[f64] = match self.coefficients[i] {
-            [_, 0.0] => &[0.0],
+            [_, stiction] if stiction == T::ZERO => &[0.0],
             _ if ahead > still => &[1.0, 0.0, -1.0],
             _ if ahead < -still => &[-1.0, 0.0, 1.0],
             _ => &[0.0, 1.0, -1.0],
         };
         let way = |is_pressed| slides.iter().map(move |&slides| Way { is_pressed, slides });
         // Without an impulse there is no friction.
-        let few = if least > 0.0 { slides.len() } else { 1 };
+        let few = if least > T::ZERO { slides.len() } else { 1 };
         way(true).chain(way(false).take(few)).collect()
     }
 
     /// The impulses that go these ways, wherever they lead; `None` where there are none.
-    fn impulses_of(&self, from: &[f64], least: &[f64], rebound: &[f64], way: &[Way]) -> Option<Vec<f64>> {
+    fn impulses_of(&self, from: &[T], least: &[T], rebound: &[T], way: &[Way]) -> Option<Vec<T>> {
         let (count, size) = (way.len(), from.len());
-        let mut impulse = vec![0.0; size];
+        let mut impulse = vec![T::ZERO; size];
         let mut unknown = Vec::new();
         for (i, way) in way.iter().enumerate() {
+            let [kinetic, stiction] = self.coefficients[i];
             if way.is_pressed {
                 unknown.push(i);
             } else {
                 impulse[i] = least[i];
-                impulse[count + i] = -way.slides * self.coefficients[i][0] * least[i];
+                impulse[count + i] = kinetic.scale(-way.slides) * least[i];
             }
-            if way.slides == 0.0 && self.coefficients[i][1] > 0.0 && (way.is_pressed || least[i] > 0.0) {
+            if way.slides == 0.0 && stiction > T::ZERO && (way.is_pressed || least[i] > T::ZERO) {
                 unknown.push(count + i);
             }
         }
@@ -137,63 +162,69 @@ impl Shocks {
             let own = self.response[row * size + column];
             match way.get(column) {
                 Some(way) => {
-                    own - way.slides
-                        * self.coefficients[column][0]
-                        * self.response[row * size + count + column]
+                    let friction = self.coefficients[column][0].scale(way.slides);
+                    own - friction * self.response[row * size + count + column]
                 }
                 None => own,
             }
         };
-        let mut matrix: Vec<f64> = unknown
+        let mut matrix: Vec<T> = unknown
             .iter()
             .flat_map(|&row| unknown.iter().map(move |&column| (row, column)))
             .map(|(r, c)| effect(r, c))
             .collect();
-        let mut values: Vec<f64> =
-            unknown.iter().map(|&row| if row < count { rebound[row] } else { 0.0 } - known[row]).collect();
-        let still = ROUNDING * self.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        solve(&mut matrix, &mut values, still)?;
+        let mut values: Vec<T> = unknown
+            .iter()
+            .map(|&row| if row < count { rebound[row] } else { T::ZERO } - known[row])
+            .collect();
+        solve(&mut matrix, &mut values, self.rounding, self.still())?;
         for (&column, value) in unknown.iter().zip(values) {
             impulse[column] = value;
             if let Some(way) = way.get(column).filter(|way| way.slides != 0.0) {
-                impulse[count + column] = -way.slides * self.coefficients[column][0] * value;
+                impulse[count + column] = self.coefficients[column][0].scale(-way.slides) * value;
             }
         }
-        impulse.iter().all(|p| p.is_finite()).then_some(impulse)
+        impulse.iter().all(|p| p.value().is_finite()).then_some(impulse)
     }
 
     /// Whether impulses and velocities after them are such as these ways claim.
-    fn fits(&self, from: &[f64], least: &[f64], rebound: &[f64], way: &[Way], impulse: &[f64]) -> bool {
+    fn fits(&self, from: &[T], least: &[T], rebound: &[T], way: &[Way], impulse: &[T]) -> bool {
         let count = way.len();
         let after = self.after(from, impulse);
-        let speed = ROUNDING * self.velocity.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        let push = ROUNDING * impulse.iter().fold(0.0_f64, |most, p| most.max(p.abs()));
+        let speed = self.still();
+        let push = self.rounding * largest(impulse);
         (0..count).all(|i| {
             let [normal, along] = [impulse[i], impulse[count + i]];
             let is_kept = normal >= least[i] - push && after[i] >= rebound[i] - speed;
             let is_rough = if way[i].slides == 0.0 {
-                along.abs() <= self.coefficients[i][1] * normal.max(0.0) * (1.0 + ROUNDING) + push
+                let pressed = if normal > T::ZERO { normal } else { T::ZERO };
+                along.abs() <= self.coefficients[i][1] * pressed * (T::ONE + self.rounding) + push
             } else {
-                way[i].slides * after[count + i] >= -speed
+                after[count + i].scale(way[i].slides) >= -speed
             };
             is_kept && is_rough
         })
     }
 }
 
+/// The largest magnitude of numbers.
+fn largest<T: Real>(numbers: &[T]) -> T {
+    numbers.iter().fold(T::ZERO, |most, x| if x.abs() > most { x.abs() } else { most })
+}
+
 /// Solves a small system that may be singular, by elimination with exchange of rows and columns; what is left
-/// open is zero.  `None` where an equation cannot be, by more than `open`.
-fn solve(matrix: &mut [f64], x: &mut [f64], open: f64) -> Option<()> {
+/// open is zero, and so is what is below this share of the largest entry.  `None` where an equation cannot
+/// be, by more than `open`.
+fn solve<T: Real>(matrix: &mut [T], x: &mut [T], rounding: T, open: T) -> Option<()> {
     let d = x.len();
     let mut order: Vec<usize> = (0..d).collect();
-    let size = matrix.iter().fold(0.0_f64, |most, a| most.max(a.abs()));
+    let size = largest(matrix);
     let mut rank = 0;
     while rank < d {
         let entries = (rank..d).flat_map(|i| (rank..d).map(move |j| (i, j)));
-        let (i, j) = entries
-            .max_by(|a, b| matrix[a.0 * d + a.1].abs().total_cmp(&matrix[b.0 * d + b.1].abs()))
-            .unwrap_or((rank, rank));
-        if matrix[i * d + j].abs() <= ROUNDING * size {
+        let weight = |(i, j): (usize, usize)| matrix[i * d + j].value().abs();
+        let (i, j) = entries.max_by(|&a, &b| weight(a).total_cmp(&weight(b))).unwrap_or((rank, rank));
+        if matrix[i * d + j].abs() <= rounding * size {
             break;
         }
         (0..d).for_each(|k| matrix.swap(rank * d + k, i * d + k));
@@ -203,16 +234,18 @@ fn solve(matrix: &mut [f64], x: &mut [f64], open: f64) -> Option<()> {
         for i in rank + 1..d {
             let share = matrix[i * d + rank] / matrix[rank * d + rank];
             for k in rank..d {
-                matrix[i * d + k] -= share * matrix[rank * d + k];
+                let above = matrix[rank * d + k];
+                matrix[i * d + k] -= share * above;
             }
-            x[i] -= share * x[rank];
+            let above = x[rank];
+            x[i] -= share * above;
         }
         rank += 1;
     }
-    if x[rank..].iter().any(|left| left.abs() > open || left.is_nan()) {
+    if x[rank..].iter().any(|left| left.abs() > open || left.value().is_nan()) {
         return None;
     }
-    let mut found = vec![0.0; d];
+    let mut found = vec![T::ZERO; d];
     for k in (0..rank).rev() {
         let sum = (k + 1..rank).fold(x[k], |sum, j| sum - matrix[k * d + j] * found[order[j]]);
         found[order[k]] = sum / matrix[k * d + k];
@@ -303,6 +336,7 @@ impl Mechanism {
                 .collect(),
             is_newton: known.clone().count() > 0 && known.clone().all(|friction| friction.is_newton),
             velocity,
+            rounding: ROUNDING,
         };
         let impulses = shocks.impulses()?;
         let (mut push, mut change) = (DVector::zeros(omega.len()), &kept - &before);

@@ -149,10 +149,11 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         };
         let most = rows.iter().map(Digits::log2).fold(f64::NEG_INFINITY, f64::max);
         let mut stuck = rows[standing + closed.len()..].iter().zip(series.sticks());
-        let grip = |(friction, mode): (&Friction<Digits<W>>, &Mode)| match mode {
+        let grip = |(place, (friction, mode)): (usize, (&Friction<Digits<W>>, &Mode))| match mode {
             Mode::Stick(_) => stuck.next().map_or(0, |(tau, normal)| {
                 let pressing = size(friction.normal, normal[0]).0;
                 let size = pressing.log2().max(most) + friction.stiction.log2();
+                let size = size.max(libm::log2(self.motion.friction_unit(place)));
                 sign(friction.stiction * pressing - tau.abs(), size + self.rounding)
             }),
             _ => 0,
@@ -165,13 +166,21 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         let speeding = |(place, friction): (usize, &Friction<Digits<W>>)| {
             self.speeding(&series, &friction.tangent, self.motion.speed_unit(place) / time)
         };
+        // At rest what is left of accelerations is rounding.
+        let moves = |(k, acceleration): (usize, &Digits<W>)| {
+            let length = if k < structure.bodies.len() { 1.0 } else { structure.size_of_parts() };
+            match sign(*acceleration, libm::log2(length / (time * time)) + self.rounding) {
+                0 => 0.0,
+                _ => acceleration.value(),
+            }
+        };
         Some(Told {
             regularity: series.regularity(),
             pressures: closed.iter().zip(&rows[standing..]).map(pressure).collect(),
             leaving: touching.iter().map(gap).collect(),
-            grips: mechanism.frictions.iter().zip(modes).map(grip).collect(),
+            grips: mechanism.frictions.iter().zip(modes).enumerate().map(grip).collect(),
             speeding: mechanism.frictions.iter().enumerate().map(speeding).collect(),
-            load: load.iter().map(|x| x.value()).collect(),
+            load: load.iter().enumerate().map(moves).collect(),
         })
     }
 

@@ -106,6 +106,12 @@ impl<const W: usize> Motion<W> {
         structure.displacement_unit(place) / structure.units.time
     }
 
+    /// The mechanism's own force of friction of a place \[N·m, N\]: far below it there is none.
+    pub(super) fn friction_unit(&self, place: usize) -> f64 {
+        let structure = &self.mechanism.structure;
+        structure.energy_scale / structure.displacement_unit(place)
+    }
+
     /// What is told in doubles of the present moment.
     fn seen_in_doubles<R>(&self, posture: &Posture<W>, tell: impl FnOnce(Moment) -> R) -> R {
         let in_doubles = |x: &[Digits<W>]| -> Vec<f64> { x.iter().map(|x| x.value()).collect() };

@@ -1,14 +1,16 @@
 //! The impact of one point on a wall where there is dry friction, in many digits: Routh's method as in
 //! doubles (`dynamics::friction::impact`), in all digits.
 //!
-//! Friction in hinges and sliders takes no part in impacts: what sticks there may slide after one.
+//! Friction in hinges and sliders takes no part in impacts: what sticks there may slide after one.  An impact
+//! that presses a point which rests on another wall with friction is one at both (module `several`).
 
 use super::evidence::gradient;
 use super::friction::SURE;
 use super::keep::Keeper;
 use super::motion::Motion;
 use super::resting;
-use super::wall::{GapRate, Jump};
+use super::several::Meeting;
+use super::wall::{GapRate, Jump, work_of_rows};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::Acting;
@@ -16,13 +18,6 @@ use crate::dynamics::friction::impact::Shock;
 use crate::dynamics::friction::{Friction, Mode, Normal};
 use crate::dynamics::kernel::dot;
 use crate::stepping::{Cause, StepError};
-
-/// An error where an impact presses several walls at once, one of them with friction.
-pub fn beside_friction<const W: usize>(motion: &Motion<W>, names: &str) -> StepError {
-    let what = format!("walls {names} are pressed by one impact, and dry friction acts there");
-    let hint = "impulses of friction at several walls are not found in many digits: run it without --digits, or leave the friction out";
-    motion.stop(Cause::Unsuited, 0.0, &what, hint)
-}
 
 /// What the impulses at one wall do.
 pub(super) fn alone<const W: usize>(
@@ -34,7 +29,7 @@ pub(super) fn alone<const W: usize>(
         let (jump, pulls) = jump(motion, wall, gap)?;
         // A point that its wall would have to pull is let go.
         if let Some(held) = resting::pulled(motion, &pulls, 0.0) {
-            motion.let_go(&[held])?;
+            motion.release(held)?;
             continue;
         }
         let (held, standing) = (&motion.state().acting.held, motion.mechanism.structure.standing_rows());
@@ -45,9 +40,7 @@ pub(super) fn alone<const W: usize>(
                 && motion.mechanism.structure.friction_at(*other).is_some()
         };
         if held.iter().zip(&pulls[standing..]).any(is_pressed) {
-            let name = |&wall: &usize| motion.mechanism.structure.contacts[wall].row.name();
-            let names = std::iter::once(&wall).chain(held).map(name).collect::<Vec<_>>().join(", ");
-            return Err(beside_friction(motion, &names));
+            return Meeting::touching(motion, wall).jump(motion);
         }
         return Ok(jump);
     }
@@ -71,7 +64,8 @@ fn jump<const W: usize>(
     let Some(friction) = motion.mechanism.frictions.iter().find(is_here) else {
         let impulse = -(Digits::ONE + restitution) * *rate / dot(normal, &response);
         let change = response.iter().map(|&a| a * impulse).collect();
-        return Ok((Jump { change, work: impulse * *travel, walls: 1 }, pulls));
+        let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
+        return Ok((Jump { change, work, walls: 1 }, pulls));
     };
     let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
     let (across, pulls_across) = keeper.response(&striking, t, at, &along);
@@ -90,6 +84,8 @@ fn jump<const W: usize>(
     };
     let change = response.iter().zip(&across).map(|(&a, &b)| a * impulse + b * tangential).collect();
     let ratio = tangential / impulse;
-    let pulls = pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
-    Ok((Jump { change, work: impulse * *travel, walls: 1 }, pulls))
+    let pulls: Vec<_> =
+        pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
+    let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
+    Ok((Jump { change, work, walls: 1 }, pulls))
 }

@@ -18,13 +18,14 @@ use super::friction::Flown;
 use super::keep::Keeper;
 use super::motion::{LongState, Motion};
 use super::posture::Posture;
-use super::several::{MOST, Problem, largest};
+use super::several::{self, MOST};
 use super::touch::{self, Passage};
 use super::wall::{gap, gap_rate, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
+use crate::dynamics::friction::simultaneous::Shocks;
 use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
@@ -174,10 +175,12 @@ pub fn pulled<const W: usize>(motion: &Motion<W>, impulses: &[Digits<W>], most: 
 /// The points that touch and do not move along their normals.
 struct Touching<const W: usize> {
     walls: Vec<usize>,
-    /// Rates of their gaps \[m/s\], and accelerations without holds \[m/s²\].
+    /// Rates of their gaps \[m/s\].
     rates: Vec<Digits<W>>,
-    accelerations: Vec<Digits<W>>,
-    problem: Problem<W>,
+    /// Forces \[N\] and accelerations \[m/s²\], for impulses and velocities.
+    problem: Shocks<Digits<W>>,
+    /// log2 of the part of a number that is rounding.
+    rounding: f64,
 }
 
 impl<const W: usize> Touching<W> {
@@ -218,14 +221,13 @@ impl<const W: usize> Touching<W> {
             gradients.push(gradient);
         }
         let rounding = sure(motion);
-        let problem = Problem::new(&gradients, &responses, largest(&accelerations) + rounding, rounding);
-        Ok(Self { walls, rates, accelerations, problem })
+        let problem = several::forces([&gradients, &responses], &accelerations, rounding);
+        Ok(Self { walls, rates, problem, rounding })
     }
 
     /// The forces of all walls \[N\]; `None` where there are none that keep the points out of them.
     fn forces(&self) -> Option<Vec<Digits<W>>> {
-        let none = vec![Digits::ZERO; self.walls.len()];
-        (self.walls.len() <= MOST).then(|| self.problem.phase(&self.accelerations, &none)).flatten()
+        (self.walls.len() <= MOST).then(|| self.problem.compression()).flatten()
     }
 
     /// How much longer a point would go on bouncing on its wall while those of `set` stay \[s\].
@@ -236,16 +238,13 @@ impl<const W: usize> Touching<W> {
             return Digits::ZERO;
         }
         // Those that bounce as well do not press.
-        let still = speed.log2() + 0.5 * self.problem.rounding;
+        let still = speed.log2() + 0.5 * self.rounding;
         let is_other = |&other: &usize| {
             other != place && set.contains(&self.walls[other]) && self.rates[other].log2() < still
         };
         let others: Vec<usize> = (0..self.walls.len()).filter(is_other).collect();
-        let none = vec![Digits::ZERO; self.walls.len()];
-        let inward = self
-            .problem
-            .pressed(&self.accelerations, &none, &others)
-            .map(|forces| -self.problem.after(&self.accelerations, &forces)[place]);
+        let inward = self.problem.pressed(&others);
+        let inward = inward.map(|forces| -self.problem.after(&self.problem.velocity, &forces)[place]);
         match inward {
             Some(inward) if inward > Digits::ZERO => {
                 speed.scale(2.0) / (inward * (Digits::ONE - restitution))
@@ -393,6 +392,19 @@ impl<const W: usize> Motion<W> {
             false if self.has_friction() => self.settle_modes_at(&set, &set, Transition::default()),
             false => self.hold(set, Vec::new(), &[], None),
         }
+    }
+
+    /// Lets the point of a wall go that an impact would pull into it, before that takes effect: nothing else
+    /// changes.
+    pub(super) fn release(&mut self, wall: usize) -> Result<(), StepError> {
+        let Acting { held, sliding, .. } = &self.state.acting;
+        let set = held.iter().copied().filter(|&held| held != wall).collect();
+        let frictions = self.mechanism.frictions.iter().zip(sliding);
+        let mode = |(friction, &mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| {
+            if friction.normal == Normal::Contact(wall) { Mode::Open } else { mode }
+        };
+        let modes = frictions.map(mode).collect();
+        self.hold(set, modes, &[], None)
     }
 
     /// Lets those points go that leave their walls.

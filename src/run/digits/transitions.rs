@@ -74,6 +74,9 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                 let tau: Vec<_> = (0..order).map(|m| motion.series.multipliers(m)[row]).collect();
                 row += 1;
                 let (grip, unit) = grip(friction.stiction, friction.normal, normals, &tau, step);
+                // Without a load what is left of one is rounding.
+                let own = motion.friction_unit(place);
+                let unit = unit.max(own * own * libm::exp2(motion.precision.rounding(SURE)));
                 if let Some(time) = passes(motion, &grip, unit, step) {
                     comes(ModeChange::Breaks(place, side(motion, &tau, time, step)), time);
                 }

@@ -11,12 +11,14 @@
 
 use super::friction_impact;
 use super::motion::Motion;
+use super::posture::Posture as AllCoordinates;
 use super::resting::{self, Released};
 use super::several::Meeting;
 use super::touch::Passage;
 use super::transitions::ModeChange;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
+use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::constraint::{Aim, ConstraintEquation, Measure, Posture};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::{Constants, Series};
@@ -276,14 +278,29 @@ fn alone<const W: usize>(
     let restitution = motion.mechanism.walls[wall].1;
     let impulse = -(Digits::ONE + restitution) * *rate / dot(gradient, &response);
     let change = response.iter().map(|&a| a * impulse).collect();
-    (Jump { change, work: impulse * *travel, walls: 1 }, pulls)
+    let work = impulse * (*travel + work_of_rows(&motion.mechanism, t, &posture, &pulls));
+    (Jump { change, work, walls: 1 }, pulls)
+}
+
+/// Work \[J\] of motors, and of walls that hold a point, which hold their rates, by these impulses of the
+/// constraints.
+pub(super) fn work_of_rows<const W: usize>(
+    mechanism: &ExactMechanism<Digits<W>>,
+    t: Digits<W>,
+    posture: &AllCoordinates<W>,
+    impulses: &[Digits<W>],
+) -> Digits<W> {
+    let z = mechanism.elements(&posture.phi);
+    let at = Posture { phi: &posture.phi, z: &z, omega: &posture.omega };
+    let rows = mechanism.constraints.iter().zip(impulses);
+    rows.fold(Digits::ZERO, |work, (row, &impulse)| work - impulse * travel_rate(row, t, at))
 }
 
 /// What impulses do at one moment.
 pub(super) struct Jump<const W: usize> {
     /// Change of the rates of all coordinates.
     pub change: Vec<Digits<W>>,
-    /// Work of walls that move \[J\].
+    /// Work of motors and of walls that move \[J\].
     pub work: Digits<W>,
     /// Walls that press.
     pub walls: u64,
