@@ -67,7 +67,7 @@ pub(super) fn pass(
     let mut outcome = Outcome::begun(&study.mechanism, plan.clone());
     let driver = build(&study.mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(&study.mechanism), driver);
-    let mut variation = study.variation().map_err(|error| error.to_string())?;
+    let mut variation = study.variation(directions.len()).map_err(|error| error.to_string())?;
     driver.jumps = Some(variation.jumps.clone());
     driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     if from.is_some() {

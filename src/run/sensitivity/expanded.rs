@@ -9,7 +9,8 @@
 //! The scene is read once more on [`Varied`] numbers, in which the numbers asked for are seeds, and compiled
 //! like any other, so that every constant of the equations has its exact derivatives by them.  The recurrence
 //! that expands the motion then expands its derivatives, of so many numbers at once as there are lanes, in
-//! the same order and with the same multipliers.  The motion stays what it was: its value is expanded again
+//! the same order and with the same multipliers.  Columns in which no number but the state differs have no
+//! seeds.  The motion stays what it was: its value is expanded again
 //! for every block of lanes.
 
 use super::super::inside::Step;
@@ -57,7 +58,8 @@ pub(super) struct Expanded {
 }
 
 impl Expanded {
-    /// Of numbers at some paths of a scene, whose mechanism and derivatives of the start are these.
+    /// Of numbers at some paths of a scene, whose mechanism and derivatives of the start are these, and of so
+    /// many directions in which the state alone differs.
     ///
     /// # Errors
     /// Why there are no such series.
@@ -67,16 +69,16 @@ impl Expanded {
         mechanism: &Arc<Mechanism>,
         numbers: &[(&str, f64)],
         starts: &[Vec<f64>],
+        directions: usize,
     ) -> Result<Self, String> {
-        let (mut blocks, mut first) = (Vec::new(), 0);
-        while first < numbers.len() {
-            let left = numbers.len() - first;
-            let count = left.min(LANES);
-            let own = first..first + count;
-            let (numbers, starts) = (&numbers[own.clone()], &starts[own]);
-            blocks.push((count, Block::new(template, scene, mechanism, numbers, starts)?));
-            first += count;
-        }
+        let all = numbers.len() + directions;
+        let block = |first: usize| {
+            let own = first.min(numbers.len())..(first + LANES).min(numbers.len());
+            let count = LANES.min(all - first);
+            let block = Block::new(template, scene, mechanism, &numbers[own.clone()], &starts[own], count)?;
+            Ok((count, block))
+        };
+        let blocks = (0..all).step_by(LANES).map(block).collect::<Result<_, String>>()?;
         Ok(Self { blocks, powers: MotionPowers::default() })
     }
 
@@ -102,7 +104,7 @@ impl Expanded {
         }
         let mut first = 0;
         self.blocks.iter_mut().all(|(count, block)| {
-            let own = first..first + *count;
+            let own = first..forcing.len().min(first + *count);
             first += *count;
             block.forcing(motion).iter().all(|(body, value, slopes)| {
                 let mut lanes = own.clone().zip(slopes);
@@ -199,6 +201,7 @@ impl Block {
         structure: &Arc<Mechanism>,
         numbers: &[(&str, f64)],
         starts: &[Vec<f64>],
+        count: usize,
     ) -> Result<Self, String> {
         let seed = |(lane, &(path, value)): (usize, &(_, f64))| (path, Number::unknown(value, lane));
         let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
@@ -216,7 +219,7 @@ impl Block {
         }
         let coordinates =
             if structure.has_multipliers() { Coordinates::All } else { Coordinates::Independent };
-        let series = columns(&mechanism.terms(), coordinates, ORDER, numbers.len());
+        let series = columns(&mechanism.terms(), coordinates, ORDER, count);
         let room = |count: usize| vec![Number::ZERO; count];
         let f = series.coordinates();
         Ok(Self {

@@ -268,21 +268,27 @@ impl Study {
         Ok(())
     }
 
-    /// Columns of all numbers at the start, and what moves them.
-    pub fn variation(&self) -> Result<Variation, SensitivityError> {
+    /// Columns of all numbers at the start, and what moves them; and room for so many directions of the state.
+    pub fn variation(&self, directions: usize) -> Result<Variation, SensitivityError> {
         let columns = self.neighbours.iter().map(|neighbours| neighbours.start.clone()).collect();
         let neighbours = self.neighbours.iter().cloned().map(Some).collect();
         let mut variation =
             Variation::new(&self.mechanism, columns, neighbours).map_err(SensitivityError::Unsuited)?;
-        let numbers: Vec<_> = self.inputs.iter().map(|input| (input.path.as_str(), input.value)).collect();
-        let expanded =
-            Expanded::new(&self.template, &self.scene, &self.mechanism, &numbers, &variation.columns);
-        let neighbours = &mut variation.neighbours;
-        variation.expanded = expanded
-            .ok()
-            .filter(|_| self.mechanism.frictions.is_empty())
-            .and_then(|mut expanded| expanded.agrees(&self.start, neighbours).then_some(expanded));
+        variation.expanded = self.expanded(directions, &mut variation.neighbours);
         Ok(variation)
+    }
+
+    /// The series of columns of all numbers, beside these neighbours, and of so many directions of the state,
+    /// where there are such.
+    fn expanded(&self, directions: usize, neighbours: &mut [Option<Neighbours>]) -> Option<Expanded> {
+        if !self.mechanism.frictions.is_empty() {
+            return None;
+        }
+        let numbers: Vec<_> = self.inputs.iter().map(|input| (input.path.as_str(), input.value)).collect();
+        let starts: Vec<_> = self.neighbours.iter().map(|neighbours| neighbours.start.clone()).collect();
+        let Self { template, scene, mechanism, .. } = self;
+        let mut expanded = Expanded::new(template, scene, mechanism, &numbers, &starts, directions).ok()?;
+        expanded.agrees(&self.start, neighbours).then_some(expanded)
     }
 
     /// The run with the columns beside it.
@@ -292,7 +298,7 @@ impl Study {
         times.sort_by(f64::total_cmp);
         times.dedup();
         let mut outcome = Outcome::begun(&self.mechanism, self.plan.clone());
-        let mut variation = self.variation()?;
+        let mut variation = self.variation(0)?;
         let mut driver = self.driver(&mut outcome, Some(variation.jumps.clone()))?;
         let begin = driver.motion();
         variation.begin(&begin);

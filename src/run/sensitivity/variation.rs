@@ -191,11 +191,10 @@ impl Variation {
         self.forcing.truncate(count);
     }
 
-    /// Adds columns that nothing moves but the motion.
+    /// Adds columns that nothing moves but the motion, for which there is room.
     #[cfg(feature = "fit")]
     pub fn add(&mut self, columns: &[Vec<f64>]) {
         self.columns.extend_from_slice(columns);
-        self.expanded = None;
         self.neighbours.resize(self.columns.len(), None);
         self.forcing.resize(self.columns.len(), Vec::new());
     }
@@ -252,8 +251,7 @@ impl Variation {
             if tail <= limit {
                 self.steps += 1;
                 if let Some(dissipation) = &mut self.dissipation {
-                    let nodes = self.method.weights.iter().zip(&dissipation.nodes);
-                    dissipation.total += h * nodes.map(|(weight, trace)| weight * trace).sum::<f64>();
+                    dissipation.add(&self.mechanism, step, (now, h), &self.method);
                 }
                 self.now = if pieces == 1.0 { to } else { self.now + h };
                 let next = h * growth.min(4.0);
@@ -282,9 +280,6 @@ impl Variation {
     fn look_at_nodes(&mut self, step: &mut Step, h: f64) {
         let n = self.mechanism.coordinates();
         self.pull.clear();
-        if let Some(dissipation) = &mut self.dissipation {
-            dissipation.nodes.clear();
-        }
         let forcing = self.forcing.iter_mut();
         forcing.zip(&self.neighbours).for_each(|(forcing, neighbours)| {
             let acts = neighbours.as_ref().is_some_and(|neighbours| !neighbours.list.is_empty());
@@ -296,9 +291,6 @@ impl Variation {
             let (t, phi, omega) = plain(motion);
             self.jacobian.evaluate(&self.mechanism, t, &phi, &omega, Bias::default());
             self.pull.extend_from_slice(&self.jacobian.acceleration);
-            if let Some(dissipation) = &mut self.dissipation {
-                dissipation.look(&self.mechanism, motion);
-            }
             if let Some(expanded) = &mut self.expanded {
                 expanded.force(motion, &mut self.forcing, i * n);
                 continue;
