@@ -270,3 +270,42 @@ fn what_an_impact_switches_is_derived_with_the_impact() {
         assert!(off < 1e-8 && doubt < 1e-9, "{path}: {off:e} {doubt:e}");
     }
 }
+
+/// A block bounces on a cart on a rough rail, which carries the cart alone until T = s (1+e)/(1-e), s² = 2h/g:
+/// dx/dT = (a_held - a_flight) (t - T).
+#[test]
+fn the_end_of_infinitely_many_bounces_beside_a_rough_rail_is_derived() {
+    let (g, mu, height, speed, e, until) = (9.81, 0.5, 0.1_f64, 10.0, 0.8, 2.0);
+    let scene = template(&format!(
+        r#"{{"name": "cart", "gravity": [0, -{g}], "until": {until}, "every": {until},
+        "bars": [{{"name": "cart", "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+            {{"name": "block", "mass": 9, "centre": [0, 0], "inertia": 0.1}}],
+        "sliders": [{{"name": "rail", "point": {{"body": "cart", "point": [0, 0]}},
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked", "friction": {{"kinetic": {mu}}}}},
+            {{"name": "post", "point": {{"body": "block", "point": [0, 0]}},
+                "rail": {{"body": "cart", "point": [0, 0], "direction": [0, 1]}}, "angle": "locked"}}],
+        "walls": [{{"name": "deck", "body": "block", "point": [0, 0], "restitution": {e},
+            "line": {{"body": "cart", "through": [0, 0], "normal": [0, 1]}}}}],
+        "outputs": {{"x": "block.x"}},
+        "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{speed}, 0]}},
+            "block": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{speed}, 0]}}}}}}"#
+    ));
+    let to = ["walls.deck.restitution", "sliders.rail.friction.kinetic", "start.block.origin[1]"];
+    let found = derived(&scene, &["x"], &to, until);
+    let fall = (2.0 * height / g).sqrt();
+    let end = fall * (1.0 + e) / (1.0 - e);
+    let (flight, held, left) = (0.1 * mu * g, mu * g, until - end);
+    let by_end = (held - flight) * left;
+    let expected = [
+        by_end * 2.0 * fall / (1.0 - e).powi(2),
+        -(0.5 * flight * end * end + flight * end * left + 0.5 * held * left * left) / mu,
+        by_end * end / (2.0 * height),
+    ];
+    let measured = &found.measures[0];
+    let x = speed * until + mu * expected[1];
+    assert_near(measured.value, x, 1e-10, "x");
+    for ((path, expected), found) in to.iter().zip(expected).zip(&measured.slopes) {
+        println!("{path}: {:.1e}", found / expected - 1.0);
+        assert_near(*found, expected, 1e-8, path);
+    }
+}

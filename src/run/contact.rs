@@ -13,6 +13,7 @@ mod state;
 
 pub(super) use impacts::in_modes;
 pub(super) use jumps::{Jump, JumpLog, Switch};
+pub(super) use rest::{Flight, come_to_rest};
 pub(super) use state::ContactDriverState;
 
 use super::driver::{Driver, Halt, Pause, Watch};

@@ -21,12 +21,11 @@ mod together;
 
 pub(super) use side::{Side, plain};
 
-use super::contact::{Jump, Switch};
+use super::contact::{Flight, Jump, Switch, come_to_rest};
 use super::event::SwitchFunction;
 use super::friction::FrictionWatch;
 use super::latch::plastic;
-use crate::arithmetic::DoubleDouble;
-use crate::dynamics::friction::{Mode, Normal};
+use crate::dynamics::friction::Mode;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -360,18 +359,24 @@ fn strike(
         impact.map(|impact| impact.omega)
     };
     // Neighbours must meet the wall as well.
-    let approach =
+    let share = reach(mechanism, contact, &side, late, column);
+    change(mechanism, &side, [late, share], column, &rates)
+        .ok_or_else(|| "neighbouring motions have no way back from a wall".into())
+}
+
+/// The differences at which the point of a wall still moves along its normal as it does, for a column that is there so
+/// much later \[s\].
+fn reach(mechanism: &Arc<Mechanism>, contact: usize, side: &Side, late: f64, column: &Column) -> f64 {
+    let speed =
         |motion: &Motion| Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()]);
     let most = column.entries.iter().fold(late.abs(), |most, entry| most.max(entry.abs()));
     let scale = |entry: f64| if most > 0.0 { entry / most } else { 0.0 };
     let unit: Vec<f64> = column.entries.iter().map(|&entry| scale(entry)).collect();
     let faster = side
-        .slope(&unit, 0.0, f64::INFINITY, &mut |motion| Some(vec![approach(motion)]))
+        .slope(&unit, 0.0, f64::INFINITY, &mut |motion| Some(vec![speed(motion)]))
         .map_or(0.0, |slope| slope[0].abs());
     let size = 1.0 + side.omega.iter().fold(0.0, |most: f64, omega| most.max(omega.abs()));
-    let share = SHARE * approach(before).abs() / (faster * size).max(f64::MIN_POSITIVE);
-    change(mechanism, &side, [late, share], column, &rates)
-        .ok_or_else(|| "neighbouring motions have no way back from a wall".into())
+    SHARE * speed(&side.motion).abs() / (faster * size).max(f64::MIN_POSITIVE)
 }
 
 /// The rates of a column after what closes or engages.
@@ -391,18 +396,22 @@ fn is_hold(jump: &Jump) -> bool {
 
 /// The rates of a column after contacts are held, which takes off what speed the last impact has left.
 fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
-    let is_new = |normal| matches!(normal, Normal::Contact(contact) if !before.held.contains(&contact));
-    let is_rubbed = jump.mechanism.sliding().any(|(friction, _)| is_new(friction.normal));
+    let (mechanism, side) = (&jump.mechanism, Side::resting(&jump.before));
+    let new: Vec<usize> =
+        mechanism.held.iter().copied().filter(|contact| !before.held.contains(contact)).collect();
     let rates = |of: &Arc<Mechanism>, motion: &Motion| {
+        let flights: Vec<_> = new.iter().filter_map(|&contact| Flight::new(of, contact, motion)).collect();
         let mut motion = motion.clone();
-        if is_rubbed {
-            let [phi, omega] = plain(&motion);
-            let rates = of.without_normal_rates(motion.time, &phi, &omega)?;
-            motion.omega = rates.into_iter().map(DoubleDouble::from).collect();
-        }
+        come_to_rest(of, &new, &flights, &mut motion)?;
         plastic(of, &motion).map(|(rates, ..)| rates)
     };
-    change(&jump.mechanism, &Side::resting(&jump.before), [late, f64::INFINITY], column, &rates)
+    // Neighbours must rebound as well where friction depends on bounces that are left out.
+    let rubs = mechanism.sliding().next().is_some();
+    let bounces = |&contact: &usize| rubs && Flight::new(mechanism, contact, &jump.before).is_some();
+    let reaches =
+        new.iter().copied().filter(bounces).map(|contact| reach(mechanism, contact, &side, late, column));
+    let share = reaches.fold(f64::INFINITY, f64::min);
+    change(mechanism, &side, [late, share], column, &rates)
         .ok_or_else(|| "what is held leaves neighbouring motions no rates".into())
 }
 

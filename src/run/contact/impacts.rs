@@ -5,8 +5,7 @@ use super::super::impact_monitor;
 use super::super::impact_monitor::Claim;
 use super::super::methods::Stabilization;
 use super::super::running::Outcome;
-use super::super::saltation::plain;
-use super::rest::Flight;
+use super::rest::{Flight, come_to_rest};
 use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
@@ -241,15 +240,16 @@ impl ContactDriver {
         let before = self.jumps.is_some().then(|| motion.clone());
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
         let new: Vec<usize> = contacts.iter().copied().filter(|c| !self.mechanism.held.contains(c)).collect();
-        let flight = |&contact: &usize| Some((contact, self.flight(contact, &contacts, &modes, &motion)?));
-        let flights: Vec<(usize, Flight)> = new.iter().filter_map(flight).collect();
+        let next = in_modes(&self.free, &contacts, &modes);
+        let flights: Vec<Flight> =
+            new.iter().filter_map(|&contact| Flight::new(&next, contact, &motion)).collect();
         self.record(&contacts, motion.time.hi, outcome);
-        for (contact, flight) in &flights {
-            self.begin_later(*contact, flight.last, outcome);
+        for flight in &flights {
+            self.begin_later(flight.contact, flight.last, outcome);
         }
         self.record_modes(&modes, motion.time.hi, outcome);
         let mut plan = outcome.plan.clone();
-        self.mechanism = in_modes(&self.free, &contacts, &modes);
+        self.mechanism = next;
         if self.mechanism.constraints.len() > self.free.constraints.len() {
             plan.stabilization = Stabilization::Projection;
             self.put_on(&mut motion, &new, &flights, outcome)?;
@@ -293,19 +293,12 @@ impl ContactDriver {
         &mut self,
         motion: &mut Motion,
         new: &[usize],
-        flights: &[(usize, Flight)],
+        flights: &[Flight],
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let before = self.sampler.balance(motion);
-        let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
-        if !flights.is_empty() && self.mechanism.sliding().any(|(friction, _)| !is_new(friction.normal)) {
-            self.fly(flights.iter().map(|(_, flight)| flight), motion);
-        } else if self.mechanism.sliding().any(|(friction, _)| is_new(friction.normal)) {
-            let [phi, omega] = plain(motion);
-            if let Some(omega) = self.mechanism.without_normal_rates(motion.time, &phi, &omega) {
-                motion.omega = omega.into_iter().map(DoubleDouble::from).collect();
-            }
-        }
+        // Where there are no such rates projection finds some.
+        let _ = come_to_rest(&self.mechanism, new, flights, motion);
         let mut form = Multiplier::<0, true>::new(Arc::clone(&self.mechanism));
         let mut state = form.state(motion);
         let mut kernel = Kernel::new(&self.mechanism);

@@ -17,7 +17,7 @@
 
 use super::super::running::Outcome;
 use super::super::saltation::plain;
-use super::{ContactDriver, NO_SPEED, in_modes};
+use super::{ContactDriver, NO_SPEED};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::contact::metric::Gradient;
@@ -26,7 +26,9 @@ use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
 
 /// A motion between bounces that are left out.
-pub(super) struct Flight {
+pub(in crate::run) struct Flight {
+    /// The wall.
+    pub contact: usize,
     /// How long all of them last \[s\].
     pub last: f64,
     /// How it goes on from the first.
@@ -51,66 +53,74 @@ impl Course {
     }
 }
 
-impl ContactDriver {
-    /// The bounces of a point that are left out, of a wall that is to be held beside `contacts`, with the
-    /// places with friction in these modes.
-    pub(super) fn flight(
-        &self,
-        contact: usize,
-        contacts: &[usize],
-        modes: &[Mode],
-        motion: &Motion,
-    ) -> Option<Flight> {
+impl Flight {
+    /// The bounces of a point that are left out, of a wall that a mechanism holds from now on beside others.
+    pub fn new(held: &Mechanism, contact: usize, motion: &Motion) -> Option<Self> {
         let [phi, omega] = plain(motion);
-        let z = self.free.elements(&phi);
-        let wall = &self.free.contacts[contact];
+        let z = held.elements(&phi);
+        let wall = &held.contacts[contact];
         let speed = wall.gap_rate(motion.time, &phi, &z, &omega);
         if speed <= NO_SPEED * wall.step_size(&omega) || wall.restitution >= 1.0 {
             return None;
         }
-        let others: Vec<usize> = contacts.iter().copied().filter(|&other| other != contact).collect();
-        let mut modes = modes.to_vec();
-        for (friction, mode) in self.free.frictions.iter().zip(&mut modes) {
+        let others: Vec<usize> = held.held.iter().copied().filter(|&other| other != contact).collect();
+        let mut modes = held.modes.clone();
+        for (friction, mode) in held.frictions.iter().zip(&mut modes) {
             if friction.normal == Normal::Contact(contact) {
                 *mode = Mode::Open;
             }
         }
-        let flying = in_modes(&self.free, &others, &modes);
-        let course = Course::of(&flying, motion);
+        let course = Course::of(&held.moving(&others, &modes), motion);
         let Gradient { row, along } =
             Gradient::of(&wall.row, motion.time, Posture { phi: &phi, z: &z, omega: &omega });
         let inward = -(dot(&along, &course.accelerations) + row.convective);
         let last = 2.0 * speed / (inward * (1.0 - wall.restitution));
-        (inward > 0.0 && last.is_finite()).then_some(Flight { last, course })
+        (inward > 0.0 && last.is_finite()).then_some(Self { contact, last, course })
     }
+}
 
-    /// Takes back what friction in joints would do beside points that are held before their bounces have ended, in
-    /// the mechanism that holds them: rates are on the constraints afterwards.
-    pub(super) fn fly<'a>(&self, flights: impl Iterator<Item = &'a Flight>, motion: &mut Motion) {
-        let mechanism = &self.mechanism;
-        let [phi, omega] = plain(motion);
-        let close = |omega: &[f64]| mechanism.without_normal_rates(motion.time, &phi, omega);
-        let (Some(closed), held) = (close(&omega), Course::of(mechanism, motion)) else { return };
-        let n = omega.len();
-        let (mut turned, mut rates) = (vec![0.0; n], closed.clone());
-        for Flight { last, course } in flights {
-            let change = |k: usize| (course.accelerations[k] - held.accelerations[k]) * last;
-            let Some(flown) = close(&(0..n).map(|k| omega[k] + change(k)).collect::<Vec<_>>()) else {
-                return;
-            };
-            for k in 0..n {
-                rates[k] += flown[k] - closed[k];
-                turned[k] -= 0.5 * last * (flown[k] - closed[k]);
-            }
-            motion.work += DoubleDouble::from((course.power - held.power) * last);
-            motion.friction += (course.lost - held.lost) * last;
-        }
-        for k in 0..n {
-            motion.phi[k] += DoubleDouble::from(turned[k]);
-            motion.omega[k] = DoubleDouble::from(rates[k]);
-        }
+/// Takes off a motion what speed bounces have left at walls that a mechanism holds anew, with what friction has to do
+/// with it: at these walls and, where flights are left out, in joints, which do not rub as beside a point held already.
+/// `None` where the constraints leave no rates.
+pub(in crate::run) fn come_to_rest(
+    held: &Mechanism,
+    new: &[usize],
+    flights: &[Flight],
+    motion: &mut Motion,
+) -> Option<()> {
+    let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
+    let flights = if held.sliding().any(|(friction, _)| !is_new(friction.normal)) { flights } else { &[] };
+    if flights.is_empty() && !held.sliding().any(|(friction, _)| is_new(friction.normal)) {
+        return Some(());
     }
+    let [phi, omega] = plain(motion);
+    let t = motion.time;
+    let close = |omega: &[f64]| held.without_normal_rates(t, &phi, omega);
+    let closed = close(&omega)?;
+    let (mut turned, mut rates) = (vec![0.0; omega.len()], closed.clone());
+    let at_once = Course::of(held, motion);
+    for flight in flights {
+        let (last, flown) = (flight.last, &flight.course);
+        let changes = flown.accelerations.iter().zip(&at_once.accelerations);
+        let changed: Vec<f64> =
+            omega.iter().zip(changes).map(|(omega, (flown, held))| omega + (flown - held) * last).collect();
+        for (k, flown) in close(&changed)?.into_iter().enumerate() {
+            rates[k] += flown - closed[k];
+            turned[k] -= 0.5 * last * (flown - closed[k]);
+        }
+        motion.work += DoubleDouble::from((flown.power - at_once.power) * last);
+        motion.friction += (flown.lost - at_once.lost) * last;
+    }
+    for ((phi, omega), (turned, rate)) in
+        motion.phi.iter_mut().zip(&mut motion.omega).zip(turned.into_iter().zip(rates))
+    {
+        *phi += DoubleDouble::from(turned);
+        *omega = DoubleDouble::from(rate);
+    }
+    Some(())
+}
 
+impl ContactDriver {
     /// Counts a hold from the end of the bounces before it on, so much later \[s\].
     pub(super) fn begin_later(&mut self, contact: usize, by: f64, outcome: &mut Outcome) {
         let Some(held) = self.held.iter_mut().find(|held| held.contact == contact) else { return };
