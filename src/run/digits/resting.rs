@@ -89,12 +89,22 @@ pub struct Unheld<const W: usize> {
 impl<const W: usize> Unheld<W> {
     /// That of a motion.
     pub fn of(motion: &Motion<W>) -> Result<Self, StepError> {
+        Self::but(motion, Vec::new())
+    }
+
+    /// The same where points stay on the walls that hold them: dry friction in hinges and sliders takes no
+    /// part in impulses.
+    pub fn but_held(motion: &Motion<W>) -> Result<Self, StepError> {
+        Self::but(motion, motion.state().acting.held.clone())
+    }
+
+    fn but(motion: &Motion<W>, held: Vec<usize>) -> Result<Self, StepError> {
         let LongState { acting, .. } = motion.state();
-        if acting.held.is_empty() && acting.sliding.iter().all(|mode| *mode == Mode::Open) {
+        if acting.held == held && acting.sliding.iter().all(|mode| *mode == Mode::Open) {
             return Ok(Self { mechanism: motion.mechanism.clone(), keeper: motion.keeper.clone() });
         }
         let sliding = vec![Mode::Open; acting.sliding.len()];
-        let acting = Acting { held: Vec::new(), sliding, ..acting.clone() };
+        let acting = Acting { held, sliding, ..acting.clone() };
         let mechanism = motion.mechanism.with(acting);
         let mechanism = mechanism.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
         let keeper = Keeper::new(&mechanism, motion.precision);
