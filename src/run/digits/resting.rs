@@ -405,6 +405,22 @@ impl<const W: usize> Motion<W> {
         }
     }
 
+    /// Lets the points of these walls go while impulses act, after which it is decided what places with
+    /// friction do.
+    pub(super) fn release(&mut self, walls: &[usize]) -> Result<(), StepError> {
+        let LongState { acting, .. } = &self.state;
+        let set: Vec<usize> = acting.held.iter().copied().filter(|wall| !walls.contains(wall)).collect();
+        if set == acting.held {
+            return Ok(());
+        }
+        let mode = |(friction, mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| match friction.normal {
+            Normal::Contact(wall) if walls.contains(&wall) => Mode::Open,
+            _ => *mode,
+        };
+        let sliding = self.mechanism.frictions.iter().zip(&acting.sliding).map(mode).collect();
+        self.hold(set, sliding, &[], None)
+    }
+
     /// Lets those points go that leave their walls.
     pub(super) fn let_leaving_go(&mut self) -> Result<(), StepError> {
         let leaving = self.state.acting.held.iter().copied().filter(|&wall| self.leaves(wall));
