@@ -1,7 +1,7 @@
 //! Impacts at several walls at one moment in many digits, against closed forms in integer arithmetic.
 
 use super::many_digits::{begun, fixed, last, near, number, one, source, times};
-use driftless::run::digits::{LongError, Row, forecast};
+use driftless::run::digits::{LongError, Pair, Precision, Progress, Row, forecast};
 use driftless::stepping::StepError;
 use num_bigint::BigInt;
 
@@ -167,4 +167,27 @@ fn a_forecast_of_a_loop_that_a_motor_drives_into_a_wall_stops() {
     let found = forecast(&source(&text, &[], "10", "10"), 1e-3, true, &mut || false);
     let Err(LongError::Step(stop)) = found else { panic!("{found:?}") };
     assert!(stop.what.contains("no way back"), "{stop}");
+}
+
+/// Of runs side by side that stop, those rows are kept that both have, that of the last state among them.
+#[test]
+fn runs_side_by_side_keep_their_rows_up_to_a_stop() {
+    let text = parallelogram(r#""rate": 1"#, "-1", r#""restitution": 0.755"#);
+    let precisions = [25, 40].map(|digits| Precision::new(digits, true));
+    let mut pair = Pair::new(&source(&text, &[], "1", "0.25"), &precisions).expect("two runs");
+    let mut rows = Vec::new();
+    let stop = loop {
+        match pair.go(&|| false) {
+            Ok(Progress::Rows(more)) => rows.extend(more),
+            Ok(_) => panic!("no stop"),
+            Err(stop) => break stop,
+        }
+    };
+    assert!(stop.what.contains("no way back"), "{stop}");
+    rows.extend(pair.up_to_stop());
+    let times: Vec<f64> = rows.iter().map(|(row, _)| row.time()).collect();
+    assert_eq!(times[..2], [0.0, 0.25]);
+    assert!(times.len() == 3 && (times[2] - (std::f64::consts::FRAC_PI_6 - 0.1)).abs() < 1e-15, "{times:?}");
+    assert!(rows.iter().all(|(_, digits)| digits.is_some_and(|digits| digits > 22.0)), "{rows:?}");
+    assert!(pair.up_to_stop().is_empty());
 }

@@ -145,16 +145,16 @@ impl<const W: usize> Keeper<W> {
         mechanism.residuals(t, phi, omega, &mut self.jacobian)
     }
 
-    /// log2 of the largest residual of position and of rate.
+    /// Sizes of all residuals \[rad, m\] and of their rates.
     pub fn left(
         &mut self,
         mechanism: &ExactMechanism<Digits<W>>,
         t: Digits<W>,
         phi: &[Digits<W>],
         omega: &[Digits<W>],
-    ) -> [f64; 2] {
+    ) -> Vec<[f64; 2]> {
         let residuals = self.residuals(mechanism, t, phi, omega);
-        [0, 1].map(|level| largest(&residuals.iter().map(|residual| residual[level]).collect::<Vec<_>>()))
+        residuals.into_iter().map(|levels| levels.map(|residual| libm::exp2(residual.log2()))).collect()
     }
 
     /// Puts positions and rates back onto the constraints.
