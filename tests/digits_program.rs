@@ -150,5 +150,87 @@ fn a_point_that_is_squeezed_by_a_motor_stops_the_run() {
         "walls": [{"name": "floor", "body": "arm", "point": [1, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [0, 1]}}],
         "start": {}, "until": 1, "every": 0.1}"#;
     program.write("arm.json", text);
-    program.run("run arm.json --digits 30").exits(4).says(&["t = 0.5", "no way back"]);
+    let ran = program.run("run arm.json --digits 30").exits(4).says(&["t = 0.5", "no way back"]);
+    assert!(!ran.stderr.contains("resume"), "{}", ran.stderr);
+    ran.shows(&["stopped", "t = 0.5 s"]);
+    // Everything is kept, as by a run in doubles, and there is nothing that would stop again.
+    let folder = "output/arm/taylor-digits-30";
+    let table = program.read(&format!("{folder}/trajectory.csv"));
+    assert_eq!(table.lines().count(), 7, "{table}");
+    assert!(table.lines().last().is_some_and(|line| line.starts_with("0.5,")), "{table}");
+    let record: serde_json::Value =
+        serde_json::from_str(&program.read(&format!("{folder}/run.json"))).expect("an object");
+    let found = record["result"]["stop"].clone();
+    let plain = program.run("run arm.json --method taylor --trust off --no-charts --json").exits(4);
+    let mut plain = plain.object()["stop"].clone();
+    assert!(plain["t"].as_f64().is_some_and(|t| (t - 0.5).abs() < 1e-12), "{plain}");
+    plain["t"] = serde_json::json!(0.5);
+    assert_eq!(found, plain);
+    let files = program.files();
+    let left: Vec<_> = files.iter().filter(|file| file.starts_with(folder)).collect();
+    assert_eq!(left, [&format!("{folder}/run.json"), &format!("{folder}/trajectory.csv")]);
+    program.run("resume output").exits(6).says(&["no interrupted run"]);
+    let object = program.run("run arm.json --digits 30 --force --json").exits(4).object();
+    assert_eq!((&object["stop"], &object["error"]["details"]), (&found, &found));
+    // Between two rows the last state has a row of its own.
+    program.run("run arm.json --digits 30 --every 0.2 --out other").exits(4);
+    let table = program.read("other/arm/taylor-digits-30/trajectory.csv");
+    let times: Vec<&str> = table.lines().skip(1).filter_map(|line| line.split(',').next()).collect();
+    assert_eq!(times, ["0.0", "0.2", "0.4", "0.5"]);
+}
+
+/// What stops while the growth of errors is measured has not begun.
+#[test]
+fn a_forecast_that_stops_says_why_and_leaves_no_files() {
+    let program = Program::with_scenes(&[]);
+    // A wall is switched on that the ball has fallen through by a metre.
+    let text = r#"{"name": "ball", "gravity": [0, -10], "bars": [{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 1}],
+        "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "inactive": ["floor"], "events": [{"name": "late", "when": "t - 0.5", "on": ["floor"]}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 0.25], "velocity": [0, 0]}}, "until": 1, "every": 0.3}"#;
+    program.write("ball.json", text);
+    program
+        .run("run ball.json --trusted-until 1")
+        .exits(4)
+        .says(&["t = 0.5", "behind which its point is by 1"]);
+    assert_eq!(program.files(), ["ball.json"]);
+    // One run alone has rows up to there: two at their times, and that of the last state.
+    let object = program.run("run ball.json --digits 30 --json").exits(4).object();
+    assert_eq!((&object["stop"]["t"], &object["final"]["t"]), (&0.5.into(), &0.5.into()));
+    assert_eq!((&object["rows"], &object["stop"]["cause"]), (&3.into(), &"unsuited".into()));
+}
+
+/// Drift limits are those of all runs, with the same words.
+#[test]
+fn drift_limits_hold_in_many_digits() {
+    let program = Program::with_scenes(&["free", "four_bars"]);
+    for (run, words) in [
+        ("free.json --max-energy-drift 1e-60", ["energy is off by", "of the scale, the limit is 1e-60"]),
+        ("four_bars.json --max-constraint-drift 1e-200", ["is violated by", "level, the limit is 1e-200"]),
+    ] {
+        let run = format!("run {run} --digits 25 --until 0.5 --every 0.25");
+        let ran = program.run(&format!("{run} --json")).exits(5).says(&words);
+        let object = ran.says(&["or state another limit with --max-energy-drift"]).object();
+        assert_eq!(
+            (&object["stop"]["cause"], &object["error"]["exit_code"]),
+            (&"drift_limit".into(), &5.into())
+        );
+        program.run("resume output").exits(6);
+        let (run, _) = run.split_once(" --max").expect("a limit");
+        program.run(&format!("{run} --digits 25 --until 0.5 --every 0.25 --force")).exits(0);
+    }
+}
+
+/// A body passes over a hill so narrow that its steps do not see it: on its top the energy is off by that of the hill,
+/// and no such run is a success unless that is allowed.
+#[test]
+fn a_broken_balance_is_no_success_in_many_digits() {
+    let program = Program::with_scenes(&[]);
+    let text = r#"{"name": "hill", "gravity": [0, 0], "bars": [{"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "rotor", "point": [0, 0]}]}],
+        "potentials": [{"name": "hill", "energy": "1*exp(-((rotor.phi - 5)/0.01)^2)"}],
+        "start": {"rotor": {"phi": 0, "omega": 1}}, "until": 10, "every": 5}"#;
+    program.write("hill.json", text);
+    program.run("run hill.json --digits 30").exits(5).says(&["energy is off by", "the limit is 1e-2"]);
+    program.run("run hill.json --digits 30 --max-energy-drift 10 --force").exits(0);
 }

@@ -577,6 +577,59 @@ fn events_push_and_stop_what_slides() {
     found.turned(&turns, 37);
 }
 
+/// A bar that hangs on a cart which sticks to its rail is braked at its lowest point, by a lock or a motor that comes
+/// into force.  Dry friction takes no part in that impulse: the momentum of both is kept, and the cart slides to a stop.
+#[test]
+fn what_sticks_slides_after_an_impulse_of_what_closes() {
+    let scene = |part: &str, switched: &str| {
+        format!(
+            r#"{{"name": "brake", "gravity": [0, -10], "bars": [
+                {{"name": "cart", "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+                {{"name": "bar", "mass": 1, "centre": [0, -0.5], "inertia": 0.05, "length": 1}}],
+            "sliders": [{{"name": "floor", "point": {{"body": "cart", "point": [0, 0]}}, "angle": "locked",
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "friction": {{"kinetic": 0.9}}}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "cart", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+            {part}, "inactive": ["{switched}"], "events": [{{"name": "brake", "when": "bar.phi", "on": ["{switched}"]}}],
+            "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}, "bar": {{"phi": -0.3, "omega": 1}}}},
+            "until": 9, "every": 9}}"#
+        )
+    };
+    let lock = scene(r#""locks": [{"name": "lock", "body": "bar", "relative_to": "cart"}]"#, "lock");
+    let motor = scene(
+        r#""motors": [{"name": "motor", "body": "bar", "relative_to": "cart", "law": {"start": 0, "rate": 0}}]"#,
+        "motor",
+    );
+    // w² = 1 + 2 m g l (1 - cos 0.3)/0.3 of the bar about its hinge, and 2 v = 0.5 w of both.
+    let turning = one() + over(&(one() - cosine(&fixed("0.3"))), &fixed("0.03"));
+    let v = root(&turning) / 4;
+    for (text, digits) in [(&lock, 30), (&lock, 60), (&motor, 40)] {
+        let found = ran(text, "1", digits);
+        let places = digits as u32 - 3;
+        found.has(&[(2, square(&v) / 18), (4, BigInt::ZERO)], places);
+        found.lost(&square(&v), places);
+        let does: Vec<_> = found.turns.iter().map(|turn| turn.does).collect();
+        assert_eq!(does, ["sticks", "slides", "sticks"]);
+        near(&(number(found.turns[2].t) - number(found.turns[1].t)), &(v.clone() / 9), places);
+    }
+}
+
+/// What no impulse of it moves goes on to stick.
+#[test]
+fn what_sticks_does_so_beside_what_closes_elsewhere() {
+    let disc = r#""hinges": [{"name": "H", "between": [{"body": "ground", "point": [5, 0]}, {"body": "disc", "point": [0, 0]}]}],
+        "bars": [{"name": "disc", "mass": 1, "centre": [0, 0], "inertia": 2, "length": 1}, "#;
+    let more = r#", "locks": [{"name": "lock", "body": "disc"}], "inactive": ["lock"],
+        "events": [{"name": "brake", "when": "t - 0.5", "on": ["lock"]}]"#;
+    let text = block(["0.8", "0.6"], r#"{"kinetic": 0.8, "static": 0.9}"#, ["0", "0", "0", "0"], more);
+    let text = text.replacen(r#""bars": [{"#, &format!("{disc}{{"), 1);
+    let text = text.replacen(r#""start": {"#, r#""start": {"disc": {"phi": 0, "omega": 1}, "#, 1);
+    let found = ran(&text, "1", 30);
+    near(&number(found.row.bodies[0][0]), &fixed("0.5"), 27);
+    near(&number(found.row.bodies[0][1]), &BigInt::ZERO, 27);
+    near(&number(found.row.bodies[1][2]), &BigInt::ZERO, 27);
+    found.turned(&[("S", "sticks", BigInt::ZERO)], 27);
+}
+
 #[test]
 fn a_run_goes_on_to_the_last_bit_while_places_stick_and_slide() {
     let spring = r#", "springs": [{"name": "k", "between": [{"body": "ground", "point": [-1, 0]}, {"body": "block", "point": [0, 0]}],

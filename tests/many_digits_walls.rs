@@ -1,7 +1,8 @@
 //! Impacts at several walls at one moment in many digits, against closed forms in integer arithmetic.
 
-use super::many_digits::{fixed, last, near, number, one, source, times};
-use driftless::run::digits::Row;
+use super::many_digits::{begun, fixed, last, near, number, one, source, times};
+use driftless::run::digits::{LongError, Pair, Precision, Progress, Row, forecast};
+use driftless::stepping::StepError;
 use num_bigint::BigInt;
 
 const DIGITS: usize = 60;
@@ -103,4 +104,90 @@ fn a_ball_in_a_corner_rebounds_the_way_it_came() {
             near(found, &fixed(expected), PLACES);
         }
     }
+}
+
+/// A parallelogram whose crank, 0.1 rad up, a motor turns: in the crank's frame the tip of the rocker sinks by
+/// 2 m sin(phi), and the crank carries a line below it.
+fn parallelogram(law: &str, height: &str, wall: &str) -> String {
+    let hinge = |name: &str, a: &str, b: &str| {
+        let end = |end: &str| {
+            let (body, at) = end.split_once('@').expect("a body and a point");
+            format!(r#"{{"body": "{body}", "point": [{at}, 0]}}"#)
+        };
+        format!(r#"{{"name": "{name}", "between": [{}, {}]}}"#, end(a), end(b))
+    };
+    format!(
+        r#"{{"name": "parallelogram", "gravity": [0, 0], "bars": [
+            {{"name": "crank", "mass": 1, "centre": [0.4, 0.1], "inertia": 0.1, "length": 1}},
+            {{"name": "coupler", "mass": 1.5, "centre": [1.1, 0], "inertia": 0.3, "length": 2}},
+            {{"name": "rocker", "mass": 0.7, "centre": [0.5, 0.03], "inertia": 0.07, "length": 1}}],
+        "hinges": [{}, {}, {}, {}], "motors": [{{"name": "drive", "body": "crank", "law": {{"start": 0.1, {law}}}}}],
+        "walls": [{{"name": "line", "body": "rocker", "point": [1, 0], {wall},
+            "line": {{"body": "crank", "through": [0, {height}], "normal": [0, 1]}}}}],
+        "start": {{"coupler": {{"phi": 0}}, "rocker": {{"phi": 0.1}}}}, "until": 10, "every": 10}}"#,
+        hinge("A", "ground@0", "crank@0"),
+        hinge("B", "crank@1", "coupler@0"),
+        hinge("C", "ground@2", "rocker@0"),
+        hinge("D", "coupler@2", "rocker@1")
+    )
+}
+
+fn stopped(text: &str, digits: usize) -> StepError {
+    let mut run = begun(&source(text, &[], "1", "1"), digits);
+    run.row(1, &mut || false).expect_err("no way on")
+}
+
+/// What the rows of a loop leave of a point that a motor drives is rounding, never exactly zero: no impulse turns it
+/// back, with friction at the wall or without, and no force holds it.
+#[test]
+fn a_loop_that_a_motor_drives_into_a_wall_stops() {
+    let time = std::f64::consts::FRAC_PI_6 - 0.1;
+    for (wall, digits) in [
+        (r#""restitution": 0.755"#, 25),
+        (r#""restitution": 0.755"#, 60),
+        (r#""restitution": 0"#, 40),
+        (r#""restitution": 0.5, "friction": {"kinetic": 0.2}"#, 25),
+    ] {
+        let stop = stopped(&parallelogram(r#""rate": 1"#, "-1", wall), digits);
+        assert!((stop.t - time).abs() < 1e-15, "{stop}");
+        assert_eq!(stop.cause.word(), "resting_contact", "{stop}");
+        assert!(stop.what.contains("meets wall line no way back"), "{stop}");
+    }
+    // It begins on the line, 2 sin(0.1) m below, and is pressed into it from rest.
+    let below = "-0.199666833293656304556921638396431165519618379306";
+    let stop = stopped(&parallelogram(r#""acceleration": 1"#, below, r#""restitution": 0.5"#), 30);
+    assert_eq!((stop.cause.word(), stop.t), ("resting_contact", 0.0), "{stop}");
+    assert!(stop.what.contains("rests on wall line and the motors leave it no freedom"), "{stop}");
+}
+
+/// The two motions that a forecast measures the growth of errors on stop there as well.
+#[test]
+fn a_forecast_of_a_loop_that_a_motor_drives_into_a_wall_stops() {
+    let text = parallelogram(r#""rate": 1"#, "-1", r#""restitution": 0.755"#);
+    let found = forecast(&source(&text, &[], "10", "10"), 1e-3, true, &mut || false);
+    let Err(LongError::Step(stop)) = found else { panic!("{found:?}") };
+    assert!(stop.what.contains("no way back"), "{stop}");
+}
+
+/// Of runs side by side that stop, those rows are kept that both have, that of the last state among them.
+#[test]
+fn runs_side_by_side_keep_their_rows_up_to_a_stop() {
+    let text = parallelogram(r#""rate": 1"#, "-1", r#""restitution": 0.755"#);
+    let precisions = [25, 40].map(|digits| Precision::new(digits, true));
+    let mut pair = Pair::new(&source(&text, &[], "1", "0.25"), &precisions).expect("two runs");
+    let mut rows = Vec::new();
+    let stop = loop {
+        match pair.go(&|| false) {
+            Ok(Progress::Rows(more)) => rows.extend(more),
+            Ok(_) => panic!("no stop"),
+            Err(stop) => break stop,
+        }
+    };
+    assert!(stop.what.contains("no way back"), "{stop}");
+    rows.extend(pair.up_to_stop());
+    let times: Vec<f64> = rows.iter().map(|(row, _)| row.time()).collect();
+    assert_eq!(times[..2], [0.0, 0.25]);
+    assert!(times.len() == 3 && (times[2] - (std::f64::consts::FRAC_PI_6 - 0.1)).abs() < 1e-15, "{times:?}");
+    assert!(rows.iter().all(|(_, digits)| digits.is_some_and(|digits| digits > 22.0)), "{rows:?}");
+    assert!(pair.up_to_stop().is_empty());
 }

@@ -9,8 +9,8 @@ use super::resume::{Saved, Work};
 use crate::dynamics::Mechanism;
 use crate::report::digits::{self as report, Table};
 use crate::run::digits::{
-    Forecast, LongError, Pair, Precision, Progress as Reached, Row, Saved as LongSaved, Source, forecast,
-    planned,
+    Forecast, LongError, Pair, Precision, Progress as Reached, Row, Saved as LongSaved, Source, exceeded,
+    forecast, planned,
 };
 use crate::run::files::{EVENTS, RECORD, TRAJECTORY};
 use crate::run::{Checkpoints, Folder, Refusal, Stream};
@@ -284,18 +284,30 @@ impl<'a> Task<'a> {
         mut between: impl FnMut(&Pair, &mut Table<Stream>, &report::Summary) -> Result<(), Failure>,
     ) -> Result<bool, Ended> {
         loop {
-            match pair.go(&interrupt::is_asked).map_err(|stop| Ended::Failure(stop.into()))? {
-                Reached::Over => return Ok(false),
-                Reached::Paused => {}
-                Reached::Rows(rows) => {
-                    for (row, agreement) in rows {
-                        if self.is_short(&row, agreement, summary) {
-                            return Ok(true);
-                        }
-                        table.write(&row, agreement).map_err(Ended::Table)?;
-                        summary.take(&row, agreement);
-                    }
+            let (rows, stop) = match pair.go(&interrupt::is_asked) {
+                Ok(Reached::Over) => return Ok(false),
+                Ok(Reached::Paused) => (Vec::new(), None),
+                Ok(Reached::Rows(rows)) => (rows, None),
+                Err(stop) => (pair.up_to_stop(), Some(stop)),
+            };
+            for (row, agreement) in rows {
+                if self.is_short(&row, agreement, summary) {
+                    return Ok(true);
                 }
+                table.write(&row, agreement).map_err(Ended::Table)?;
+                summary.take(&row, agreement);
+                // At the last state a stop of the run itself comes first.
+                let is_last = stop.as_ref().is_some_and(|stop| row.time() >= stop.t);
+                let limits = self.flags.limits();
+                let exceeded = exceeded(&row, self.mechanism(), &limits, summary.largest);
+                if let Some(exceeded) = exceeded.filter(|_| !is_last) {
+                    summary.stop = Some(exceeded);
+                    return Ok(false);
+                }
+            }
+            if let Some(stop) = stop {
+                summary.stop = Some(stop);
+                return Ok(false);
             }
             between(pair, table, summary).map_err(Ended::Failure)?;
         }
@@ -369,7 +381,7 @@ impl<'a> Task<'a> {
         }
         folder.write(RECORD, format!("{:#}\n", report::record(&shown, &hash)).as_bytes())?;
         checkpoints.remove()?;
-        let failure = summary.parted.map(|t| {
+        let parted = summary.parted.map(|t| {
             let text = format!(
                 "the path is known up to t = {:.6} s, not up to {} s: the runs part at t = {t:.6} s\nhint: --within a larger distance, or an earlier time",
                 summary.t,
@@ -377,6 +389,7 @@ impl<'a> Task<'a> {
             );
             Failure::new(Exit::Stopped, text)
         });
+        let failure = summary.stop.clone().map(Failure::from).or(parted);
         if self.flags.scene.tell.json {
             let mut object = report::object(&shown);
             name_files(&mut object, folder);

@@ -5,7 +5,9 @@ use crate::arithmetic::Real;
 use crate::arithmetic::digits::Layout as Decimals;
 use crate::dynamics::Mechanism;
 use crate::run::digits::{Forecast, LongEvent, LongHold, LongTurn, Pair, Row, Source, Wide};
+use crate::run::drift;
 use crate::run::files::sha256;
+use crate::stepping::StepError;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::io::{self, BufWriter, Write};
@@ -154,6 +156,11 @@ pub struct Summary {
     pub least: Option<f64>,
     /// Where the runs part \[s\].
     pub parted: Option<f64>,
+    /// The largest energy or work of any row \[J\].
+    pub largest: f64,
+    /// Why the run stopped.
+    #[serde(skip)]
+    pub stop: Option<StepError>,
     /// Wall time \[s\].
     #[serde(skip)]
     pub wall_s: f64,
@@ -168,6 +175,8 @@ impl Summary {
     pub fn take(&mut self, row: &Row, agreement: Option<f64>) {
         (self.t, self.rows) = (row.time(), self.rows + 1);
         self.drift = self.drift.max(row.drift.abs());
+        let [kinetic, _, work] = row.energy.map(|energy| energy.value().abs());
+        self.largest = self.largest.max(kinetic).max(work);
         self.residual = std::array::from_fn(|level| self.residual[level].max(row.residual[level]));
         self.agreement = agreement;
         self.least = match (self.least, agreement) {
@@ -258,7 +267,7 @@ pub fn object(shown: &Shown) -> Value {
         "wall_s": summary.wall_s,
         "final": {"t": summary.t, "bodies": bodies},
         "energy": {
-            "kind": if source.mechanism.has_work_integral() { "energy minus work" } else { "energy" },
+            "kind": drift::kind(&source.mechanism),
             "max_relative": summary.drift,
             "scale": source.mechanism.energy_scale,
         },
@@ -272,6 +281,7 @@ pub fn object(shown: &Shown) -> Value {
             "runs": runs,
             "how": "two runs with other digits and orders, compared at every row",
         })),
+        "stop": summary.stop,
     });
     if super::events::has_any(&source.mechanism) {
         object["events"] = json!({"count": events.len(), "ended_by": shown.ended_by(), "first": first});
@@ -367,6 +377,9 @@ pub fn text(shown: &Shown) -> String {
                 &format!("{least:.1} digits at the least of {}", counted(summary.rows, "row", "rows")),
             );
         }
+    }
+    if let Some(stop) = &summary.stop {
+        page.entry("stopped", &format!("at t = {} s: {}", figure(stop.t), stop.what));
     }
     page.entry("final state", &format!("t = {} s", figure(summary.t)));
     let digits = layout.digits(summary.agreement);

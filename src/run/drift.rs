@@ -132,6 +132,50 @@ pub struct Limits {
     pub constraint: Option<f64>,
 }
 
+impl Limits {
+    /// Names the first limit that is exceeded: of what is called so the imbalance over the largest energy so
+    /// far and over the energy scale, with the limit of the former where none is stated; of constraints by name
+    /// what is left at both levels, and what that is measured in.
+    pub(super) fn exceeded<'a>(
+        &self,
+        (kind, [share, excursion], most): (&str, [f64; 2], f64),
+        constraints: impl Iterator<Item = (&'a str, [f64; 2], f64)>,
+    ) -> Result<(), String> {
+        let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
+        let (off, limit) = self.energy.map_or((share, most), |limit| (excursion, limit));
+        if beyond(off, limit) {
+            let explained =
+                if self.energy.is_none() && limit < ENERGY_MOST { " of errors at the tolerance" } else { "" };
+            let limit = if explained.is_empty() { format!("{limit:e}") } else { format!("{limit:.1e}") };
+            return Err(format!("{kind} is off by {off:.2e} of the scale, the limit{explained} is {limit}"));
+        }
+        for (name, left, unit) in constraints {
+            let (most, levels) = self.constraint.map_or((POSITION_MOST * unit, 1), |limit| (limit, 2));
+            for (left, level) in left.into_iter().zip(["position", "velocity"]).take(levels) {
+                if beyond(left, most) {
+                    return Err(format!(
+                        "constraint {name} is violated by {left:.2e} at {level} level, the limit is {most:e}"
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What the energy balance of a mechanism is called: `energy`, or `energy minus work` where motors, dampers or
+/// impacts change it.
+pub(crate) fn kind(mechanism: &Mechanism) -> &'static str {
+    let works = mechanism.has_work_integral() || !mechanism.contacts.is_empty();
+    if works { "energy minus work" } else { "energy" }
+}
+
+/// What violations of each constraint are measured in: 1 rad, or the size of the mechanism \[m\].
+pub(super) fn units(mechanism: &Mechanism) -> Vec<f64> {
+    let unit = |is_in_radians: bool| if is_in_radians { 1.0 } else { mechanism.size_of_parts() };
+    mechanism.with_all_parts().constraints.iter().map(|row| unit(row.is_in_radians())).collect()
+}
+
 /// The larger of two magnitudes; not a number where either is not.
 pub(super) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
@@ -181,11 +225,10 @@ pub struct Drift {
 impl Drift {
     /// Monitors of a mechanism over a horizon \[s\].
     pub fn new(mechanism: &Mechanism, until: f64) -> Self {
-        let works = mechanism.has_work_integral() || !mechanism.contacts.is_empty();
         let pair = || [Excursion::new(until), Excursion::new(until)];
         Self {
             energy: Excursion::new(until),
-            kind: if works { "energy minus work" } else { "energy" },
+            kind: kind(mechanism),
             constraints: mechanism.constraints.iter().map(|row| (row.name().to_owned(), pair())).collect(),
             singular: None,
             stabilizer: 0.0,
@@ -195,12 +238,7 @@ impl Drift {
             allowance: None,
             limit: EnergyLimit::default(),
             scale: mechanism.energy_scale,
-            units: mechanism
-                .with_all_parts()
-                .constraints
-                .iter()
-                .map(|row| if row.is_in_radians() { 1.0 } else { mechanism.size_of_parts() })
-                .collect(),
+            units: units(mechanism),
         }
     }
 
@@ -272,34 +310,10 @@ impl Drift {
                 self.constraints.get(sample.weakest).map_or_else(String::new, |(name, _)| name.clone());
             self.singular = Some(Singular { smallest: sample.singular, t: sample.t, constraint });
         }
-        let beyond = |value: f64, limit: f64| value.is_nan() || value > limit;
-        let (off, limit) =
-            limits.energy.map_or((self.energy_share, self.limit.most), |limit| (self.energy.max, limit));
-        if beyond(off, limit) {
-            let explained = if limits.energy.is_none() && limit < ENERGY_MOST {
-                " of errors at the tolerance"
-            } else {
-                ""
-            };
-            let limit = if explained.is_empty() { format!("{limit:e}") } else { format!("{limit:.1e}") };
-            return Err(format!(
-                "{} is off by {off:.2e} of the scale, the limit{explained} is {limit}",
-                self.kind
-            ));
-        }
-        for ((name, [position, velocity]), unit) in self.constraints.iter().zip(&self.units) {
-            let (most, levels) = limits.constraint.map_or((POSITION_MOST * unit, 1), |limit| (limit, 2));
-            for (monitor, level) in [(position, "position"), (velocity, "velocity")].into_iter().take(levels)
-            {
-                if beyond(monitor.max, most) {
-                    return Err(format!(
-                        "constraint {name} is violated by {:.2e} at {level} level, the limit is {most:e}",
-                        monitor.max
-                    ));
-                }
-            }
-        }
-        Ok(())
+        let names = self.constraints.iter().zip(&self.units);
+        let constraints =
+            names.map(|((name, levels), &unit)| (&name[..], [levels[0].max, levels[1].max], unit));
+        limits.exceeded((self.kind, [self.energy_share, self.energy.max], self.limit.most), constraints)
     }
 }
 

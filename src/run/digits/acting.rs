@@ -12,7 +12,7 @@ use super::functions::Functions;
 use super::keep::Keeper;
 use super::motion::{LongState, Motion, coordinates_of};
 use super::posture::Posture;
-use super::resting;
+use super::resting::{self, Unheld};
 use super::wall;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -103,7 +103,8 @@ impl<const W: usize> Motion<W> {
                 return Err(unsuited(self, &what, hint));
             }
         }
-        self.let_go(&gone)?;
+        // What places with friction do is decided once all impulses have acted.
+        if closing.is_empty() { self.let_go(&gone) } else { self.release(&gone) }?;
         let kept = self.kept(&closing);
         self.close(&closing)?;
         let after = self.state_posture();
@@ -181,7 +182,8 @@ impl<const W: usize> Motion<W> {
         kept.map(|residual| residual.log2()).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Lets those rows take hold that were not in force before.
+    /// Lets those rows take hold that were not in force before.  Dry friction has no part in their impulses:
+    /// what sticks may slide after them.
     fn close(&mut self, closing: &[usize]) -> Result<(), StepError> {
         if closing.is_empty() {
             return Ok(());
@@ -195,23 +197,25 @@ impl<const W: usize> Motion<W> {
                 return Err(self.stop(Cause::Unsuited, 0.0, &what, "let the event be where it meets"));
             }
         }
-        let work = loop {
+        let Unheld { mechanism, mut keeper } = loop {
+            let mut unheld = Unheld::but_held(self)?;
             let LongState { t, u, rate, .. } = &self.state;
             let mut after = rate.clone();
-            let (work, impulses) = self.keeper.close(&self.mechanism, *t, u, &mut after);
+            let (work, impulses) = unheld.keeper.close(&unheld.mechanism, *t, u, &mut after);
             let most = impulses.iter().map(Digits::log2).fold(f64::NEG_INFINITY, f64::max);
             // A point that its wall would have to pull is let go.
             match resting::pulled(self, &impulses, most) {
-                Some(pulled) => self.let_go(&[pulled])?,
+                Some(pulled) => self.release(&[pulled])?,
                 None => {
                     self.state.rate = after;
-                    break work;
+                    self.state.work += work;
+                    self.state.jump_energy -= work;
+                    break unheld;
                 }
             }
         };
-        self.state.work += work;
-        self.state.jump_energy -= work;
-        self.settle()
+        let LongState { t, u, rate, .. } = &mut self.state;
+        keeper.project(&mechanism, *t, u, rate)
     }
 
     /// Kinetic and potential energy of the state \[J\].

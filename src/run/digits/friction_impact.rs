@@ -29,7 +29,7 @@ pub(super) fn alone<const W: usize>(
         let (jump, pulls) = jump(motion, wall, gap)?;
         // A point that its wall would have to pull is let go.
         if let Some(held) = resting::pulled(motion, &pulls, 0.0) {
-            motion.release(held)?;
+            motion.release(&[held])?;
             continue;
         }
         let (held, standing) = (&motion.state().acting.held, motion.mechanism.structure.standing_rows());

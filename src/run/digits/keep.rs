@@ -11,6 +11,7 @@ use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::constraint::Posture;
+use crate::dynamics::kernel::dot;
 use crate::dynamics::{schur, tree};
 use crate::stepping::{Cause, StepError};
 
@@ -33,6 +34,8 @@ pub struct Keeper<const W: usize> {
     scale: Vec<f64>,
     /// log2 of what counts as rounding.
     rounding: f64,
+    /// log2 of the share of an inverse mass that constraints leave, below which they leave nothing.
+    no_freedom: f64,
 }
 
 impl<const W: usize> Keeper<W> {
@@ -51,6 +54,7 @@ impl<const W: usize> Keeper<W> {
             mass_pivot: zeros(n),
             scale: mechanism.structure.row_scales(),
             rounding: -64.0 * (precision.limbs - 1) as f64 + 24.0,
+            no_freedom: precision.rounding(1.0),
         }
     }
 
@@ -141,16 +145,16 @@ impl<const W: usize> Keeper<W> {
         mechanism.residuals(t, phi, omega, &mut self.jacobian)
     }
 
-    /// log2 of the largest residual of position and of rate.
+    /// Sizes of all residuals \[rad, m\] and of their rates.
     pub fn left(
         &mut self,
         mechanism: &ExactMechanism<Digits<W>>,
         t: Digits<W>,
         phi: &[Digits<W>],
         omega: &[Digits<W>],
-    ) -> [f64; 2] {
+    ) -> Vec<[f64; 2]> {
         let residuals = self.residuals(mechanism, t, phi, omega);
-        [0, 1].map(|level| largest(&residuals.iter().map(|residual| residual[level]).collect::<Vec<_>>()))
+        residuals.into_iter().map(|levels| levels.map(|residual| libm::exp2(residual.log2()))).collect()
     }
 
     /// Puts positions and rates back onto the constraints.
@@ -241,7 +245,12 @@ impl<const W: usize> Keeper<W> {
     }
 
     /// The change of the rates by an impulse of one along `gradient`, the constraints kept, and the impulses
-    /// sigma of these; all at a posture.
+    /// sigma of these; all at a posture.  Where the constraints leave no freedom along `gradient`, what is
+    /// left of the change is rounding, and zero is returned:
+    ///
+    /// ```text
+    /// aᵀ M a <= 10^(-D) gᵀ M⁻¹ g,   a = M⁻¹ (g - Gᵀ sigma)
+    /// ```
     pub(super) fn response(
         &mut self,
         mechanism: &ExactMechanism<Digits<W>>,
@@ -254,12 +263,17 @@ impl<const W: usize> Keeper<W> {
         let n = phi.len();
         let mut response = gradient.to_vec();
         tree::solve::<Digits<W>, 0>(n, &self.mass, &self.mass_pivot, &mut response);
+        let without = dot(gradient, &response);
         let mut along: Vec<_> = self
             .jacobian
             .chunks_exact(n)
             .map(|row| row.iter().zip(&response).fold(Digits::ZERO, |sum, (&a, &b)| sum + a * b))
             .collect();
         self.take_off(&mut along, &mut response);
+        let [left, _] = mechanism.energy(phi, &response, &mechanism.elements(phi));
+        if left.scale(2.0).log2() - without.log2() <= self.no_freedom {
+            response.fill(Digits::ZERO);
+        }
         (response, along)
     }
 }

@@ -14,6 +14,7 @@ mod friction_impact;
 mod functions;
 mod growth;
 mod keep;
+mod limits;
 mod motion;
 mod pair;
 mod polynomial;
@@ -28,6 +29,7 @@ mod transitions;
 mod wall;
 
 pub use self::growth::{Forecast, forecast, planned};
+pub use self::limits::exceeded;
 pub use self::pair::{Pair, Progress};
 pub use self::precision::{DIGITS, Precision};
 pub use self::saved::Saved;
@@ -36,7 +38,9 @@ pub use self::shown::{LongEvent, LongHold, LongTurn, Row};
 use self::events::Happened;
 use self::friction::Turn;
 use self::motion::Motion;
+use self::posture::Posture;
 use self::resting::Hold;
+use super::drift::larger;
 use super::magnitude::changes;
 use super::plan::{Refusal, check_forces_of_joints};
 use crate::arithmetic::digits::{Digits, MOST};
@@ -98,6 +102,10 @@ pub trait LongRun: Send {
     /// # Errors
     /// The run stops.
     fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<Row>, StepError>;
+
+    /// The row of the last state before a stop, under this number; `None` where that is not beyond the last
+    /// row.
+    fn stopped(&mut self, number: u64) -> Option<Row>;
 
     /// Everything it needs to go on, to the last bit.
     fn save(&self) -> Saved;
@@ -230,6 +238,28 @@ impl<const W: usize> Runner<W> {
     }
 }
 
+impl<const W: usize> Runner<W> {
+    /// The row of a moment.
+    fn shown(&mut self, number: u64, t: Digits<W>, posture: &Posture<W>) -> Row {
+        let mechanism = &self.motion.mechanism;
+        let z = mechanism.elements(&posture.phi);
+        let [kinetic, potential] = mechanism.energy(&posture.phi, &posture.omega, &z);
+        let balance = kinetic + potential - posture.work[0] - posture.work[1] - self.energy;
+        let drift = balance.value() / mechanism.structure.energy_scale;
+        let centres = mechanism.centres(&z, &posture.omega);
+        let body = |(k, [at, rate]): (usize, [crate::arithmetic::Complex<Digits<W>>; 2])| {
+            [posture.phi[k], posture.omega[k], at.re, at.im, rate.re, rate.im].map(Digits::resized)
+        };
+        let bodies = centres.into_iter().enumerate().map(body).collect();
+        let energy = [kinetic, potential, posture.work[0]].map(Digits::resized);
+        let left = self.motion.keeper.left(mechanism, t, &posture.phi, &posture.omega);
+        let residual = [0, 1].map(|level| left.iter().fold(0.0, |most, left| larger(left[level], most)));
+        let residuals = left.into_iter().take(mechanism.structure.standing_rows()).collect();
+        let friction = self.motion.has_friction().then(|| posture.lost.resized());
+        Row { number, t: t.resized(), bodies, energy, friction, drift, residual, residuals }
+    }
+}
+
 impl<const W: usize> LongRun for Runner<W> {
     fn precision(&self) -> Precision {
         self.motion.precision
@@ -250,24 +280,19 @@ impl<const W: usize> LongRun for Runner<W> {
         }
         self.seen = t;
         let posture = self.motion.at(t);
-        let mechanism = &self.motion.mechanism;
-        let z = mechanism.elements(&posture.phi);
-        let [kinetic, potential] = mechanism.energy(&posture.phi, &posture.omega, &z);
-        let balance = kinetic + potential - posture.work[0] - posture.work[1] - self.energy;
-        let drift = balance.value() / mechanism.structure.energy_scale;
-        let centres = mechanism.centres(&z, &posture.omega);
-        let body = |(k, [at, rate]): (usize, [crate::arithmetic::Complex<Digits<W>>; 2])| {
-            [posture.phi[k], posture.omega[k], at.re, at.im, rate.re, rate.im].map(Digits::resized)
-        };
-        let bodies = centres.into_iter().enumerate().map(body).collect();
-        let energy = [kinetic, potential, posture.work[0]].map(Digits::resized);
-        let residual = if mechanism.constraints.is_empty() {
-            [0.0; 2]
-        } else {
-            self.motion.keeper.left(mechanism, t, &posture.phi, &posture.omega).map(libm::exp2)
-        };
-        let friction = self.motion.has_friction().then(|| posture.lost.resized());
-        Ok(Some(Row { number, t: t.resized(), bodies, energy, friction, drift, residual }))
+        Ok(Some(self.shown(number, t, &posture)))
+    }
+
+    fn stopped(&mut self, number: u64) -> Option<Row> {
+        let (t, posture) = (self.motion.state().t, self.motion.state_posture());
+        let is_finite = posture.phi.iter().chain(&posture.omega).all(|x| x.is_finite());
+        // A row that is beside it by rounding has it.
+        let rounding = t.log2() + self.motion.precision.rounding(1.0);
+        if t <= self.seen || (t - self.seen).log2() <= rounding || !is_finite {
+            return None;
+        }
+        self.seen = t;
+        Some(self.shown(number, t, &posture))
     }
 
     fn save(&self) -> Saved {

@@ -3,6 +3,7 @@
 use super::{LongError, LongEvent, LongHold, LongRun, LongTurn, Row, Saved, Source, Wide, long_run};
 use crate::arithmetic::Real;
 use crate::stepping::StepError;
+use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
 
 /// Rows that are gathered before they are shown, at most.
@@ -18,6 +19,8 @@ pub struct Pair {
     rows: u64,
     /// The runs as they were before the rows that are next.
     saved: Vec<Saved>,
+    /// Rows up to a stop.
+    stopped: Vec<(Row, Option<f64>)>,
 }
 
 /// How far runs have come.
@@ -40,7 +43,7 @@ impl Pair {
         let runs: Vec<_> =
             precisions.iter().map(|&precision| long_run(source, precision)).collect::<Result<_, _>>()?;
         let saved = runs.iter().map(|run| run.save()).collect();
-        Ok(Self { runs, next: 0, rows: 1, saved })
+        Ok(Self { runs, next: 0, rows: 1, saved, stopped: Vec::new() })
     }
 
     /// Goes on where others were, before the row `next`; false where they cannot have been runs of this
@@ -142,10 +145,16 @@ impl Pair {
         &self.runs
     }
 
+    /// Rows that all runs have up to the stop which [`Pair::go`] has told of, that of their last states among
+    /// them.
+    pub fn up_to_stop(&mut self) -> Vec<(Row, Option<f64>)> {
+        std::mem::take(&mut self.stopped)
+    }
+
     /// The next rows, each run on a thread of its own.
     ///
     /// # Errors
-    /// A run stops.
+    /// A run stops; see [`Pair::up_to_stop`].
     pub fn go(&mut self, pause: &(dyn Fn() -> bool + Sync)) -> Result<Progress, StepError> {
         let first = self.next;
         if first > self.last_row() {
@@ -153,18 +162,7 @@ impl Pair {
         }
         let last = self.last_row().min(first + self.rows - 1);
         let begin = Instant::now();
-        // Rows up to a pause, and whether there was none.
-        let gather = |run: &mut Box<dyn LongRun>| -> Result<(Vec<Row>, bool), StepError> {
-            let mut rows = Vec::new();
-            // An event may end the run on the way.
-            for number in first..=last {
-                if number <= run.last_row() {
-                    let Some(row) = run.row(number, &mut || pause())? else { return Ok((rows, false)) };
-                    rows.push(row);
-                }
-            }
-            Ok((rows, true))
-        };
+        let gather = |run: &mut Box<dyn LongRun>| Gathered::from(&mut **run, first..=last, pause);
         let found: Vec<_> = match &mut self.runs[..] {
             [only] => vec![gather(only)],
             runs => std::thread::scope(|scope| {
@@ -172,20 +170,26 @@ impl Pair {
                 threads.into_iter().filter_map(|thread| thread.join().ok()).collect()
             }),
         };
-        let found: Vec<(Vec<Row>, bool)> = found.into_iter().collect::<Result<_, _>>()?;
-        if !found.iter().all(|(_, is_through)| *is_through) {
+        if let Some(stop) = found.iter().find_map(|gathered| gathered.stop.clone()) {
+            let mut rows: Vec<Vec<Row>> = found.into_iter().map(|gathered| gathered.rows).collect();
+            let common = rows.iter().map(Vec::len).min().unwrap_or(0);
+            rows.iter_mut().for_each(|rows| rows.truncate(common));
+            self.stopped = self.with_agreement(rows);
+            return Err(stop);
+        }
+        if !found.iter().all(|gathered| gathered.is_through) {
             // Runs that have come to rows of which others are not through do them again; those on their way to
             // the first one go on from there.
             let mut saved = std::mem::take(&mut self.saved);
-            for ((run, saved), (rows, _)) in self.runs.iter().zip(&mut saved).zip(&found) {
-                if rows.is_empty() {
+            for ((run, saved), gathered) in self.runs.iter().zip(&mut saved).zip(&found) {
+                if gathered.rows.is_empty() {
                     *saved = run.save();
                 }
             }
             self.resume(&saved, first);
             return Ok(Progress::Paused);
         }
-        let mut found: Vec<Vec<Row>> = found.into_iter().map(|(rows, _)| rows).collect();
+        let found: Vec<Vec<Row>> = found.into_iter().map(|gathered| gathered.rows).collect();
         self.saved = self.runs.iter().map(|run| run.save()).collect();
         self.next = self.last_row().min(last) + 1;
         let spent = begin.elapsed();
@@ -197,6 +201,11 @@ impl Pair {
             self.rows
         };
         self.rows = self.rows.clamp(1, MOST);
+        Ok(Progress::Rows(self.with_agreement(found)))
+    }
+
+    /// The rows of the run with the most digits, with the digits to which all agree.
+    fn with_agreement(&self, mut found: Vec<Vec<Row>>) -> Vec<(Row, Option<f64>)> {
         let best = found.pop().unwrap_or_default();
         let most = self.most();
         let with_agreement = |(i, row): (usize, Row)| {
@@ -204,7 +213,38 @@ impl Pair {
             let least = found.iter().map(least).reduce(f64::min);
             (row, least)
         };
-        Ok(Progress::Rows(best.into_iter().enumerate().map(with_agreement).collect()))
+        best.into_iter().enumerate().map(with_agreement).collect()
+    }
+}
+
+/// What one run has gathered.
+struct Gathered {
+    rows: Vec<Row>,
+    /// False where it paused or stopped.
+    is_through: bool,
+    stop: Option<StepError>,
+}
+
+impl Gathered {
+    /// These rows of a run, up to a pause or a stop; of a stop the row of the state before it is the last one.
+    fn from(run: &mut dyn LongRun, numbers: RangeInclusive<u64>, pause: &(dyn Fn() -> bool + Sync)) -> Self {
+        let (mut rows, mut stop) = (Vec::new(), None);
+        for number in numbers {
+            // An event may end the run on the way.
+            if number > run.last_row() {
+                break;
+            }
+            match run.row(number, &mut || pause()) {
+                Ok(Some(row)) => rows.push(row),
+                Ok(None) => return Self { rows, is_through: false, stop },
+                Err(error) => {
+                    rows.extend(run.stopped(number));
+                    stop = Some(error);
+                    break;
+                }
+            }
+        }
+        Self { rows, is_through: stop.is_none(), stop }
     }
 }
 

@@ -90,12 +90,22 @@ pub struct Unheld<const W: usize> {
 impl<const W: usize> Unheld<W> {
     /// That of a motion.
     pub fn of(motion: &Motion<W>) -> Result<Self, StepError> {
+        Self::but(motion, Vec::new())
+    }
+
+    /// The same where points stay on the walls that hold them: dry friction in hinges and sliders takes no
+    /// part in impulses.
+    pub fn but_held(motion: &Motion<W>) -> Result<Self, StepError> {
+        Self::but(motion, motion.state().acting.held.clone())
+    }
+
+    fn but(motion: &Motion<W>, held: Vec<usize>) -> Result<Self, StepError> {
         let LongState { acting, .. } = motion.state();
-        if acting.held.is_empty() && acting.sliding.iter().all(|mode| *mode == Mode::Open) {
+        if acting.held == held && acting.sliding.iter().all(|mode| *mode == Mode::Open) {
             return Ok(Self { mechanism: motion.mechanism.clone(), keeper: motion.keeper.clone() });
         }
         let sliding = vec![Mode::Open; acting.sliding.len()];
-        let acting = Acting { held: Vec::new(), sliding, ..acting.clone() };
+        let acting = Acting { held, sliding, ..acting.clone() };
         let mechanism = motion.mechanism.with(acting);
         let mechanism = mechanism.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
         let keeper = Keeper::new(&mechanism, motion.precision);
@@ -394,17 +404,20 @@ impl<const W: usize> Motion<W> {
         }
     }
 
-    /// Lets the point of a wall go that an impact would pull into it, before that takes effect: nothing else
-    /// changes.
-    pub(super) fn release(&mut self, wall: usize) -> Result<(), StepError> {
-        let Acting { held, sliding, .. } = &self.state.acting;
-        let set = held.iter().copied().filter(|&held| held != wall).collect();
-        let frictions = self.mechanism.frictions.iter().zip(sliding);
-        let mode = |(friction, &mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| {
-            if friction.normal == Normal::Contact(wall) { Mode::Open } else { mode }
+    /// Lets the points of these walls go while impulses act, after which it is decided what places with
+    /// friction do.
+    pub(super) fn release(&mut self, walls: &[usize]) -> Result<(), StepError> {
+        let LongState { acting, .. } = &self.state;
+        let set: Vec<usize> = acting.held.iter().copied().filter(|wall| !walls.contains(wall)).collect();
+        if set == acting.held {
+            return Ok(());
+        }
+        let mode = |(friction, mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| match friction.normal {
+            Normal::Contact(wall) if walls.contains(&wall) => Mode::Open,
+            _ => *mode,
         };
-        let modes = frictions.map(mode).collect();
-        self.hold(set, modes, &[], None)
+        let sliding = self.mechanism.frictions.iter().zip(&acting.sliding).map(mode).collect();
+        self.hold(set, sliding, &[], None)
     }
 
     /// Lets those points go that leave their walls.

@@ -21,6 +21,8 @@ pub struct Row {
     pub drift: f64,
     /// Largest residual of the constraints \[rad or m\] and of its rate.
     pub residual: [f64; 2],
+    /// That of each constraint of the scene.
+    pub residuals: Vec<[f64; 2]>,
 }
 
 impl Row {

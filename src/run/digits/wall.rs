@@ -12,7 +12,7 @@
 use super::friction_impact;
 use super::motion::Motion;
 use super::posture::Posture as AllCoordinates;
-use super::resting::{self, Released};
+use super::resting::{self, Released, Unheld};
 use super::several::Meeting;
 use super::touch::Passage;
 use super::transitions::ModeChange;
@@ -210,6 +210,9 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     if several.is_none() && approach >= Digits::ZERO {
         return Ok(());
     }
+    if approach < Digits::ZERO && !has_way_back(motion, wall, &gap, several.is_some())? {
+        return Err(no_way_back(motion, wall));
+    }
     let jump = match several {
         Some(meeting) => meeting.jump(motion)?,
         None if motion.has_friction() => friction_impact::alone(motion, wall, &gap)?,
@@ -229,12 +232,47 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     let after = gap_rate(motion, wall).rate;
     let is_left = after < Digits::ZERO && (after / approach).log2() > motion.precision.rounding(SURE);
     if is_left || !after.is_finite() {
-        let name = &motion.mechanism.walls[wall].0.name;
-        let what = format!("the constraints leave a point that meets wall {name} no way back");
-        let hint = "look for motors that drive it there and change their laws, or end the run before";
-        return Err(motion.stop(Cause::Unsuited, 0.0, &what, hint));
+        return Err(no_way_back(motion, wall));
     }
     Ok(())
+}
+
+/// True where an impulse turns a point back that meets its wall, points let go that others would have to pull;
+/// among several walls only points that are not at rest along their normals are looked at.
+fn has_way_back<const W: usize>(
+    motion: &mut Motion<W>,
+    wall: usize,
+    gap: &GapRate<W>,
+    is_among_several: bool,
+) -> Result<bool, StepError> {
+    let structure = &motion.mechanism.structure;
+    let unit = libm::log2(structure.contacts[wall].length) - libm::log2(structure.units.time);
+    if is_among_several && gap.rate.log2() - unit <= motion.precision.rounding(SURE) {
+        return Ok(true);
+    }
+    let posture = motion.state_posture();
+    let at = [&posture.phi[..], &posture.omega[..]];
+    loop {
+        // Of several walls those that hold points press as well.
+        let Unheld { mechanism, mut keeper } =
+            if is_among_several { Unheld::of(motion) } else { Unheld::but_held(motion) }?;
+        let (response, pulls) = keeper.response(&mechanism, motion.state.t, at, &gap.gradient);
+        if !response.iter().all(Digits::is_zero) {
+            return Ok(true);
+        }
+        match resting::pulled(motion, &pulls, 0.0).filter(|_| !is_among_several) {
+            Some(held) => motion.let_go(&[held])?,
+            None => return Ok(false),
+        }
+    }
+}
+
+/// An error where no impulse turns a point back.
+fn no_way_back<const W: usize>(motion: &Motion<W>, wall: usize) -> StepError {
+    let name = &motion.mechanism.walls[wall].0.name;
+    let what = format!("the constraints leave a point that meets wall {name} no way back");
+    let hint = "look for motors that drive it there and change their laws, or end the run before";
+    motion.stop(Cause::RestingContact, 0.0, &what, hint)
 }
 
 /// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap \[m/s\].
