@@ -248,3 +248,27 @@ fn moving_walls_are_written_as_they_were_read_and_refused_with_their_place() {
     let error = Simulation::new(&scene(&behind)).err().expect("no start").to_string();
     assert!(error.contains("wall `top`") && error.contains("1.000e-1 m behind"), "{error}");
 }
+
+/// An arm lies on its stop, which leaves it no freedom and cannot pull, and is hit from below.
+#[test]
+fn a_wall_that_rises_takes_an_arm_off_its_stop() {
+    let lift = scene(
+        r#"{"name": "lift", "gravity": [0, -10], "until": 0.3, "every": 0.3,
+        "bars": [{"name": "arm", "mass": 1.2, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]}],
+        "walls": [
+            {"name": "stop", "body": "arm", "point": [1, 0], "restitution": 0, "line": {"through": [0, 0], "normal": [0, 1]}},
+            {"name": "lifter", "body": "arm", "point": [0.5, 0], "restitution": 0.5, "line": {"through": [0, -0.25], "normal": [0, 1]},
+                "law": {"start": 0, "rate": 1}}],
+        "start": {"arm": {"phi": 0, "omega": 0}}}"#,
+    );
+    for request in methods() {
+        let outcome = finished(&lift, &request);
+        assert_eq!(outcome.impacts.len(), 1, "{:?}: {:?}", request.method, outcome.impacts);
+        near(outcome.impacts[0].t, 0.25, 1e-10, "impact");
+        near(outcome.holds[0].until.expect("an end"), 0.25, 1e-10, "end of the hold");
+        // 1.5 m/s at 0.5 m, with an inertia of 0.4 kg m² about the hinge.
+        near(outcome.last.kinetic + outcome.last.potential, 1.8, 1e-9, "energy");
+        assert!(outcome.last.phi[0] > 0.1, "{:?}", outcome.last.phi);
+    }
+}

@@ -147,6 +147,25 @@ pub struct Impact {
 }
 
 impl Mechanism {
+    /// The held contact that would have to pull the hardest to keep a point from rebounding at another one, where the
+    /// constraints leave it no freedom; `None` where none has to.
+    pub fn pulled_without_way_back(
+        &self,
+        contact: usize,
+        t: Time,
+        phi: &[f64],
+        omega: &[f64],
+    ) -> Option<usize> {
+        let metric = Metric::at(self, t, phi, omega)?;
+        let z = self.elements(phi);
+        let Gradient { along, .. } =
+            Gradient::of(&self.contacts[contact].row, t, Posture { phi, z: &z, omega });
+        let pulls = metric.multipliers(&metric.column(&along));
+        let held = self.held.iter().zip(&pulls[self.standing_rows()..]);
+        let hardest = held.filter(|(_, pull)| **pull > NO_FREEDOM).max_by(|a, b| a.1.total_cmp(b.1));
+        hardest.map(|(&held, _)| held)
+    }
+
     /// The jump at contact `contact`, or `None` where the motors leave the point no freedom to rebound.
     ///
     /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] at the moment of impact; a point that is not

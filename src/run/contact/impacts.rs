@@ -76,6 +76,10 @@ impl ContactDriver {
                 false => in_modes(&self.free, &self.mechanism.held, &modes),
             };
             let Some(impact) = striking.impact_at(contact, t, &phi, &omega) else {
+                if let Some(pulled) = striking.pulled_without_way_back(contact, t, &phi, &omega) {
+                    self.release(pulled, outcome)?;
+                    continue;
+                }
                 let what = format!(
                     "the constraints leave a point that meets wall {} no way back",
                     self.name(contact)
@@ -90,16 +94,7 @@ impl ContactDriver {
                 .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
                 .max_by(|a, b| a.1.total_cmp(b.1));
             match pulled.map(|(&held, _)| held) {
-                Some(pulled) => {
-                    let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
-                    let open = |(friction, &mode): (&Friction, &Mode)| match friction.normal {
-                        Normal::Contact(contact) if contact == pulled => Mode::Open,
-                        _ => mode,
-                    };
-                    let modes =
-                        self.mechanism.frictions.iter().zip(&self.mechanism.modes).map(open).collect();
-                    self.switch(rest, modes, outcome)?;
-                }
+                Some(pulled) => self.release(pulled, outcome)?,
                 None => break (impact, striking),
             }
         };
@@ -227,6 +222,17 @@ impl ContactDriver {
             jumps.at_friction(place);
         }
         Ok(())
+    }
+
+    /// Lets the point of a wall go that an impact would pull into it.
+    fn release(&mut self, pulled: usize, outcome: &mut Outcome) -> Result<(), StepError> {
+        let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
+        let open = |(friction, &mode): (&Friction, &Mode)| match friction.normal {
+            Normal::Contact(contact) if contact == pulled => Mode::Open,
+            _ => mode,
+        };
+        let modes = self.mechanism.frictions.iter().zip(&self.mechanism.modes).map(open).collect();
+        self.switch(rest, modes, outcome)
     }
 
     /// Goes on with these contacts held, and the places with friction in these modes.
