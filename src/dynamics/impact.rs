@@ -147,8 +147,8 @@ pub struct Impact {
 }
 
 impl Mechanism {
-    /// The held contact that would have to pull the hardest to keep a point from rebounding at another one, where the
-    /// constraints leave it no freedom; `None` where none has to.
+    /// The held contact that would have to pull the hardest to keep a point from rebounding at another one,
+    /// where the constraints leave it no freedom; `None` where none has to.
     pub fn pulled_without_way_back(
         &self,
         contact: usize,

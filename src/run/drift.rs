@@ -134,8 +134,8 @@ pub struct Limits {
 
 impl Limits {
     /// Names the first limit that is exceeded: of what is called so the imbalance over the largest energy so
-    /// far and over the energy scale, with the limit of the former where none is stated; of constraints by name
-    /// what is left at both levels, and what that is measured in.
+    /// far and over the energy scale, with the limit of the former where none is stated; of constraints by
+    /// name what is left at both levels, and what that is measured in.
     pub(super) fn exceeded<'a>(
         &self,
         (kind, [share, excursion], most): (&str, [f64; 2], f64),
@@ -163,8 +163,8 @@ impl Limits {
     }
 }
 
-/// What the energy balance of a mechanism is called: `energy`, or `energy minus work` where motors, dampers or
-/// impacts change it.
+/// What the energy balance of a mechanism is called: `energy`, or `energy minus work` where motors, dampers
+/// or impacts change it.
 pub(crate) fn kind(mechanism: &Mechanism) -> &'static str {
     let works = mechanism.has_work_integral() || !mechanism.contacts.is_empty();
     if works { "energy minus work" } else { "energy" }

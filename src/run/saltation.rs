@@ -364,8 +364,8 @@ fn strike(
         .ok_or_else(|| "neighbouring motions have no way back from a wall".into())
 }
 
-/// The differences at which the point of a wall still moves along its normal as it does, for a column that is there so
-/// much later \[s\].
+/// The differences at which the point of a wall still moves along its normal as it does, for a column that is
+/// there so much later \[s\].
 fn reach(mechanism: &Arc<Mechanism>, contact: usize, side: &Side, late: f64, column: &Column) -> f64 {
     let speed =
         |motion: &Motion| Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()]);

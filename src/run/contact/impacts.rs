@@ -293,8 +293,8 @@ impl ContactDriver {
     }
 
     /// Takes off a motion what keeps it from its walls: gaps of rounding, and normal velocities too small to
-    /// rebound with, at the walls that are held anew with the friction of their impulses, and after flights that
-    /// are left out.
+    /// rebound with, at the walls that are held anew with the friction of their impulses, and after flights
+    /// that are left out.
     fn put_on(
         &mut self,
         motion: &mut Motion,

@@ -7,9 +7,9 @@
 //! ```
 //!
 //! Holding the point at once with that impulse leaves the rates where all bounces would, and the place to the
-//! height of the last one, where nothing depends on the pressure of the wall but what is on it.  Dry friction in
-//! joints does, and takes no part in impulses: until the end it is that of a flight, and what it would do beside
-//! a point held at once is taken back.
+//! height of the last one, where nothing depends on the pressure of the wall but what is on it.  Dry friction
+//! in joints does, and takes no part in impulses: until the end it is that of a flight, and what it would do
+//! beside a point held at once is taken back.
 //!
 //! ```text
 //! Δw = (a_flight - a_held) T, the constraints kept,   Δq = -T Δw / 2        T: how long all bounces last
@@ -79,9 +79,9 @@ impl Flight {
     }
 }
 
-/// Takes off a motion what speed bounces have left at walls that a mechanism holds anew, with what friction has to do
-/// with it: at these walls and, where flights are left out, in joints, which do not rub as beside a point held already.
-/// `None` where the constraints leave no rates.
+/// Takes off a motion what speed bounces have left at walls that a mechanism holds anew, with what friction
+/// has to do with it: at these walls and, where flights are left out, in joints, which do not rub as beside a
+/// point held already.  `None` where the constraints leave no rates.
 pub(in crate::run) fn come_to_rest(
     held: &Mechanism,
     new: &[usize],

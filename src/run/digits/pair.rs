@@ -226,7 +226,8 @@ struct Gathered {
 }
 
 impl Gathered {
-    /// These rows of a run, up to a pause or a stop; of a stop the row of the state before it is the last one.
+    /// These rows of a run, up to a pause or a stop; of a stop the row of the state before it is the last
+    /// one.
     fn from(run: &mut dyn LongRun, numbers: RangeInclusive<u64>, pause: &(dyn Fn() -> bool + Sync)) -> Self {
         let (mut rows, mut stop) = (Vec::new(), None);
         for number in numbers {

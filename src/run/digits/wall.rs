@@ -237,8 +237,8 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
     Ok(())
 }
 
-/// True where an impulse turns a point back that meets its wall, points let go that others would have to pull;
-/// among several walls only points that are not at rest along their normals are looked at.
+/// True where an impulse turns a point back that meets its wall, points let go that others would have to
+/// pull; among several walls only points that are not at rest along their normals are looked at.
 fn has_way_back<const W: usize>(
     motion: &mut Motion<W>,
     wall: usize,

@@ -305,8 +305,9 @@ impl EventDetector {
         of_the_scene.chain(self.events.iter().map(|event| event.value(at))).collect()
     }
 
-    /// Remembers the events whose functions a jump of the rates has carried across zero: they happen where the
-    /// next step begins, unless another jump at this moment carries them back before any of them has happened.
+    /// Remembers the events whose functions a jump of the rates has carried across zero: they happen where
+    /// the next step begins, unless another jump at this moment carries them back before any of them has
+    /// happened.
     pub fn jump(&mut self, [before, after]: [&Motion; 2]) {
         let has_begun = self.memory.last.iter().any(|(_, t)| *t == after.time);
         let [before, after] =

@@ -24,8 +24,8 @@ use crate::run::running::Outcome;
 use crate::scene::{Scene, Template};
 use serde::Serialize;
 
-/// Coordinates up to which columns are taken on by collocation in no more time than by series: `spring` takes 0.6 of
-/// it, `free` and `four_bars` as long, `branch` 1.2, `chain8` 1.6 and `andrews` 2.0 times as long.
+/// Coordinates up to which columns are taken on by collocation in no more time than by series: `spring` takes
+/// 0.6 of it, `free` and `four_bars` as long, `branch` 1.2, `chain8` 1.6 and `andrews` 2.0 times as long.
 const FEW: usize = 4;
 /// Times at which exponents so far are kept.
 const KEPT: usize = 400;

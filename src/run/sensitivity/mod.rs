@@ -268,7 +268,8 @@ impl Study {
         Ok(())
     }
 
-    /// Columns of all numbers at the start, and what moves them; and room for so many directions of the state.
+    /// Columns of all numbers at the start, and what moves them; and room for so many directions of the
+    /// state.
     pub fn variation(&self, directions: usize) -> Result<Variation, SensitivityError> {
         let columns = self.neighbours.iter().map(|neighbours| neighbours.start.clone()).collect();
         let neighbours = self.neighbours.iter().cloned().map(Some).collect();

@@ -1,5 +1,5 @@
-//! Steps that an event cuts short: what of them has not happened, and what happens where the next one begins, or
-//! would begin.
+//! Steps that an event cuts short: what of them has not happened, and what happens where the next one begins,
+//! or would begin.
 
 use super::{Action, EventDetector, Owner, SAME};
 use crate::dynamics::{Motion, Time};
