@@ -630,6 +630,29 @@ fn what_sticks_does_so_beside_what_closes_elsewhere() {
     found.turned(&[("S", "sticks", BigInt::ZERO)], 27);
 }
 
+/// A lock closes, through a weld, beside a hinge with friction that comes to rest with it: there is none then, and
+/// steps may be longer than the series of the hinge's force converges.
+#[test]
+fn what_is_locked_by_others_asks_nothing_of_the_force_in_its_hinge() {
+    let text = r#"{"name": "locked", "gravity": [-0.097, -3.988],
+        "bars": [{"name": "b0", "mass": 0.747, "centre": [0.115, 0.003], "inertia": 0.00498, "length": 0.315},
+            {"name": "b1", "mass": 1.008, "centre": [0.235, 0.008], "inertia": 0.01494, "length": 0.457},
+            {"name": "b2", "mass": 0.527, "centre": [0.159, -0.01], "inertia": 0.00802, "length": 0.324}],
+        "hinges": [{"name": "h0", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b0", "point": [0, 0]}]},
+            {"name": "h1", "between": [{"body": "b1", "point": [0.457, 0]}, {"body": "b2", "point": [0.001, -0.045]}],
+                "friction": {"radius": 0.014, "kinetic": 0.269}}],
+        "points": [{"name": "p", "body": "b1", "point": [0.457, -0.01]}],
+        "welds": [{"name": "weld", "between": [{"body": "b0", "point": [0.315, 0]}, {"body": "b1", "point": [0.07, 0.047]}]}],
+        "locks": [{"name": "lock", "body": "b2", "relative_to": "b0"}], "inactive": ["lock"],
+        "events": [{"name": "closes", "when": "p.y - 0.253", "direction": "falling", "on": ["lock"]}],
+        "start": {"b0": {"phi": -0.162, "omega": -1.187}, "b1": {"phi": 1.204, "omega": -1.187},
+            "b2": {"phi": -1.539, "omega": -2.787}}, "until": 0.3, "every": 0.3}"#;
+    for digits in [20, 25, 30, 35] {
+        ran(text, "0.3", digits);
+    }
+    compared(text, "0.3").expect("a motion");
+}
+
 #[test]
 fn a_run_goes_on_to_the_last_bit_while_places_stick_and_slide() {
     let spring = r#", "springs": [{"name": "k", "between": [{"body": "ground", "point": [-1, 0]}, {"body": "block", "point": [0, 0]}],

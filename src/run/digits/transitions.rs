@@ -64,7 +64,10 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                 {
                     comes(ModeChange::Moves(place, sign), Digits::ZERO);
                 }
-                if let Some(time) = reverses(motion, place, slides.normal, slides.size, step)? {
+                // Where there is no friction its normal force does nothing, and steps do not heed its series.
+                if strain != 0.0
+                    && let Some(time) = reverses(motion, place, slides.normal, slides.size, step)?
+                {
                     comes(ModeChange::Reverses, time);
                 }
             }
