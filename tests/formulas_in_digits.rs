@@ -1,6 +1,6 @@
 //! Formulas of time and state in many digits, against closed forms in integer arithmetic of another crate.
 
-use crate::many_digits::{cosine, fixed, last, mean, near, number, one, pi, source, text, times};
+use crate::many_digits::{cosine, fixed, last, mean, near, number, one, pi, root, source, text, times};
 use num_bigint::BigInt;
 
 /// A rotor of moment of inertia 0.7 kg m² and what acts on it.
@@ -25,10 +25,6 @@ fn exponential(x: &BigInt) -> BigInt {
 
 fn inverse(x: &BigInt) -> BigInt {
     one() * one() / x
-}
-
-fn root(x: &BigInt) -> BigInt {
-    (x * one()).sqrt()
 }
 
 /// 0.1 + 0.5 cos(2 t), as a potential, as a torque, by parameters, and by the integral of the rate: 0.1, 1.4, 2.8

@@ -328,6 +328,30 @@ fn a_hinged_bar_comes_to_rest_on_a_rough_wall() {
     assert!(ends.iter().all(|end| (end - ends[2]).abs() < 2e-9), "{ends:?}");
 }
 
+/// A block above a cart on a rough rail of the ground, of these masses, at a height and with the speed of the cart.
+pub fn cart_below_a_block(
+    [cart, block]: [f64; 2],
+    mu: f64,
+    e: f64,
+    [height, speed]: [f64; 2],
+    until: f64,
+) -> String {
+    format!(
+        r#"{{"name": "cart", "gravity": [0, -{G}], "until": {until}, "every": {until},
+        "bars": [{{"name": "cart", "mass": {cart}, "centre": [0, 0], "inertia": 0.1}},
+            {{"name": "block", "mass": {block}, "centre": [0, 0], "inertia": 0.1}}],
+        "sliders": [{{"name": "rail", "point": {{"body": "cart", "point": [0, 0]}},
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked", "friction": {{"kinetic": {mu}}}}},
+            {{"name": "post", "point": {{"body": "block", "point": [0, 0]}},
+                "rail": {{"body": "cart", "point": [0, 0], "direction": [0, 1]}}, "angle": "locked"}}],
+        "walls": [{{"name": "deck", "body": "block", "point": [0, 0], "restitution": {e},
+            "line": {{"body": "cart", "through": [0, 0], "normal": [0, 1]}}}}],
+        "outputs": {{"x": "block.x"}},
+        "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{speed}, 0]}},
+            "block": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{speed}, 0]}}}}}}"#
+    )
+}
+
 /// A block that bounces on a cart, which slides along a rough rail of the ground: until the bounces have ended the
 /// rail carries the cart alone.
 #[test]
@@ -335,19 +359,7 @@ fn a_joint_rubs_as_in_flight_until_infinitely_many_bounces_have_ended() {
     let (cart, block, mu, height, speed, until) = (1.0, 9.0, 0.5, 0.1_f64, 10.0, 2.0);
     let total = cart + block;
     for e in [0.5_f64, 0.8, 0.85] {
-        let text = format!(
-            r#"{{"name": "cart", "gravity": [0, -{G}], "until": {until}, "every": {until},
-            "bars": [{{"name": "cart", "mass": {cart}, "centre": [0, 0], "inertia": 0.1}},
-                {{"name": "block", "mass": {block}, "centre": [0, 0], "inertia": 0.1}}],
-            "sliders": [{{"name": "rail", "point": {{"body": "cart", "point": [0, 0]}},
-                    "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked", "friction": {{"kinetic": {mu}}}}},
-                {{"name": "post", "point": {{"body": "block", "point": [0, 0]}},
-                    "rail": {{"body": "cart", "point": [0, 0], "direction": [0, 1]}}, "angle": "locked"}}],
-            "walls": [{{"name": "deck", "body": "block", "point": [0, 0], "restitution": {e},
-                "line": {{"body": "cart", "through": [0, 0], "normal": [0, 1]}}}}],
-            "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{speed}, 0]}},
-                "block": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{speed}, 0]}}}}}}"#
-        );
+        let text = cart_below_a_block([cart, block], mu, e, [height, speed], until);
         let end = (2.0 * height / G).sqrt() * (1.0 + e) / (1.0 - e);
         let (flying, held) = (mu * G * cart / total, mu * G);
         let left = until - end;

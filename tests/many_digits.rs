@@ -112,6 +112,18 @@ pub fn times(a: &BigInt, b: &BigInt) -> BigInt {
     a * b / one()
 }
 
+pub fn over(a: &BigInt, b: &BigInt) -> BigInt {
+    a * one() / b
+}
+
+pub fn root(x: &BigInt) -> BigInt {
+    (x * one()).sqrt()
+}
+
+pub fn square(x: &BigInt) -> BigInt {
+    times(x, x)
+}
+
 pub fn cosine(x: &BigInt) -> BigInt {
     let (mut term, mut sum) = (one(), one());
     for k in 1..400_u32 {

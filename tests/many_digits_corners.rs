@@ -1,7 +1,7 @@
 //! Formulas with corners, events that change what acts, and walls that move, in many digits: against closed forms
 //! in integer arithmetic.
 
-use super::many_digits::{cosine, fixed, last, near, number, one, pi, source, text, times};
+use super::many_digits::{cosine, fixed, last, near, number, one, over, pi, root, source, text, times};
 use driftless::arithmetic::Real;
 use driftless::run::digits::{LongRun, Pair, Precision, Progress, Saved, Source, long_run};
 use driftless::stepping::Cause;
@@ -24,14 +24,6 @@ fn at(parts: &str, [phi, omega]: [&str; 2], until: &str) -> [BigInt; 2] {
     let row = last(&source(&rotor(parts, phi, omega), &[], until, until), DIGITS);
     assert!(row.drift.abs() < 1e-56, "{parts}: {:e}", row.drift);
     [number(row.bodies[0][0]), number(row.bodies[0][1])]
-}
-
-fn over(a: &BigInt, b: &BigInt) -> BigInt {
-    a * one() / b
-}
-
-fn root(x: &BigInt) -> BigInt {
-    (x * one()).sqrt()
 }
 
 fn begun(source: &Source) -> Box<dyn LongRun> {

@@ -5,7 +5,7 @@ use super::forces_at_points::{SLOPES, on_a_slope};
 use super::friction::{any_scene, rod};
 use super::friction_shared::linkage;
 use super::many_digits::{
-    begun, cosine, fixed, near, number, one, pi, proved, resumed, shipped, source, times,
+    begun, cosine, fixed, near, number, one, over, pi, proved, resumed, root, shipped, source, square, times,
 };
 use driftless::Mechanism;
 use driftless::arithmetic::Real;
@@ -15,20 +15,8 @@ use driftless::scene::parse_scene;
 use driftless::stepping::StepError;
 use num_bigint::BigInt;
 
-fn over(a: &BigInt, b: &BigInt) -> BigInt {
-    a * one() / b
-}
-
-fn root(x: &BigInt) -> BigInt {
-    (x * one()).sqrt()
-}
-
 fn sine(x: &BigInt) -> BigInt {
     cosine(&(pi() / 2 - x))
-}
-
-fn square(x: &BigInt) -> BigInt {
-    times(x, x)
 }
 
 /// The last row of a run of a scene, and its transitions.

@@ -3,7 +3,9 @@
 
 use super::common;
 use super::friction::Dice;
-use super::many_digits::{begun, fixed, near, number, one, proved, resumed, source, times};
+use super::many_digits::{
+    begun, fixed, near, number, one, over, proved, resumed, root, source, square, times,
+};
 use driftless::arithmetic::Real;
 use driftless::run::digits::{LongHold, LongTurn, Row};
 use driftless::run::{MethodId, Outcome, Request};
@@ -18,18 +20,6 @@ const X: usize = 2;
 const Y: usize = 3;
 const VX: usize = 4;
 const VY: usize = 5;
-
-fn over(a: &BigInt, b: &BigInt) -> BigInt {
-    a * one() / b
-}
-
-fn root(x: &BigInt) -> BigInt {
-    (x * one()).sqrt()
-}
-
-fn square(x: &BigInt) -> BigInt {
-    times(x, x)
-}
 
 /// A run, at its end.
 struct Ran {
@@ -407,7 +397,7 @@ fn compared(text: &str, until: &str, plain: &Outcome) -> Ran {
     many
 }
 
-/// A box on two feet with an arm hinged on it, and a wheel on the box geared to the arm in some: it falls flat, or
+/// A box on two corners with an arm hinged on it, and a wheel on the box geared to the arm in some: it falls flat, or
 /// slides over the floor until its arm strikes a wall.
 fn any_machine(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 5);
@@ -423,7 +413,7 @@ fn any_machine(seed: u64) -> String {
     let e = |dice: &mut Dice| if dice.is(0.3) { 0.0 } else { dice.within(0.1, 0.9) };
     let law = if dice.is(0.3) { r#", "impact": "newton""# } else { "" };
     let (height, arm, phi) = (dice.within(0.1, 0.4), dice.within(0.4, 0.8), dice.within(-0.7, 0.7));
-    let foot = |dice: &mut Dice, name: &str, x: f64, share: f64| {
+    let corner = |dice: &mut Dice, name: &str, x: f64, share: f64| {
         let (e, friction) = (e(dice), rough(dice, share, law));
         format!(
             r#"{{"name": "{name}", "body": "box", "point": [{x:.3}, {:.3}], "line": {{"through": [0, 0], "normal": [0, 1]}},
@@ -434,11 +424,11 @@ fn any_machine(seed: u64) -> String {
     let mut walls = vec![
         {
             let x = dice.within(-0.6, -0.3);
-            foot(&mut dice, "left", x, 1.0)
+            corner(&mut dice, "left", x, 1.0)
         },
         {
             let x = dice.within(0.3, 0.6);
-            foot(&mut dice, "right", x, 0.6)
+            corner(&mut dice, "right", x, 0.6)
         },
     ];
     let (e, friction) = (e(&mut dice), rough(&mut dice, 0.5, law));

@@ -2,20 +2,14 @@
 //! runs in doubles.
 
 use super::common;
-use super::many_digits::{begun, cosine, fixed, near, number, one, pi, proved, resumed, source, times};
+use super::many_digits::{
+    begun, cosine, fixed, near, number, one, over, pi, proved, resumed, root, source, times,
+};
 use driftless::arithmetic::Real;
 use driftless::run::Request;
 use driftless::run::digits::{LongEvent, LongHold, Row};
 use driftless::scene::parse_scene;
 use num_bigint::BigInt;
-
-fn over(a: &BigInt, b: &BigInt) -> BigInt {
-    a * one() / b
-}
-
-fn root(x: &BigInt) -> BigInt {
-    (x * one()).sqrt()
-}
 
 /// The last row of a run of a scene, and the times that points stayed on walls.
 struct Ran {

@@ -1,6 +1,6 @@
 //! Impacts at several walls at one moment in many digits, against closed forms in integer arithmetic.
 
-use super::many_digits::{begun, fixed, last, near, number, one, source, times};
+use super::many_digits::{begun, fixed, last, near, number, one, over, source, times};
 use driftless::run::digits::{LongError, Pair, Precision, Progress, Row, forecast};
 use driftless::stepping::StepError;
 use num_bigint::BigInt;
@@ -9,10 +9,6 @@ const DIGITS: usize = 60;
 const PLACES: u32 = 57;
 /// Of the box: mass, moment of inertia, height of its centre, and how far it falls.
 const BOX: [&str; 4] = ["1.5", "0.11", "0.3", "0.49"];
-
-fn over(a: &BigInt, b: &BigInt) -> BigInt {
-    a * one() / b
-}
 
 /// A box that lands flat on corners at these places beside its centre of mass, with these restitutions.
 fn landed(corners: [(&str, &str); 2], until: &str) -> Row {

@@ -1,6 +1,7 @@
 //! Sensitivities through dry friction, points that rest, numbers that events set, moving walls and several walls
 //! at once, against closed forms and against differences of references.
 
+use crate::friction_impacts::cart_below_a_block;
 use crate::mechanisms::Dice;
 use crate::sensitivity::{assert_near, compared, derived, example, template};
 use crate::switched::{scene, scene_of_numbers};
@@ -276,20 +277,7 @@ fn what_an_impact_switches_is_derived_with_the_impact() {
 #[test]
 fn the_end_of_infinitely_many_bounces_beside_a_rough_rail_is_derived() {
     let (g, mu, height, speed, e, until) = (9.81, 0.5, 0.1_f64, 10.0, 0.8, 2.0);
-    let scene = template(&format!(
-        r#"{{"name": "cart", "gravity": [0, -{g}], "until": {until}, "every": {until},
-        "bars": [{{"name": "cart", "mass": 1, "centre": [0, 0], "inertia": 0.1}},
-            {{"name": "block", "mass": 9, "centre": [0, 0], "inertia": 0.1}}],
-        "sliders": [{{"name": "rail", "point": {{"body": "cart", "point": [0, 0]}},
-                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked", "friction": {{"kinetic": {mu}}}}},
-            {{"name": "post", "point": {{"body": "block", "point": [0, 0]}},
-                "rail": {{"body": "cart", "point": [0, 0], "direction": [0, 1]}}, "angle": "locked"}}],
-        "walls": [{{"name": "deck", "body": "block", "point": [0, 0], "restitution": {e},
-            "line": {{"body": "cart", "through": [0, 0], "normal": [0, 1]}}}}],
-        "outputs": {{"x": "block.x"}},
-        "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{speed}, 0]}},
-            "block": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{speed}, 0]}}}}}}"#
-    ));
+    let scene = template(&cart_below_a_block([1.0, 9.0], mu, e, [height, speed], until));
     let to = ["walls.deck.restitution", "sliders.rail.friction.kinetic", "start.block.origin[1]"];
     let found = derived(&scene, &["x"], &to, until);
     let fall = (2.0 * height / g).sqrt();

@@ -160,10 +160,14 @@ impl Mechanism {
         let z = self.elements(phi);
         let Gradient { along, .. } =
             Gradient::of(&self.contacts[contact].row, t, Posture { phi, z: &z, omega });
-        let pulls = metric.multipliers(&metric.column(&along));
-        let held = self.held.iter().zip(&pulls[self.standing_rows()..]);
-        let hardest = held.filter(|(_, pull)| **pull > NO_FREEDOM).max_by(|a, b| a.1.total_cmp(b.1));
-        hardest.map(|(&held, _)| held)
+        self.pulled(&metric.multipliers(&metric.column(&along)), NO_FREEDOM)
+    }
+
+    /// The held contact that would have to pull the hardest, by more than `least`, of these impulses of the rows.
+    pub fn pulled(&self, row_impulses: &[f64], least: f64) -> Option<usize> {
+        let held = self.held.iter().zip(&row_impulses[self.standing_rows()..]);
+        let pulled = held.filter(|(_, pull)| **pull > least);
+        pulled.max_by(|a, b| a.1.total_cmp(b.1)).map(|(&held, _)| held)
     }
 
     /// The jump at contact `contact`, or `None` where the motors leave the point no freedom to rebound.

@@ -399,18 +399,19 @@ fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Column) -> R
     let (mechanism, side) = (&jump.mechanism, Side::resting(&jump.before));
     let new: Vec<usize> =
         mechanism.held.iter().copied().filter(|contact| !before.held.contains(contact)).collect();
-    let rates = |of: &Arc<Mechanism>, motion: &Motion| {
-        let flights: Vec<_> = new.iter().filter_map(|&contact| Flight::new(of, contact, motion)).collect();
-        let mut motion = motion.clone();
-        come_to_rest(of, &new, &flights, &mut motion)?;
-        plastic(of, &motion).map(|(rates, ..)| rates)
+    // Bounces that are left out matter to friction alone, and neighbours must make them as well.
+    let flights = |of: &Mechanism, motion: &Motion| match of.sliding().next() {
+        Some(_) => Flight::all(of, &new, motion),
+        None => Vec::new(),
     };
-    // Neighbours must rebound as well where friction depends on bounces that are left out.
-    let rubs = mechanism.sliding().next().is_some();
-    let bounces = |&contact: &usize| rubs && Flight::new(mechanism, contact, &jump.before).is_some();
-    let reaches =
-        new.iter().copied().filter(bounces).map(|contact| reach(mechanism, contact, &side, late, column));
-    let share = reaches.fold(f64::INFINITY, f64::min);
+    let rates = |of: &Arc<Mechanism>, motion: &Motion| {
+        let mut after = motion.clone();
+        come_to_rest(of, &new, &flights(of, motion), &mut after)?;
+        plastic(of, &after).map(|(rates, ..)| rates)
+    };
+    let share = (flights(mechanism, &jump.before).iter())
+        .map(|flight| reach(mechanism, flight.contact, &side, late, column))
+        .fold(f64::INFINITY, f64::min);
     change(mechanism, &side, [late, share], column, &rates)
         .ok_or_else(|| "what is held leaves neighbouring motions no rates".into())
 }

@@ -90,10 +90,7 @@ impl ContactDriver {
                     "look for motors that drive it there and change their laws, or end the run before",
                 ));
             };
-            let pulled = (striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]))
-                .filter(|(_, pull)| **pull > 1e-12 * impact.impulse)
-                .max_by(|a, b| a.1.total_cmp(b.1));
-            match pulled.map(|(&held, _)| held) {
+            match striking.pulled(&impact.row_impulses, 1e-12 * impact.impulse) {
                 Some(pulled) => self.release(pulled, outcome)?,
                 None => break (impact, striking),
             }
@@ -247,8 +244,7 @@ impl ContactDriver {
         self.stabilizer += std::mem::take(&mut motion.stabilizer);
         let new: Vec<usize> = contacts.iter().copied().filter(|c| !self.mechanism.held.contains(c)).collect();
         let next = in_modes(&self.free, &contacts, &modes);
-        let flights: Vec<Flight> =
-            new.iter().filter_map(|&contact| Flight::new(&next, contact, &motion)).collect();
+        let flights = Flight::all(&next, &new, &motion);
         self.record(&contacts, motion.time.hi, outcome);
         for flight in &flights {
             self.begin_later(flight.contact, flight.last, outcome);

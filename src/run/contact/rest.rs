@@ -54,8 +54,13 @@ impl Course {
 }
 
 impl Flight {
-    /// The bounces of a point that are left out, of a wall that a mechanism holds from now on beside others.
-    pub fn new(held: &Mechanism, contact: usize, motion: &Motion) -> Option<Self> {
+    /// The bounces that are left out at walls that a mechanism holds from now on.
+    pub fn all(held: &Mechanism, new: &[usize], motion: &Motion) -> Vec<Self> {
+        new.iter().filter_map(|&contact| Self::new(held, contact, motion)).collect()
+    }
+
+    /// Those of one wall beside others.
+    fn new(held: &Mechanism, contact: usize, motion: &Motion) -> Option<Self> {
         let [phi, omega] = plain(motion);
         let z = held.elements(&phi);
         let wall = &held.contacts[contact];
