@@ -346,6 +346,44 @@ fn turns_of_a_torsion_spring_are_kept() {
     }
 }
 
+/// A motor, a lock or a weld counts whole turns: where it holds two bodies and a torsion spring acts on the second, a place
+/// in which they are a turn off is none of theirs.  One angle is left: V = g (0.6 sin a + 0.1 sin b) + k b²/2, b = a + c.
+#[test]
+fn whole_turns_between_bodies_held_to_each_other_are_kept() {
+    let given = 0.7;
+    let held = [
+        r#""motors": [{"name": "m", "body": "b", "relative_to": "a", "law": {"start": 0.7}}]"#,
+        r#""motors": [{"name": "m", "body": "a", "relative_to": "b", "law": {"start": -0.7}}]"#,
+        r#""locks": [{"name": "m", "body": "b", "relative_to": "a", "angle": 0.7}]"#,
+        r#""welds": [{"name": "m", "between": [{"body": "a", "point": [0.4, 0]}, {"body": "b", "point": [0, 0]}]}]"#,
+    ];
+    for (held, stiffness) in held.iter().flat_map(|held| [0.3, 1.0, 1.9].map(|k| (held, k))) {
+        let is_weld = held.contains("welds");
+        let hinge = r#", {"name": "B", "between": [{"body": "a", "point": [0.4, 0]}, {"body": "b", "point": [0, 0]}]}"#;
+        let (hinge, b) = if is_weld { ("", r#", "b": {"phi": 1.0, "omega": 0}"#) } else { (hinge, "") };
+        let scene = parsed(&format!(
+            r#"{{"name": "held", "gravity": [0, -9.81],
+                "bars": [{{"name": "a", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4}},
+                    {{"name": "b", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": 0.3}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}}{hinge}],
+                {held},
+                "torsion_springs": [{{"name": "coil", "body": "b", "stiffness": {stiffness}, "free_angle": 0}}],
+                "start": {{"a": {{"phi": 0.3, "omega": 0}}{b}}}, "until": 1, "every": 0.1}}"#
+        ));
+        let torque = |a: f64| 9.81 * (0.6 * a.cos() + 0.1 * (a + given).cos()) + stiffness * (a + given);
+        let found = found(&scene, 64).equilibria;
+        for one in &found {
+            let [a, b] = [one.phi[0], one.phi[1]];
+            assert!((b - a - given).abs() < 1e-12 && torque(a).abs() < 1e-10, "{held} {stiffness}: {one:?}");
+        }
+        // At most half a turn of the first one away: all that there are; the search need not wind springs up.
+        let ends = (-3142..3142).map(|i| [1e-3 * f64::from(i), 1e-3 * f64::from(i + 1)]);
+        let roots = ends.filter(|[a, b]| torque(*a) * torque(*b) < 0.0).count();
+        let near = found.iter().filter(|one| one.phi[0].abs() < 3.142).count();
+        assert!(roots >= 1 && near == roots, "{held} {stiffness}: {near} of {roots}");
+    }
+}
+
 /// A spring with a free length that has none pushes in no direction: the top of its cone is no equilibrium.
 #[test]
 fn no_equilibrium_is_where_a_spring_has_no_length() {

@@ -163,7 +163,8 @@ impl Mechanism {
         self.pulled(&metric.multipliers(&metric.column(&along)), NO_FREEDOM)
     }
 
-    /// The held contact that would have to pull the hardest, by more than `least`, of these impulses of the rows.
+    /// The held contact that would have to pull the hardest, by more than `least`, of these impulses of the
+    /// rows.
     pub fn pulled(&self, row_impulses: &[f64], least: f64) -> Option<usize> {
         let held = self.held.iter().zip(&row_impulses[self.standing_rows()..]);
         let pulled = held.filter(|(_, pull)| **pull > least);

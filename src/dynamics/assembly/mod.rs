@@ -177,7 +177,9 @@ impl Mechanism {
             let of = |(k, q): (usize, DoubleDouble)| {
                 if k < self.bodies.len() { q.reduced().0.hi } else { q.hi }
             };
-            found.q.into_iter().enumerate().map(of).collect()
+            let mut q: Vec<f64> = found.q.into_iter().enumerate().map(of).collect();
+            self.wind(&mut q);
+            q
         };
         found.into_iter().skip(1).map(plain).collect()
     }

@@ -1,6 +1,7 @@
 //! Of which bodies whole turns matter, and between which.
 
 use super::Mechanism;
+use crate::dynamics::Time;
 use crate::dynamics::constraint::{Measure, Site};
 use crate::dynamics::force::UserForce;
 use crate::dynamics::force::formula::Formulas;
@@ -17,6 +18,11 @@ pub(crate) struct WholeTurns {
 impl WholeTurns {
     /// Those of a mechanism: springs hold bodies to one another, formulas to the ground.
     pub fn of(mechanism: &Mechanism) -> Self {
+        Self::joined(mechanism, std::iter::empty())
+    }
+
+    /// Those of a mechanism in which pairs of bodies, or a body and the ground, turn together.
+    fn joined(mechanism: &Mechanism, pairs: impl Iterator<Item = (usize, Option<usize>)>) -> Self {
         let ground = mechanism.bodies.len();
         let mut group: Vec<usize> = (0..=ground).collect();
         let mut join = |a: usize, b: usize| {
@@ -31,9 +37,17 @@ impl WholeTurns {
         for body in mechanism.forces.iter().flat_map(UserForce::counted_angles).chain(aims).chain(formulas) {
             join(body, ground);
         }
+        pairs.for_each(|(body, base)| join(body, base.unwrap_or(ground)));
         let first = |k: usize| group.iter().position(|one| *one == group[k]);
         let with = (0..ground).map(|k| if group[k] == group[ground] { None } else { first(k) }).collect();
         Self { with }
+    }
+
+    /// The same beside motors, locks and welds as they stand at one time: they count turns, so that the bodies whose
+    /// angles they measure turn together.
+    pub fn beside_rows(mechanism: &Mechanism) -> Self {
+        let pairs = mechanism.angles_given().map(|(body, base, _)| (body, base));
+        Self::joined(mechanism, pairs)
     }
 
     /// Takes whole turns off a difference of two positions: those that leave least of it.
@@ -62,6 +76,42 @@ impl WholeTurns {
     pub fn is_of_row(&self, measure: &Measure) -> bool {
         let Measure::Angle { body, base } = *measure else { return false };
         self.with[body] != base.and_then(|base| self.with[base])
+    }
+}
+
+impl Mechanism {
+    /// The angles that motors, locks and welds give at t = 0: a body, what it is measured from, and the angle \[rad\].
+    fn angles_given(&self) -> impl Iterator<Item = (usize, Option<usize>, f64)> {
+        self.constraints.iter().filter_map(|row| match (&row.measure, &row.law, &row.aim) {
+            (&Measure::Angle { body, base }, Some(law), None) => {
+                Some((body, base, law.angle(Time::default()).hi))
+            }
+            _ => None,
+        })
+    }
+
+    /// Turns bodies by whole turns until motors, locks and welds, which count them, are where they are given at t = 0:
+    /// from the ground on, and from the first body of those that nothing ties to it.
+    pub(crate) fn wind(&self, phi: &mut [f64]) {
+        let ground = self.bodies.len();
+        let mut is_placed = vec![false; ground + 1];
+        for first in std::iter::once(ground).chain(0..ground) {
+            is_placed[first] = true;
+            let next = |is_placed: &[bool]| {
+                let mut given = self.angles_given();
+                given.find(|&(body, base, _)| is_placed[body] != is_placed[base.unwrap_or(ground)])
+            };
+            while let Some((body, base, angle)) = next(&is_placed) {
+                let off = phi[body] - base.map_or(0.0, |base| phi[base]) - angle;
+                let turns = TAU * (off / TAU).round();
+                match base {
+                    Some(base) if is_placed[body] => phi[base] += turns,
+                    _ => phi[body] -= turns,
+                }
+                is_placed[body] = true;
+                is_placed[base.unwrap_or(ground)] = true;
+            }
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use super::local::{Local, at_rest};
 use super::{
     BALANCED, BRANCHES, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability,
 };
+use crate::dynamics::compile::WholeTurns;
 use crate::dynamics::jacobian::Jacobian;
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::{Mechanism, Time};
@@ -21,13 +22,15 @@ pub(super) struct Search<'a> {
 impl<'a> Search<'a> {
     pub(super) fn new<'b>(mechanism: &'a Mechanism, starts: impl Iterator<Item = &'b Vec<f64>>) -> Self {
         let mut local = Local::new(mechanism);
+        local.turns = WholeTurns::beside_rows(mechanism);
         let usual = starts.map(|phi| local.pull(phi, 0.0).amax()).fold(0.0, f64::max);
         Self { local, jacobian: Jacobian::new(mechanism), usual }
     }
 
     /// The same search with the laws on other branches.
     pub(super) fn on<'b>(&self, mechanism: &'b Mechanism) -> Search<'b> {
-        Search { local: Local::new(mechanism), jacobian: Jacobian::new(mechanism), usual: self.usual }
+        let local = Local { turns: self.local.turns.clone(), ..Local::new(mechanism) };
+        Search { local, jacobian: Jacobian::new(mechanism), usual: self.usual }
     }
 
     /// The equilibrium that is reached from a position with the laws on their branches there, and the
