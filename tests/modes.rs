@@ -377,9 +377,9 @@ fn whole_turns_between_bodies_held_to_each_other_are_kept() {
             assert!((b - a - given).abs() < 1e-12 && torque(a).abs() < 1e-10, "{held} {stiffness}: {one:?}");
         }
         // At most half a turn of the first one away: all that there are; the search need not wind springs up.
-        let ends = (-3142..3142).map(|i| [1e-3 * f64::from(i), 1e-3 * f64::from(i + 1)]);
+        let ends = (-3000..3000).map(|i| [PI / 3e3 * f64::from(i), PI / 3e3 * f64::from(i + 1)]);
         let roots = ends.filter(|[a, b]| torque(*a) * torque(*b) < 0.0).count();
-        let near = found.iter().filter(|one| one.phi[0].abs() < 3.142).count();
+        let near = found.iter().filter(|one| one.phi[0].abs() < PI).count();
         assert!(roots >= 1 && near == roots, "{held} {stiffness}: {near} of {roots}");
     }
 }

@@ -40,8 +40,10 @@ const CONSTANT: f64 = 1e-14;
 const WAITS: u8 = 1;
 /// Halvings of a step that no interpolant resolves: an output may have corners.
 const HALVINGS: u32 = 6;
-/// Halvings of the bracket of an extreme.
+/// Halvings of the bracket of an extreme, and golden sections of one beside a corner.
 const ROUNDS: usize = 48;
+/// The longer part of a golden section.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What an output came to over a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -283,12 +285,64 @@ impl ExtremesDetector {
             if found.holds(curve, rounding[k]) {
                 continue;
             }
+            if !is_resolved && curve.tail() > (RESOLVED * curve.most()).max(rounding[k]) {
+                self.look_beside_nodes(inside, (begin, span), k, (values, &nodes.places));
+                continue;
+            }
             let known = [found.min[0], found.max[0]];
             for share in turns(curve, values, &nodes.places, known) {
                 let t = begin + share * span;
                 row.clear();
                 self.values(inside.at(t), &mut row);
                 self.memory.found[k].see(row[k], t.hi);
+            }
+        }
+    }
+
+    /// Looks for the extremes of an output next to its least and its largest value at nodes, by golden sections
+    /// of the output itself: beside a corner the interpolant does not tell where they are.
+    fn look_beside_nodes(
+        &mut self,
+        inside: &mut dyn Inside,
+        (begin, span): (Time, f64),
+        k: usize,
+        (values, places): (&[f64], &[f64]),
+    ) {
+        for sign in [1.0, -1.0] {
+            let Some(least) =
+                (0..values.len()).min_by(|&a, &b| (sign * values[a]).total_cmp(&(sign * values[b])))
+            else {
+                continue;
+            };
+            let (before, after) = (least.saturating_sub(1), (least + 1).min(values.len() - 1));
+            let rise =
+                [before, after].map(|i| sign * (values[i] - values[least])).into_iter().fold(0.0, f64::max);
+            let known = self.memory.found[k];
+            let known = if sign > 0.0 { known.min[0] } else { -known.max[0] };
+            // Nodes go from 1 to 0.
+            let (mut low, mut high) = (places[after], places[before]);
+            if sign * values[least] - rise >= known {
+                continue;
+            }
+            let mut row = Vec::new();
+            let mut at = |share: f64| {
+                row.clear();
+                self.values(inside.at(begin + share * span), &mut row);
+                self.memory.found[k].see(row[k], (begin + share * span).hi);
+                sign * row[k]
+            };
+            let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
+            let mut found = inner.map(&mut at);
+            for _ in 0..ROUNDS {
+                if found[0] < found[1] {
+                    (high, inner[1], found[1]) = (inner[1], inner[0], found[0]);
+                    inner[0] = high - GOLDEN * (high - low);
+                    found[0] = at(inner[0]);
+                } else {
+                    (low, inner[0], found[0]) = (inner[0], inner[1], found[1]);
+                    inner[1] = low + GOLDEN * (high - low);
+                    found[1] = at(inner[1]);
+                }
             }
         }
     }

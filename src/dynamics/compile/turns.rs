@@ -43,8 +43,8 @@ impl WholeTurns {
         Self { with }
     }
 
-    /// The same beside motors, locks and welds as they stand at one time: they count turns, so that the bodies whose
-    /// angles they measure turn together.
+    /// The same beside motors, locks and welds as they stand at one time: they count turns, so that the bodies
+    /// whose angles they measure turn together.
     pub fn beside_rows(mechanism: &Mechanism) -> Self {
         let pairs = mechanism.angles_given().map(|(body, base, _)| (body, base));
         Self::joined(mechanism, pairs)
@@ -80,7 +80,8 @@ impl WholeTurns {
 }
 
 impl Mechanism {
-    /// The angles that motors, locks and welds give at t = 0: a body, what it is measured from, and the angle \[rad\].
+    /// The angles that motors, locks and welds give at t = 0: a body, what it is measured from, and the angle
+    /// \[rad\].
     fn angles_given(&self) -> impl Iterator<Item = (usize, Option<usize>, f64)> {
         self.constraints.iter().filter_map(|row| match (&row.measure, &row.law, &row.aim) {
             (&Measure::Angle { body, base }, Some(law), None) => {
@@ -90,8 +91,8 @@ impl Mechanism {
         })
     }
 
-    /// Turns bodies by whole turns until motors, locks and welds, which count them, are where they are given at t = 0:
-    /// from the ground on, and from the first body of those that nothing ties to it.
+    /// Turns bodies by whole turns until motors, locks and welds, which count them, are where they are given at
+    /// t = 0: from the ground on, and from the first body of those that nothing ties to it.
     pub(crate) fn wind(&self, phi: &mut [f64]) {
         let ground = self.bodies.len();
         let mut is_placed = vec![false; ground + 1];
@@ -121,8 +122,8 @@ impl Formulas {
         self.meanings().flat_map(counted)
     }
 
-    /// True where whole turns may matter to them: on other branches, to events that change what acts, and to what
-    /// acts with other parameters than those that hold, beside which derivatives are taken.
+    /// True where whole turns may matter to them: on other branches, to events that change what acts, and to
+    /// what acts with other parameters than those that hold, beside which derivatives are taken.
     pub fn may_count_turns(&self) -> bool {
         self.switches() && self.counted_angles().next().is_some()
             || self.acting_meanings().flat_map(counted).next().is_some()
