@@ -12,8 +12,9 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, golden_sections, interpolated};
 use serde::{Deserialize, Serialize};
+use std::convert::Infallible;
 use std::sync::Arc;
 
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
@@ -42,8 +43,6 @@ const WAITS: u8 = 1;
 const HALVINGS: u32 = 6;
 /// Halvings of the bracket of an extreme, and golden sections of one beside a corner.
 const ROUNDS: usize = 48;
-/// The longer part of a golden section.
-const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// What an output came to over a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -309,41 +308,26 @@ impl ExtremesDetector {
         (values, places): (&[f64], &[f64]),
     ) {
         for sign in [1.0, -1.0] {
-            let Some(least) =
-                (0..values.len()).min_by(|&a, &b| (sign * values[a]).total_cmp(&(sign * values[b])))
-            else {
-                continue;
+            let signed = |i: usize| sign * values[i];
+            let Some(least) = (0..values.len()).min_by(|&a, &b| signed(a).total_cmp(&signed(b))) else {
+                return;
             };
-            let (before, after) = (least.saturating_sub(1), (least + 1).min(values.len() - 1));
-            let rise =
-                [before, after].map(|i| sign * (values[i] - values[least])).into_iter().fold(0.0, f64::max);
-            let known = self.memory.found[k];
-            let known = if sign > 0.0 { known.min[0] } else { -known.max[0] };
-            // Nodes go from 1 to 0.
-            let (mut low, mut high) = (places[after], places[before]);
-            if sign * values[least] - rise >= known {
+            let beside = [(least + 1).min(values.len() - 1), least.saturating_sub(1)];
+            let rise = beside.iter().fold(0.0, |rise: f64, &i| rise.max(signed(i) - signed(least)));
+            let Found { min: [min, _], max: [max, _], .. } = self.memory.found[k];
+            if signed(least) - rise >= if sign > 0.0 { min } else { -max } {
                 continue;
             }
             let mut row = Vec::new();
-            let mut at = |share: f64| {
+            let at = |share: f64| {
+                let t = begin + share * span;
                 row.clear();
-                self.values(inside.at(begin + share * span), &mut row);
-                self.memory.found[k].see(row[k], (begin + share * span).hi);
-                sign * row[k]
+                self.values(inside.at(t), &mut row);
+                self.memory.found[k].see(row[k], t.hi);
+                Ok::<f64, Infallible>(sign * row[k])
             };
-            let mut inner = [high - GOLDEN * (high - low), low + GOLDEN * (high - low)];
-            let mut found = inner.map(&mut at);
-            for _ in 0..ROUNDS {
-                if found[0] < found[1] {
-                    (high, inner[1], found[1]) = (inner[1], inner[0], found[0]);
-                    inner[0] = high - GOLDEN * (high - low);
-                    found[0] = at(inner[0]);
-                } else {
-                    (low, inner[0], found[0]) = (inner[0], inner[1], found[1]);
-                    inner[1] = low + GOLDEN * (high - low);
-                    found[1] = at(inner[1]);
-                }
-            }
+            // Nodes go from 1 to 0.
+            let Ok(()) = golden_sections(at, beside.map(|i| places[i]), ROUNDS);
         }
     }
 }

@@ -7,6 +7,7 @@
 
 use super::impact_monitor::{gap, gap_rate};
 use crate::dynamics::{BodyAngles, Mechanism};
+use crate::stepping::search::golden_sections;
 use crate::stepping::{Cause, StepError};
 
 /// Parts of a step between which it is looked at, and golden sections after that.
@@ -77,22 +78,7 @@ impl WallGuard {
                 (least, place) = (gap, i);
             }
         }
-        let golden = 0.5 * (5f64.sqrt() - 1.0);
-        let (mut low, mut high) = ((place - 1) as f64 / PARTS as f64, (place + 1) as f64 / PARTS as f64);
-        let [mut one, mut other] = [high - golden * (high - low), low + golden * (high - low)];
-        let [mut gap_one, mut gap_other] = [gap_at(one)?, gap_at(other)?];
-        for _ in 0..SECTIONS {
-            if gap_one < gap_other {
-                (high, other, gap_other) = (other, one, gap_one);
-                one = high - golden * (high - low);
-                gap_one = gap_at(one)?;
-            } else {
-                (low, one, gap_one) = (one, other, gap_other);
-                other = low + golden * (high - low);
-                gap_other = gap_at(other)?;
-            }
-        }
-        Ok(())
+        golden_sections(gap_at, [place - 1, place + 1].map(|i| i as f64 / PARTS as f64), SECTIONS)
     }
 
     /// Looks at one moment.

@@ -152,6 +152,32 @@ fn turn(curve: &impl Curve, mut low: f64, mut high: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// Asks for values in a bracket by golden sections, as they close in on the least one.
+///
+/// # Errors
+/// What asking for a value ends with.
+pub fn golden_sections<E>(
+    mut value: impl FnMut(f64) -> Result<f64, E>,
+    [mut low, mut high]: [f64; 2],
+    sections: usize,
+) -> Result<(), E> {
+    let golden = 0.5 * (5f64.sqrt() - 1.0);
+    let [mut one, mut other] = [high - golden * (high - low), low + golden * (high - low)];
+    let [mut at_one, mut at_other] = [value(one)?, value(other)?];
+    for _ in 0..sections {
+        if at_one < at_other {
+            (high, other, at_other) = (other, one, at_one);
+            one = high - golden * (high - low);
+            at_one = value(one)?;
+        } else {
+            (low, one, at_one) = (one, other, at_other);
+            other = low + golden * (high - low);
+            at_other = value(other)?;
+        }
+    }
+    Ok(())
+}
+
 /// The first change of sign of `curve - level` in (from, to].
 pub fn root(curve: &impl Curve, level: f64, from: f64, to: f64) -> Option<f64> {
     search(curve, level, from, to).0
