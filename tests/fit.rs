@@ -134,6 +134,37 @@ fn what_data_do_not_tell_is_refused() {
     let twice = Data::parse("t,bar1.phi,bar1.phi\n0,1,1\n0.1,1,1\n0.2,1,1\n", "twice.csv").expect("a table");
     let error = fit(&known, &twice, &request("gravity[0]"), &mut || false).map(|_| ()).expect_err("no fit");
     assert!(error.to_string().contains("twice.csv: has two columns bar1.phi"), "{error}");
+    for (head, part) in
+        [("bar1.omega [deg]", "`deg` does not measure"), ("bar1.omega [degree/s]", "`degree` is no unit")]
+    {
+        let other = Data::parse(&format!("t [s],{head}\n0,1\n0.1,1\n0.2,1\n"), "other.csv").expect("a table");
+        let error =
+            fit(&known, &other, &request("gravity[0]"), &mut || false).map(|_| ()).expect_err("no fit");
+        let error = error.to_string();
+        assert!(error.contains("other.csv: line 1, column bar1.omega: ") && error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn the_same_measurements_in_other_units_give_the_same_fit() {
+    let known = template("free", &[]);
+    let data = data(&known, 1.0, 0.05, 1e-3, 7);
+    let (_, angles) = &data.columns[0];
+    let mut text = "t [ms],bar1.phi [deg],what [counts]\n".to_owned();
+    for (t, angle) in data.times.iter().zip(angles) {
+        let angle = angle.expect("a value").to_degrees();
+        text += &format!("{},{angle},3\n", t * 1e3);
+    }
+    let scaled = Data::parse(&text, "scaled.csv").expect("a table");
+    let request = FitRequest {
+        vary: vec!["bars.bar1.density".into()],
+        columns: vec!["bar1.phi".into()],
+        ..FitRequest::default()
+    };
+    let [one, other] =
+        [&data, &scaled].map(|data| fit(&known, data, &request, &mut || false).expect("a fit"));
+    let apart = (one.numbers[0].value - other.numbers[0].value).abs();
+    assert!(apart < 1e-6 * one.numbers[0].error, "{:?} {:?}", one.numbers, other.numbers);
 }
 
 /// Whenever it is paused: at the guess, in the search, in the states between parts.

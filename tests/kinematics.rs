@@ -110,6 +110,51 @@ fn limits_and_dead_centres_are_where_the_law_of_cosines_has_them() {
     assert!((range.min[0] - least).abs() < 1e-12 && (range.max[0] - FRAC_PI_2).abs() < 1e-6, "{range:?}");
 }
 
+#[test]
+fn extremes_are_the_same_wherever_a_turn_begins_and_however_many_positions_it_has() {
+    let mut scene = example("crank_rocker");
+    let output = |name: &str| Output { name: name.replace('.', "_"), formula: name.to_owned() };
+    scene.outputs = vec![output("rocker.omega"), output("rocker.alpha")];
+    let w = 10.0 * PI;
+    let of = |crank: f64| {
+        let [_, [_, first, second]] = derived(crank);
+        [w * first, w * w * second]
+    };
+    let dense: Vec<[f64; 2]> = (0..200_000).map(|k| of(TAU * f64::from(k) / 200_000.0)).collect();
+    for (count, shifts) in [(360, 40), (48, 25), (24, 13)] {
+        for shift in 0..shifts {
+            let from = -TAU * f64::from(shift) / f64::from(shifts);
+            let turn = Drive { range: Some([from, from + TAU]), ..drive("motor") };
+            let found = kinematics(&scene, &turn, count).expect("kinematics");
+            for (k, name) in ["rocker_omega", "rocker_alpha"].into_iter().enumerate() {
+                let range = found.ranges.iter().find(|range| range.name == name).expect("an output");
+                let least = dense.iter().map(|values| values[k]).fold(f64::INFINITY, f64::min);
+                let most = dense.iter().map(|values| values[k]).fold(f64::NEG_INFINITY, f64::max);
+                for (end, exact) in [(range.min, least), (range.max, most)] {
+                    assert!(
+                        (end[0] - exact).abs() < 1e-8 * exact.abs(),
+                        "{name} {count} {from}: {end:?} {exact}"
+                    );
+                    assert!(
+                        (of(end[1])[k] - exact).abs() < 1e-8 * exact.abs(),
+                        "{name} {count} {from}: {end:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_range_of_too_many_turns_is_refused() {
+    let far = kinematics(&example("crank_rocker"), &drive("motor=0..2e6"), 3);
+    let error = far.expect_err("too far").to_string();
+    assert!(
+        error.contains("`motor` would go from 0 to 2e6 rad") && error.contains("at most 1e6 rad"),
+        "{error}"
+    );
+}
+
 /// Torque and the forces at O, A, B and C on crank, coupler and rocker, from the nine equations of three bodies.
 fn balanced(crank: f64, w: f64, gravity: f64) -> [f64; 5] {
     let bodies = [A, B, C].map(|length| {

@@ -209,6 +209,25 @@ fn what_has_no_period_says_why() {
     both.motors[0].law.sines = vec![driftless::scene::Sine { amplitude: 0.1, frequency: 7.5, phase: 0.4 }];
     let period = found(&both, 0, None).expect("a search").period;
     assert!((period - 4.0 * PI / 5.0).abs() < 1e-12, "{period}");
+    // A force that swings while the motor stands or turns counts as well.
+    for (rate, shared) in [(0.0, 0.8 * PI), (5.0, 0.8 * PI), (3.0, 4.0 * PI)] {
+        let mut pulled = arm(9.81, 1.0, 0.5, 0.4);
+        pulled.motors[0].law.rate = rate;
+        pulled.torques = parsed(
+            r#"{"name": "pull", "gravity": [0, -9.81],
+            "bars": [{"name": "one", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4},
+                     {"name": "two", "mass": 2, "centre": [0.3, 0], "inertia": 0.05, "length": 0.6}],
+            "start": {"one": {"phi": 0, "omega": 0}, "two": {"phi": 0, "omega": 0}},
+            "torques": [{"name": "pull", "body": "two", "torque": 0.3,
+                         "law": {"start": 0.1, "sines": [{"amplitude": 1, "frequency": 2.5}]}}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "one", "point": [0, 0]}]},
+                       {"name": "B", "between": [{"body": "one", "point": [0.4, 0]}, {"body": "two", "point": [0, 0]}]}],
+            "until": 1, "every": 1}"#,
+        )
+        .torques;
+        let period = found(&pulled, 0, None).expect("a search").period;
+        assert!((period - shared).abs() < 1e-12, "{rate}: {period}");
+    }
 }
 
 #[test]

@@ -140,7 +140,9 @@ pub enum ModesError {
     #[error("the period of {0} is not known\nhint: `--period S` gives it, in seconds; it is checked")]
     PeriodUnknown(String),
     /// Not a period.
-    #[error("{period} s is no period of {what}\nhint: for a motor at a constant rate it is one turn")]
+    #[error(
+        "{period} s is no period of {what}\nhint: `--period S` gives another one; for a motor at a constant rate it is one turn"
+    )]
     NotPeriodic {
         /// The one asked for \[s\].
         period: f64,

@@ -1,6 +1,7 @@
 //! Measured data: a table with a column of times and columns named as in `trajectory.csv`.
 
 use super::FitError;
+use crate::scene::formula::unit::{Dimension, UnitScale};
 use std::path::Path;
 
 /// A table of measurements.
@@ -10,8 +11,11 @@ pub struct Data {
     pub source: String,
     /// Times \[s\], rising, from 0 on.
     pub times: Vec<f64>,
-    /// The other columns: names without units, and values, some of which may be missing.
+    /// The other columns: names without units, and values in units of the SI, some of which may be missing.
     pub columns: Vec<(String, Vec<Option<f64>>)>,
+    /// The units their header names, those of none left out; values with one that is not known stay as they
+    /// are.
+    pub units: Vec<Option<String>>,
 }
 
 impl Data {
@@ -26,7 +30,8 @@ impl Data {
         Self::parse(&text, &source)
     }
 
-    /// Reads a text: a header `t [s],bar1.phi [rad],…` and rows of numbers; an empty cell is no measurement.
+    /// Reads a text: a header `t [ms],bar1.phi [deg],…` and rows of numbers; an empty cell is no measurement,
+    /// and without a unit a column is in units of the SI.
     ///
     /// # Errors
     /// It is no such table; the message names line, column and value.
@@ -35,26 +40,38 @@ impl Data {
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let fail = |what: String, hint: &str| FitError::Data(format!("{source}: {what}\nhint: {hint}"));
         let header = reader.headers().map_err(|error| fail(error.to_string(), "a table of numbers"))?.clone();
-        let names: Vec<&str> =
-            header.iter().map(|head| head.split(" [").next().unwrap_or(head).trim()).collect();
+        let heads: Vec<(&str, Option<&str>)> = header.iter().map(head).collect();
+        let names: Vec<&str> = heads.iter().map(|(name, _)| *name).collect();
         let time = names.iter().position(|name| *name == "t").ok_or_else(|| {
             fail("has no column of times".into(), "name one `t [s]`, and the others as in trajectory.csv")
         })?;
-        let others = names.iter().enumerate().filter(|(column, _)| *column != time);
+        let scales: Vec<Option<UnitScale>> =
+            heads.iter().map(|(_, unit)| unit.and_then(|unit| UnitScale::read(unit).ok())).collect();
+        if let Some(unit) = heads[time].1 {
+            let is_time = |scale: &UnitScale| scale.dimension.is(Dimension::of("s"));
+            if !scales[time].as_ref().is_some_and(is_time) {
+                let what = format!("line 1, column t: `{unit}` is no unit of time");
+                return Err(fail(what, "as in `t [s]`: s, ms, us, min or h"));
+            }
+        }
         let mut data = Self { source: source.into(), ..Self::default() };
-        data.columns.extend(others.map(|(_, name)| ((*name).to_owned(), Vec::new())));
+        for (_, (name, unit)) in heads.iter().enumerate().filter(|(column, _)| *column != time) {
+            data.columns.push(((*name).to_owned(), Vec::new()));
+            data.units.push(unit.map(str::to_owned));
+        }
         for record in reader.records() {
             let record = record
                 .map_err(|error| fail(error.to_string(), "every row has as many cells as the header"))?;
             let line = record.position().map_or(0, csv::Position::line);
             let mut cells = Vec::new();
-            for (cell, name) in record.iter().zip(&names) {
+            for ((cell, name), scale) in record.iter().zip(&names).zip(&scales) {
                 let value = if cell.is_empty() { None } else { crate::scene::number(cell) };
                 if value.is_none() && !cell.is_empty() {
                     let what = format!("line {line}, column {name}: `{cell}` is not a number");
                     return Err(fail(what, "write 0.5, or leave the cell empty where nothing was measured"));
                 }
-                cells.push(value);
+                let of = |value: f64| scale.map_or(value, |scale| scale.of_number(value));
+                cells.push(value.map(of));
             }
             let last = data.times.last().copied();
             match cells.remove(time) {
@@ -74,6 +91,13 @@ impl Data {
     }
 }
 
+/// Name and unit of a column: `bar1.phi [rad]`; a unit `?` is none.
+fn head(head: &str) -> (&str, Option<&str>) {
+    let (name, unit) = head.split_once(" [").map_or((head, None), |(name, unit)| (name, Some(unit)));
+    let unit = unit.map(|unit| unit.trim().trim_end_matches(']').trim());
+    (name.trim(), unit.filter(|unit| *unit != "?"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -90,9 +114,22 @@ mod tests {
             ("t,a\n0,one\n", "line 2, column a: `one`"),
             ("t,a\n", "no rows"),
             ("t,a\n0,1,2\n", "data.csv"),
+            ("t [deg],a\n0,1\n", "line 1, column t: `deg`"),
+            ("t [sec],a\n0,1\n", "line 1, column t: `sec`"),
         ] {
             let error = Data::parse(text, "data.csv").expect_err(text).to_string();
             assert!(error.contains(told) && error.contains("data.csv"), "{error}");
         }
+    }
+
+    #[test]
+    fn values_are_brought_to_units_of_the_si() {
+        let text = "t [ms],bar1.phi [deg],tip.x [mm],a [counts],b [?]\n500,180,2,7,8\n";
+        let data = Data::parse(text, "data.csv").expect("a table");
+        assert_eq!(data.times, [0.5]);
+        let values: Vec<_> = data.columns.iter().map(|(_, values)| values[0]).collect();
+        assert_eq!(values, [std::f64::consts::PI, 0.002, 7.0, 8.0].map(Some));
+        let units: Vec<_> = data.units.iter().map(Option::as_deref).collect();
+        assert_eq!(units, [Some("deg"), Some("mm"), Some("counts"), None]);
     }
 }

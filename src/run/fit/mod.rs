@@ -23,6 +23,7 @@ pub use data::Data;
 use super::driver::Pause;
 use super::extremes::ExtremesDetector;
 use super::sensitivity::{Measure, SensitivityError, SensitivityRequest, Study};
+use crate::scene::formula::unit::UnitScale;
 use crate::scene::{Output, OutputNames, Scene, SceneError, Template, Variable};
 use nalgebra::DMatrix;
 use problem::Problem;
@@ -298,7 +299,7 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
         let text = format!("{}: has no column {missing}\nhint: there are: {}", data.source, known.join(", "));
         return Err(FitError::Data(text));
     }
-    for (name, _) in &data.columns {
+    for ((name, _), unit) in data.columns.iter().zip(&data.units) {
         if !request.columns.is_empty() && !request.columns.contains(name) {
             continue;
         }
@@ -309,7 +310,13 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
                 let text = format!("{}: has two columns {name}\nhint: leave one of them out", data.source);
                 return Err(FitError::Data(text));
             }
-            Ok(_) => outputs.push(output),
+            Ok(bound) => {
+                check_unit(unit.as_deref(), &bound.unit).map_err(|(what, hint)| {
+                    let text = format!("{}: line 1, column {name}: {what}\nhint: {hint}", data.source);
+                    FitError::Data(text)
+                })?;
+                outputs.push(output);
+            }
             Err(error) if request.columns.contains(name) => {
                 let text = format!("{}: column {name}: {}\nhint: {}", data.source, error.problem, error.hint);
                 return Err(FitError::Data(text));
@@ -323,6 +330,20 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
             data.source
         ))),
         false => Ok((outputs, ignored)),
+    }
+}
+
+/// A column's unit, where it has one, is of the dimension of the scene's quantity, where that is known.
+fn check_unit(unit: Option<&str>, own: &str) -> Result<(), (String, String)> {
+    let Some(unit) = unit else { return Ok(()) };
+    let scale = UnitScale::read(unit)
+        .map_err(|part| (format!("`{part}` is no unit"), format!("there are {}", UnitScale::names())))?;
+    match UnitScale::read(own) {
+        Ok(own_scale) if !own_scale.dimension.is(scale.dimension) => Err((
+            format!("`{unit}` does not measure what the scene has in {own}"),
+            "mend the unit, or name the column after what was measured".into(),
+        )),
+        _ => Ok(()),
     }
 }
 

@@ -8,6 +8,9 @@ use std::f64::consts::TAU;
 use std::str::FromStr;
 use std::sync::Arc;
 
+/// Farthest that an angle is driven from its start \[rad\]: some millions of positions, in about a minute.
+const FARTHEST: f64 = 1e6;
+
 /// What is driven, and how far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drive {
@@ -56,6 +59,18 @@ pub enum KinematicsError {
     /// A slider goes no turns.
     #[error("`{0}` goes along a rail\nhint: say from where to where [m], as --drive {0}=0..0.1")]
     NoRange(String),
+    /// So many turns are walked in no reasonable time.
+    #[error(
+        "`{name}` would go from {start} to {value:e} rad\nhint: at most {FARTHEST:e} rad from the start, as {name}=0..2pi"
+    )]
+    Far {
+        /// The drive.
+        name: String,
+        /// An end of its range \[rad\].
+        value: f64,
+        /// Its value at the start \[rad\].
+        start: f64,
+    },
     /// More moves than the drive gives.
     #[error(
         "`{name}` leaves {left} degree(s) of freedom, and kinematics none\nhint: `driftless run` integrates what the drive does not give; or add motors or locks"
@@ -147,6 +162,9 @@ impl Driven {
             None if unit == "m" => return Err(KinematicsError::NoRange(name)),
             None => [start, start + TAU],
         };
+        if let Some(&value) = range.iter().find(|value| unit == "rad" && (*value - start).abs() > FARTHEST) {
+            return Err(KinematicsError::Far { name, value, start });
+        }
         let mechanism = Arc::new(compile(&scene, &name)?);
         let left = mechanism.assembly.degrees_of_freedom;
         if left > 0 {

@@ -8,6 +8,7 @@ use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, State, Time};
 use crate::scene::Scene;
 use crate::stabilization::projection::project;
+use crate::stepping::search::golden_sections;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -24,6 +25,11 @@ pub(super) const IN_LINE: f64 = 1e-4;
 const NEARLY_IN_LINE: f64 = 1e-2;
 /// Branches of laws that are tried at a position.
 const BRANCHES: usize = 4;
+/// Least values of the positions beside which a column's least value is looked for, and golden sections there.
+const LOOKED_AT: usize = 8;
+const SECTIONS: usize = 40;
+/// Values that differ by less, over the column's largest one, are the same: as near as sections come to a corner.
+const SAME: f64 = 1e-9;
 /// Up to so many coordinates the sign of det G is watched.
 const WATCHED: usize = 40;
 
@@ -322,41 +328,48 @@ impl Walk {
         Some(below.position)
     }
 
-    /// The least value of a column, times a sign, over positions and between them, and the drive's value
-    /// there; nothing where it has none.
+    /// The least value of a column, times a sign, over positions and between them, and the drive's value at
+    /// the first of them; nothing where it has none.
+    ///
+    /// Between positions it is looked for on both sides of every one that is not above its neighbours, of
+    /// many those that may hide most.
     pub fn least(&mut self, all: &[Solved], column: usize, sign: f64) -> Option<[f64; 2]> {
-        let value = |k: usize| sign * all[k].position.column(column);
-        let finite = (0..all.len()).filter(|&k| value(k).is_finite());
-        let best = finite.min_by(|&a, &b| value(a).total_cmp(&value(b)))?;
-        let mut found = [value(best), all[best].position.drive];
-        let (from, to) = (&all[best.saturating_sub(1)], &all[(best + 1).min(all.len() - 1)]);
-        let (mut a, mut b) = (from.state.time.hi, to.state.time.hi);
-        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-        let mut at = |t: f64| {
-            self.restore(from);
-            self.go(t).ok().map(|()| (sign * self.column(column), self.drive()))
+        let values: Vec<f64> = all.iter().map(|one| sign * one.position.column(column)).collect();
+        let size =
+            values.iter().filter(|value| value.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+        let beside = |k: usize| [k.saturating_sub(1), (k + 1).min(all.len() - 1)];
+        // As far below a position as a neighbour is above it, at most.
+        let hidden =
+            |k: usize| values[k] - beside(k).map(|j| values[j] - values[k]).into_iter().fold(0.0, f64::max);
+        let is_low = |k: &usize| {
+            let is_above = |j: usize| values[j] >= values[*k] || values[j].is_nan();
+            values[*k].is_finite() && beside(*k).into_iter().all(is_above)
         };
-        let (mut left, mut right) = (b - golden * (b - a), a + golden * (b - a));
-        let (Some(mut low), Some(mut high)) = (at(left), at(right)) else { return Some(found) };
-        for _ in 0..40 {
-            if low.0 < high.0 {
-                (b, right, high) = (right, left, low);
-                left = b - golden * (b - a);
-                let Some(next) = at(left) else { break };
-                low = next;
-            } else {
-                (a, left, low) = (left, right, high);
-                right = a + golden * (b - a);
-                let Some(next) = at(right) else { break };
-                high = next;
-            }
-            for (value, drive) in [low, high] {
-                if value < found[0] {
-                    found = [value, drive];
+        let mut low: Vec<usize> = (0..all.len()).filter(is_low).collect();
+        low.sort_by(|&a, &b| hidden(a).total_cmp(&hidden(b)));
+        low.truncate(LOOKED_AT);
+        low.sort_unstable();
+        let mut found: Option<[f64; 2]> = None;
+        for k in low {
+            let mut here = [values[k], all[k].position.drive];
+            let [from, to] = beside(k).map(|j| &all[j]);
+            let look = |t: f64| {
+                self.restore(from);
+                self.go(t)?;
+                let value = sign * self.column(column);
+                if value < here[0] {
+                    here = [value, self.drive()];
                 }
+                Ok::<_, Limit>(value)
+            };
+            // Where there is no way to a place between them, what was found stands.
+            let _ = golden_sections(look, [from.state.time.hi, to.state.time.hi], SECTIONS);
+            // Of several that are the same to rounding the first.
+            if found.is_none_or(|[least, _]| here[0] < least - SAME * size) {
+                found = Some(here);
             }
         }
-        Some(found)
+        found
     }
 
     /// The drive's value.

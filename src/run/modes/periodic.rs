@@ -188,19 +188,24 @@ impl PeriodicMotions {
     }
 }
 
-/// The least common period of the drives \[s\].
+/// The least common period of the drives and of forces that are laws of time \[s\].
 fn common_period(mechanism: &Mechanism) -> Result<f64, ModesError> {
     let unknown = |name: &str| ModesError::PeriodUnknown(name.to_owned());
-    let mut periods: Vec<f64> = Vec::new();
+    let mut rates: Vec<f64> = Vec::new();
     for row in &mechanism.constraints {
         let Some(law) = row.law.as_ref().filter(|law| !law.is_constant()) else { continue };
         let is_unknown = law.acceleration != 0.0 || law.profile.is_some();
         if is_unknown || (law.rate != 0.0 && !row.is_angle()) {
             return Err(unknown(&format!("`{}`", row.name())));
         }
-        let rates = law.sines.iter().map(|sine| sine.frequency).chain([law.rate]);
-        periods.extend(rates.filter(|rate| *rate != 0.0).map(|rate| TAU / rate.abs()));
+        rates.extend(law.sines.iter().map(|sine| sine.frequency).chain([law.rate]));
     }
+    for action in &mechanism.actions {
+        // A law with more in it than sines is looked at by `check_period`.
+        rates.extend(action.law.iter().flat_map(|law| law.sines.iter().map(|sine| sine.frequency)));
+    }
+    let rates = rates.into_iter().filter(|rate| *rate != 0.0);
+    let periods: Vec<f64> = rates.map(|rate| TAU / rate.abs()).collect();
     if periods.is_empty() {
         return Err(unknown("the scene's forces"));
     }

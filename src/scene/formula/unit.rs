@@ -62,21 +62,7 @@ impl Dimension {
 
     /// That of a unit of the format, as `N·s/m` or `kg·m²`; of an empty text that of a pure number.
     pub fn of(unit: &str) -> Self {
-        let mut all = Self::NONE;
-        for (number, part) in unit.split('/').enumerate() {
-            let side = if number == 0 { 1.0 } else { -1.0 };
-            for factor in part.split('·').filter(|factor| !factor.is_empty() && *factor != "1") {
-                let (name, power) = match (factor.strip_suffix('²'), factor.strip_suffix('³')) {
-                    (Some(name), _) => (name, 2.0),
-                    (_, Some(name)) => (name, 3.0),
-                    _ => (factor, 1.0),
-                };
-                if let Some(unit) = find(name) {
-                    all = all.times(unit.dimension, side * power);
-                }
-            }
-        }
-        all
+        UnitScale::read(unit).map_or(Self::NONE, |unit| unit.dimension)
     }
 }
 
@@ -100,6 +86,56 @@ impl fmt::Display for Dimension {
             }
         }
         Ok(())
+    }
+}
+
+/// What a unit measures, and how large it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnitScale {
+    /// Its dimension.
+    pub dimension: Dimension,
+    /// Multiplied by the first and divided by the second one it is in units of the SI.
+    factors: [f64; 2],
+}
+
+impl UnitScale {
+    /// Those of a unit, as `deg/s`, `kg·m²`, `N m` or `kg/(m s^2)`; of an empty text those of 1.
+    ///
+    /// # Errors
+    /// The part of it that is no unit.
+    pub fn read(unit: &str) -> Result<Self, &str> {
+        let (mut dimension, mut factors) = (Dimension::NONE, [1.0; 2]);
+        for (number, part) in unit.split('/').enumerate() {
+            let side = if number == 0 { 1.0 } else { -1.0 };
+            let names = part.split(|c: char| "·*()".contains(c) || c.is_whitespace());
+            for factor in names.filter(|factor| !factor.is_empty() && *factor != "1") {
+                let (name, power) = match (factor.strip_suffix('²'), factor.strip_suffix('³')) {
+                    (Some(name), _) => (name, 2.0),
+                    (_, Some(name)) => (name, 3.0),
+                    _ => match factor.split_once('^') {
+                        Some((name, power)) => (name, power.parse().map_err(|_| factor)?),
+                        None => (factor, 1.0),
+                    },
+                };
+                let (unit, power) = (find(name).ok_or(factor)?, side * power);
+                dimension = dimension.times(unit.dimension, power);
+                let [above, below] =
+                    if power < 0.0 { [unit.below, unit.above] } else { [unit.above, unit.below] };
+                factors[0] *= libm::pow(above, power.abs());
+                factors[1] *= libm::pow(below, power.abs());
+            }
+        }
+        Ok(Self { dimension, factors })
+    }
+
+    /// A number in units of the SI.
+    pub fn of_number(&self, number: f64) -> f64 {
+        number * self.factors[0] / self.factors[1]
+    }
+
+    /// The names of all units, to choose from.
+    pub fn names() -> String {
+        UNITS.each_ref().map(|unit| unit.name).join(", ")
     }
 }
 
@@ -202,5 +238,25 @@ mod tests {
             assert_eq!(Dimension::of(&unit.replace(' ', "·")).unit(), unit);
         }
         assert_eq!(Dimension::of("N/m²").unit(), "kg/(m s²)");
+        assert!(Dimension::of("kg/(m s²)").is(Dimension::of("N/m^2")));
+    }
+
+    #[test]
+    fn numbers_are_brought_to_units_of_the_si() {
+        for (unit, number, found) in [
+            ("ms", 250.0, 0.25),
+            ("mm/s", 5.0, 0.005),
+            ("deg", 180.0, PI),
+            ("kN mm", 3.0, 3.0),
+            ("1", 2.0, 2.0),
+        ] {
+            assert_eq!(UnitScale::read(unit).map(|unit| unit.of_number(number)), Ok(found), "{unit}");
+        }
+        let per_minute = UnitScale::read("rad/min").map(|unit| unit.of_number(60.0));
+        assert_eq!((per_minute, UnitScale::read("mm/min^2").is_ok()), (Ok(1.0), true));
+        assert_eq!(
+            ["degs", "m/foo", "m^x"].map(|unit| UnitScale::read(unit).err()),
+            ["degs", "foo", "m^x"].map(Some)
+        );
     }
 }
