@@ -52,8 +52,22 @@ pub trait Arithmetic: Copy + Debug + 'static {
     }
 }
 
+/// What else sines and cosines take.
+pub trait Signed: Arithmetic {
+    /// Square roots.
+    fn sqrt(self) -> Self;
+    /// Magnitudes.
+    fn abs(self) -> Self;
+    /// The negatives, zeros included.
+    fn neg(self) -> Self;
+    /// True where every lane is at most `bound` in magnitude; false where one is not a number.
+    fn are_within(self, bound: f64) -> bool;
+    /// A function of two lanes, lane by lane.
+    fn each<const N: usize>(lanes: [Self; N], f: fn([f64; N]) -> [f64; N]) -> [Self; N];
+}
+
 /// Four doubles; lanes 0-1 and 2-3 are pairs, which are halves of the vector.
-pub trait Lanes: Arithmetic + Send {
+pub trait Lanes: Signed + Send {
     /// True where long kernels are worth unrolling; where each operation is a call, a loop is as fast and
     /// compiles in a tenth of the time.
     const UNROLLED: bool;
@@ -62,20 +76,12 @@ pub trait Lanes: Arithmetic + Send {
     fn of(lanes: [f64; 4]) -> Self;
     /// As an array.
     fn array(self) -> [f64; 4];
-    /// Square roots.
-    fn sqrt(self) -> Self;
     /// `[1, 0, 3, 2]`.
     fn swap_pairs(self) -> Self;
     /// `[2, 3, 0, 1]`.
     fn swap_halves(self) -> Self;
-    /// Magnitudes.
-    fn abs(self) -> Self;
     /// The larger ones; `other` where one is not a number.
     fn max(self, other: Self) -> Self;
-    /// True where every lane is at most `bound` in magnitude; false where one is not a number.
-    fn are_within(self, bound: f64) -> bool;
-    /// The negatives, zeros included.
-    fn neg(self) -> Self;
 
     /// Runs code on these lanes, compiled by itself and not as a part of what calls it.
     fn apart<C: Code>(code: C) -> C::Output;
@@ -153,6 +159,39 @@ impl Arithmetic for Portable {
     }
 }
 
+impl Signed for Portable {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.map(f64::sqrt))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.map(f64::abs))
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(self.0.map(|x| -x))
+    }
+
+    #[inline(always)]
+    fn are_within(self, bound: f64) -> bool {
+        self.0.iter().all(|x| x.abs() <= bound)
+    }
+
+    fn each<const N: usize>(lanes: [Self; N], f: fn([f64; N]) -> [f64; N]) -> [Self; N] {
+        each_of_four(lanes, f)
+    }
+}
+
+/// [`Signed::each`] of four lanes.
+fn each_of_four<L: Lanes, const N: usize>(lanes: [L; N], f: fn([f64; N]) -> [f64; N]) -> [L; N] {
+    let lanes = lanes.map(L::array);
+    let found: [_; 4] = std::array::from_fn(|lane| f(lanes.map(|lanes| lanes[lane])));
+    std::array::from_fn(|i| L::of(found.map(|found| found[i])))
+}
+
 impl Lanes for Portable {
     const UNROLLED: bool = false;
 
@@ -167,11 +206,6 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        Self(self.0.map(f64::sqrt))
-    }
-
-    #[inline(always)]
     fn swap_pairs(self) -> Self {
         Self([self.0[1], self.0[0], self.0[3], self.0[2]])
     }
@@ -182,23 +216,8 @@ impl Lanes for Portable {
     }
 
     #[inline(always)]
-    fn abs(self) -> Self {
-        Self(self.0.map(f64::abs))
-    }
-
-    #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.zip(other, |a, b| if a > b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn are_within(self, bound: f64) -> bool {
-        self.0.iter().all(|x| x.abs() <= bound)
-    }
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        Self(self.0.map(|x| -x))
     }
 
     #[inline(never)]

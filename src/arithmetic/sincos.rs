@@ -1,4 +1,4 @@
-//! Sine and cosine of four independent angles in lanes, at most one unit in the last place off; and of pairs,
+//! Sine and cosine of independent angles in lanes, at most one unit in the last place off; and of pairs,
 //! to about 66 bits.
 //!
 //! ```text
@@ -17,7 +17,7 @@
 //! Source of the reduction: W. J. Cody, W. Waite, *Software Manual for the Elementary Functions* (1980),
 //! section 8, with a fused multiply-add.
 
-use super::lanes::{self, Code, Lanes};
+use super::lanes::{self, Code, Lanes, Signed};
 use super::{Complex, DoubleDouble, Scalar};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
@@ -66,7 +66,7 @@ struct Reduced<L> {
 }
 
 #[inline(always)]
-fn reduce<L: Lanes>(angle: L, rest: L) -> Reduced<L> {
+fn reduce<L: Signed>(angle: L, rest: L) -> Reduced<L> {
     let shift = L::splat(SHIFT);
     let q = angle.mul_add(L::splat(FRAC_2_PI), shift).sub(shift);
     let long = q.neg_mul_add(L::splat(FRAC_PI_2), angle);
@@ -84,7 +84,7 @@ fn reduce<L: Lanes>(angle: L, rest: L) -> Reduced<L> {
     Reduced { r, low, along: L::ONE.sub(size), across: m.mul(L::splat(2.0).sub(size)) }
 }
 
-impl<L: Lanes> Reduced<L> {
+impl<L: Signed> Reduced<L> {
     /// Back to the quadrant: sums of one number and a zero.
     #[inline(always)]
     fn turn(&self, sin: L, cos: L) -> (L, L) {
@@ -94,7 +94,7 @@ impl<L: Lanes> Reduced<L> {
 
 /// `Σ c_k z^k` by two Horner chains in z².
 #[inline(always)]
-fn series<L: Lanes>(factors: &[f64], z: L, zz: L) -> L {
+fn series<L: Signed>(factors: &[f64], z: L, zz: L) -> L {
     let n = factors.len();
     let (mut even, mut odd) = (L::splat(factors[n - 2]), L::splat(factors[n - 1]));
     let mut k = n - 2;
@@ -112,9 +112,9 @@ fn series<L: Lanes>(factors: &[f64], z: L, zz: L) -> L {
 /// At most 0.8 units in the last place off for angles up to [`RANGE`], at most 1 beyond; not a number where
 /// an angle is not finite.
 #[inline(always)]
-pub fn sin_cos<L: Lanes>(angle: L, rest: L) -> (L, L) {
+pub fn sin_cos<L: Signed>(angle: L, rest: L) -> (L, L) {
     if !angle.are_within(RANGE) {
-        return far(angle.array());
+        return far(angle);
     }
     let reduced = reduce(angle, rest);
     let (r, low) = (reduced.r, reduced.low);
@@ -170,27 +170,27 @@ fn units_in<L: Lanes>(angles: &[f64], units: &mut [Complex<f64>]) {
 type Pair<L> = [L; 2];
 
 #[inline(always)]
-fn quick<L: Lanes>(high: L, low: L) -> Pair<L> {
+fn quick<L: Signed>(high: L, low: L) -> Pair<L> {
     let (high, low) = high.fast_two_sum(low);
     [high, low]
 }
 
 /// a + b where |a| >= |b|.
 #[inline(always)]
-fn sum<L: Lanes>(a: Pair<L>, b: Pair<L>) -> Pair<L> {
+fn sum<L: Signed>(a: Pair<L>, b: Pair<L>) -> Pair<L> {
     let [high, low] = quick(a[0], b[0]);
     quick(high, low.add(a[1].add(b[1])))
 }
 
 #[inline(always)]
-fn product<L: Lanes>(a: Pair<L>, b: Pair<L>) -> Pair<L> {
+fn product<L: Signed>(a: Pair<L>, b: Pair<L>) -> Pair<L> {
     let high = a[0].mul(b[0]);
     quick(high, a[1].mul_add(b[0], a[0].mul_add(b[1], a[0].mul_add(b[0], high.neg()))))
 }
 
 /// `c_0 + c_1 z + z² Σ c_k z^(k-2)`, its first two terms in pairs.
 #[inline(always)]
-fn series_pair<L: Lanes>(factors: &[f64; 10], rests: [f64; 2], z: Pair<L>, zz: L) -> Pair<L> {
+fn series_pair<L: Signed>(factors: &[f64; 10], rests: [f64; 2], z: Pair<L>, zz: L) -> Pair<L> {
     let constant = |k: usize| [L::splat(factors[k]), L::splat(rests[k])];
     let steep = sum(constant(1), [z[0].mul(series(&factors[2..], z[0], zz)), L::ZERO]);
     sum(constant(0), product(z, steep))
@@ -200,9 +200,9 @@ fn series_pair<L: Lanes>(factors: &[f64; 10], rests: [f64; 2], z: Pair<L>, zz: L
 ///
 /// An angle beyond [`RANGE`] sends the vector to [`DoubleDouble`], lane by lane.
 #[inline(always)]
-pub fn sin_cos_pair<L: Lanes>(angle: Pair<L>) -> (Pair<L>, Pair<L>) {
+pub fn sin_cos_pair<L: Signed>(angle: Pair<L>) -> (Pair<L>, Pair<L>) {
     if !angle[0].are_within(RANGE) {
-        return far_pair(angle[0].array(), angle[1].array());
+        return far_pair(angle);
     }
     let reduced = reduce(angle[0], angle[1]);
     let r = [reduced.r, reduced.low];
@@ -219,17 +219,20 @@ pub fn sin_cos_pair<L: Lanes>(angle: Pair<L>) -> (Pair<L>, Pair<L>) {
 
 #[cold]
 #[inline(never)]
-fn far<L: Lanes>(angles: [f64; 4]) -> (L, L) {
-    let pairs = angles.map(libm::sincos);
-    (L::of(pairs.map(|pair| pair.0)), L::of(pairs.map(|pair| pair.1)))
+fn far<L: Signed>(angle: L) -> (L, L) {
+    let of = |[angle, _]: [f64; 2]| libm::sincos(angle).into();
+    L::each([angle; 2], of).into()
 }
 
 #[cold]
 #[inline(never)]
-fn far_pair<L: Lanes>(angles: [f64; 4], rests: [f64; 4]) -> (Pair<L>, Pair<L>) {
-    let pairs: [_; 4] = std::array::from_fn(|k| DoubleDouble::sum(angles[k], rests[k]).sin_cos());
-    let join = |part: fn((DoubleDouble, DoubleDouble)) -> f64| L::of(pairs.map(part));
-    ([join(|p| p.0.hi), join(|p| p.0.lo)], [join(|p| p.1.hi), join(|p| p.1.lo)])
+fn far_pair<L: Signed>([angle, rest]: Pair<L>) -> (Pair<L>, Pair<L>) {
+    let of = |[angle, rest, ..]: [f64; 4]| {
+        let (sin, cos) = DoubleDouble::sum(angle, rest).sin_cos();
+        [sin.hi, sin.lo, cos.hi, cos.lo]
+    };
+    let [sin, sin_rest, cos, cos_rest] = L::each([angle, rest, angle, rest], of);
+    ([sin, sin_rest], [cos, cos_rest])
 }
 
 #[cfg(test)]

@@ -11,8 +11,8 @@
 
 #![allow(unsafe_code)]
 
-use super::wide::{EightLanes, Slots, Task, WideCode};
-use super::{Arithmetic, Code, Lanes};
+use super::wide::{EightLanes, Slots, Task, WideCode, each_of_eight};
+use super::{Arithmetic, Code, Lanes, Signed, each_of_four};
 use std::arch::x86_64::*;
 
 /// The proof that the processor has AVX and FMA.
@@ -176,6 +176,34 @@ impl Arithmetic for Avx {
     }
 }
 
+impl Signed for Avx {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        instruction!(Self(_mm256_sqrt_pd(self.0)))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        instruction!(Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        instruction!(Self(_mm256_xor_pd(_mm256_set1_pd(-0.0), self.0)))
+    }
+
+    #[inline(always)]
+    fn are_within(self, bound: f64) -> bool {
+        instruction!(
+            _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111
+        )
+    }
+
+    fn each<const N: usize>(lanes: [Self; N], f: fn([f64; N]) -> [f64; N]) -> [Self; N] {
+        each_of_four(lanes, f)
+    }
+}
+
 impl Lanes for Avx {
     const UNROLLED: bool = true;
 
@@ -192,11 +220,6 @@ impl Lanes for Avx {
     }
 
     #[inline(always)]
-    fn sqrt(self) -> Self {
-        instruction!(Self(_mm256_sqrt_pd(self.0)))
-    }
-
-    #[inline(always)]
     fn swap_pairs(self) -> Self {
         instruction!(Self(_mm256_permute_pd::<0b0101>(self.0)))
     }
@@ -207,25 +230,8 @@ impl Lanes for Avx {
     }
 
     #[inline(always)]
-    fn abs(self) -> Self {
-        instruction!(Self(_mm256_andnot_pd(_mm256_set1_pd(-0.0), self.0)))
-    }
-
-    #[inline(always)]
     fn max(self, other: Self) -> Self {
         instruction!(Self(_mm256_max_pd(self.0, other.0)))
-    }
-
-    #[inline(always)]
-    fn are_within(self, bound: f64) -> bool {
-        instruction!(
-            _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LE_OQ>(self.abs().0, _mm256_set1_pd(bound))) == 0b1111
-        )
-    }
-
-    #[inline(always)]
-    fn neg(self) -> Self {
-        instruction!(Self(_mm256_xor_pd(_mm256_set1_pd(-0.0), self.0)))
     }
 
     #[inline(always)]
@@ -279,6 +285,35 @@ impl Arithmetic for Avx512 {
     }
 }
 
+impl Signed for Avx512 {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        instruction!(Self(_mm512_sqrt_pd(self.0)))
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        instruction!(Self(_mm512_abs_pd(self.0)))
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        instruction!(Self(_mm512_castsi512_pd(_mm512_xor_si512(
+            _mm512_castpd_si512(_mm512_set1_pd(-0.0)),
+            _mm512_castpd_si512(self.0)
+        ))))
+    }
+
+    #[inline(always)]
+    fn are_within(self, bound: f64) -> bool {
+        instruction!(_mm512_cmp_pd_mask::<_CMP_LE_OQ>(self.abs().0, _mm512_set1_pd(bound)) == 0xff)
+    }
+
+    fn each<const N: usize>(lanes: [Self; N], f: fn([f64; N]) -> [f64; N]) -> [Self; N] {
+        each_of_eight(lanes, f)
+    }
+}
+
 impl Slots for Avx512 {
     const COUNT: usize = 8;
     const UNROLLED: bool = true;
@@ -312,12 +347,28 @@ impl EightLanes for Avx512 {
     }
 
     #[inline(always)]
-    fn halves(self) -> [Avx; 2] {
-        instruction!([Avx(_mm512_castpd512_pd256(self.0)), Avx(_mm512_extractf64x4_pd::<1>(self.0))])
+    fn smaller(self, other: Self) -> Self {
+        instruction!(Self(_mm512_min_pd(self.0, other.0)))
+    }
+
+    /// From its halves: the leading one counts 2³² times, and the sum of both is rounded once.
+    #[inline(always)]
+    fn bits_above(self, other: Self) -> Self {
+        instruction!({
+            let bits = _mm512_sub_epi64(_mm512_castpd_si512(self.0), _mm512_castpd_si512(other.0));
+            let high = _mm512_cvtepi32_pd(_mm512_cvtepi64_epi32(_mm512_srai_epi64::<32>(bits)));
+            let low = _mm512_cvtepu32_pd(_mm512_cvtepi64_epi32(bits));
+            Self(_mm512_fmadd_pd(high, _mm512_set1_pd(4_294_967_296.0), low))
+        })
     }
 
     #[inline(always)]
-    fn join([low, high]: [Avx; 2]) -> Self {
-        instruction!(Self(_mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low.0), high.0)))
+    fn floor(self) -> Self {
+        instruction!(Self(_mm512_roundscale_pd::<{ _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC }>(self.0)))
+    }
+
+    #[inline(always)]
+    fn times_power(self, exponent: Self) -> Self {
+        instruction!(Self(_mm512_scalef_pd(self.0, exponent.0)))
     }
 }

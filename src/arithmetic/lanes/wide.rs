@@ -1,6 +1,6 @@
 //! Eight doubles at once, in one vector of AVX-512 or two of four lanes, with the same bits.
 
-use super::{Arithmetic, Hardware, Lanes, Portable, hardware, is_disabled, sum};
+use super::{Arithmetic, Hardware, Lanes, Portable, Signed, hardware, is_disabled, sum};
 use std::marker::PhantomData;
 
 #[cfg(all(target_arch = "x86_64", not(driftless_portable)))]
@@ -33,7 +33,7 @@ pub trait Task {
 }
 
 /// Eight doubles.
-pub trait EightLanes: Slots {
+pub trait EightLanes: Slots + Signed {
     /// Four of them.
     type Half: Lanes;
 
@@ -42,10 +42,15 @@ pub trait EightLanes: Slots {
 
     /// Magnitudes, or `other` where that is larger or the magnitude not a number.
     fn larger(self, other: Self) -> Self;
-    /// The first four, and the others.
-    fn halves(self) -> [Self::Half; 2];
-    /// Of these.
-    fn join(halves: [Self::Half; 2]) -> Self;
+    /// The smaller ones; `other` where one is not a number.
+    fn smaller(self, other: Self) -> Self;
+    /// How far the bits of numbers from zero on are above those of others, in units of the last place: about
+    /// 2⁵² times the logarithm to base 2 of their ratio.
+    fn bits_above(self, other: Self) -> Self;
+    /// The whole numbers below.
+    fn floor(self) -> Self;
+    /// These from 1 to 2 times 2 to a whole power from -1000 to 1000.
+    fn times_power(self, exponent: Self) -> Self;
 }
 
 impl<L: Lanes> Arithmetic for [L; 2] {
@@ -88,6 +93,51 @@ impl<L: Lanes> Arithmetic for [L; 2] {
     }
 }
 
+impl<L: Lanes> Signed for [L; 2] {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        [self[0].sqrt(), self[1].sqrt()]
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        [self[0].abs(), self[1].abs()]
+    }
+
+    #[inline(always)]
+    fn neg(self) -> Self {
+        [self[0].neg(), self[1].neg()]
+    }
+
+    #[inline(always)]
+    fn are_within(self, bound: f64) -> bool {
+        self[0].are_within(bound) && self[1].are_within(bound)
+    }
+
+    fn each<const N: usize>(lanes: [Self; N], f: fn([f64; N]) -> [f64; N]) -> [Self; N] {
+        each_of_eight(lanes, f)
+    }
+}
+
+/// [`Signed::each`] of eight lanes.
+pub(super) fn each_of_eight<W: Slots, const N: usize>(lanes: [W; N], f: fn([f64; N]) -> [f64; N]) -> [W; N] {
+    let lanes = lanes.map(W::array);
+    let found: [_; 8] = std::array::from_fn(|lane| f(lanes.map(|lanes| lanes[lane])));
+    std::array::from_fn(|i| W::of(&found.map(|found| found[i])))
+}
+
+/// What two arrays of eight come to, lane by lane, in code of the place it stands in.
+macro_rules! lane_by_lane {
+    ($a:expr, $b:expr, $f:expr) => {{
+        let (a, b, mut found, mut lane) = ($a.array(), $b.array(), [0.0; 8], 0);
+        while lane < 8 {
+            found[lane] = $f(a[lane], b[lane]);
+            lane += 1;
+        }
+        Self::of(&found)
+    }};
+}
+
 impl<L: Lanes> Slots for [L; 2] {
     const COUNT: usize = 8;
     const UNROLLED: bool = L::UNROLLED;
@@ -120,13 +170,23 @@ impl<L: Lanes> EightLanes for [L; 2] {
     }
 
     #[inline(always)]
-    fn halves(self) -> [L; 2] {
-        self
+    fn smaller(self, other: Self) -> Self {
+        lane_by_lane!(self, other, |a: f64, b: f64| if a < b { a } else { b })
     }
 
     #[inline(always)]
-    fn join(halves: [L; 2]) -> Self {
-        halves
+    fn bits_above(self, other: Self) -> Self {
+        lane_by_lane!(self, other, |a: f64, b: f64| (a.to_bits() as i64 - b.to_bits() as i64) as f64)
+    }
+
+    #[inline(always)]
+    fn floor(self) -> Self {
+        lane_by_lane!(self, self, |a: f64, _| a.floor())
+    }
+
+    #[inline(always)]
+    fn times_power(self, exponent: Self) -> Self {
+        lane_by_lane!(self, exponent, |a, b: f64| a * f64::from_bits(((1023 + b as i64) as u64) << 52))
     }
 }
 
@@ -275,7 +335,15 @@ mod tests {
                 x.neg_mul_add(y, z),
                 x.mul_add(y, z),
                 x.larger(y),
-                W::join([y.halves()[1], x.halves()[0]]),
+                x.smaller(y),
+                x.sqrt(),
+                x.abs(),
+                x.neg(),
+                x.abs().bits_above(y.abs()),
+                y.floor(),
+                W::splat(1.5).times_power(z.floor()),
+                W::each([x, y], |[x, y]| [x - y, y])[0],
+                W::splat(f64::from(u8::from(x.are_within(20.0)))),
                 W::splat(self.0[0][0]),
                 W::ZERO,
                 W::ONE,

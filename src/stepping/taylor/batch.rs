@@ -7,6 +7,7 @@
 //! trajectory as soon as its last one has ended.
 
 mod clearance;
+mod clock;
 mod driven;
 mod formulas;
 mod free;
@@ -21,18 +22,19 @@ mod swinging;
 mod trees;
 mod vectors;
 
+use self::clock::{LaneClock, LaneStep};
 use self::driven::DrivenTeam;
 use self::free::FreeTeam;
 use self::looped::LoopTeam;
 pub use self::passage::Passage;
 use self::passage::coordinates;
 pub(crate) use self::passage::read;
-use self::slots::{LaneSlot, LaneSlots};
+use self::slots::LaneSlots;
 use self::swinging::SwingingTeam;
 use self::trees::TreeTeam;
-use self::vectors::{added, load, moved, root, store, unit};
+use self::vectors::{added, flaw_of, load, moved, pair, store, unit};
 use super::{JUDGES, Kernel, Taylor, stop};
-use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::looped::reduced;
 use crate::dynamics::natural::Reduced;
@@ -277,7 +279,7 @@ impl Batch {
         observer: &mut dyn BatchObserver,
     ) {
         let vectors = if self.is_portable { Vectors::Portable } else { Vectors::default() };
-        let lanes = LaneSlots::new(T::new(&members[like], self.order, vectors), self.order, until);
+        let lanes = LaneSlots::new(T::new(&members[like], self.order, vectors), self, until);
         vectors.run(Integration::<T> { lanes, fits, batch: self, members, until, observer });
     }
 }
@@ -308,8 +310,8 @@ trait Team {
     /// Keeps an empty lane busy with something harmless.
     fn park(&mut self, lane: usize);
 
-    /// Begins a step, from what the lanes are doing.
-    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]);
+    /// Begins a step, from when the lanes are.
+    fn begin<W: EightLanes>(&mut self, clock: &LaneClock);
 
     /// Expands all lanes to an order.
     fn expand<W: EightLanes>(&mut self, order: usize);
@@ -317,8 +319,8 @@ trait Team {
     /// The largest coefficients of every lane, of this order and those before it.
     fn sizes<W: EightLanes>(&self, order: usize) -> [Octet; JUDGES];
 
-    /// True where a lane's coefficients of this order are finite.
-    fn is_finite(&self, lane: usize, order: usize) -> bool;
+    /// Zero where a lane's coefficients of this order are finite, elsewhere not a number.
+    fn flaw<W: EightLanes>(&self, order: usize) -> W;
 
     /// True where a lane's trajectory is better left to other code from where the present step begins: asked
     /// after its expansion, and again after its end.
@@ -327,8 +329,8 @@ trait Team {
     }
 
     /// Of the step a lane wants as much as its series carries \[s\].
-    fn allowed(&mut self, _lane: usize, slot: &LaneSlot, _order: usize, _tolerance: f64) -> f64 {
-        slot.wanted
+    fn allowed(&mut self, step: &LaneStep, _order: usize, _tolerance: f64) -> f64 {
+        step.wanted
     }
 
     /// Every lane's state at the end of its step \[s\].
@@ -390,12 +392,14 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
             if self.lanes.is_idle() {
                 return;
             }
-            self.lanes.team.begin::<W>(&self.lanes.slots);
+            self.lanes.clock.look::<W>();
+            self.lanes.team.begin::<W>(&self.lanes.clock);
             self.lanes.team.expand::<W>(order);
-            let mut taken = self.lanes.choose_steps::<W>(order, self.batch.tolerance);
-            self.lanes.look_ahead(order, self.members, &mut taken, self.observer);
-            self.lanes.team.finish::<W>(order, &taken);
-            self.lanes.arrive(order, self.members, self.until, self.observer);
+            self.lanes.choose_steps::<W>(order, self.batch.tolerance);
+            self.lanes.look_ahead(order, self.members, self.observer);
+            self.lanes.team.finish::<W>(order, &self.lanes.clock.taken);
+            let ends = self.lanes.clock.ends::<W>();
+            self.lanes.arrive(order, self.members, &ends, self.until, self.observer);
             self.lanes.bring_back(self.batch, self.members, self.until, self.observer);
         }
     }

@@ -1,9 +1,9 @@
-//! Double-double in lanes: four unevaluated sums `hi + lo`.
+//! Double-double in lanes: unevaluated sums `hi + lo`.
 //!
 //! The operations are those of [`DoubleDouble`], less care for the last place: each is good to about 1e-31 of
 //! its larger operand.
 
-use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::{Arithmetic, Lanes};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use std::sync::LazyLock;
 
@@ -14,17 +14,11 @@ pub struct Wide<L> {
     pub lo: L,
 }
 
-impl<L: Lanes> Wide<L> {
+impl<L: Arithmetic> Wide<L> {
     /// The numbers themselves.
     #[inline(always)]
     pub fn of(hi: L) -> Self {
         Self { hi, lo: L::splat(0.0) }
-    }
-
-    /// From arrays of both parts.
-    #[inline(always)]
-    pub fn from(hi: [f64; 4], lo: [f64; 4]) -> Self {
-        Self { hi: L::of(hi), lo: L::of(lo) }
     }
 
     /// `hi + lo` where `hi` is the larger, brought into form.
@@ -84,6 +78,14 @@ impl<L: Lanes> Wide<L> {
     #[inline(always)]
     pub fn formed(self) -> Self {
         Self::quick(self.hi, self.lo)
+    }
+}
+
+impl<L: Lanes> Wide<L> {
+    /// From arrays of both parts.
+    #[inline(always)]
+    pub fn from(hi: [f64; 4], lo: [f64; 4]) -> Self {
+        Self { hi: L::of(hi), lo: L::of(lo) }
     }
 
     /// One over the first number, in every lane.

@@ -6,7 +6,6 @@ use super::factor::FactorInLanes;
 use super::{Times, constants};
 use crate::arithmetic::eight::LANES;
 use crate::arithmetic::lanes::wide::{EightLanes, Task};
-use crate::arithmetic::lanes::{Arithmetic, Lanes};
 use crate::arithmetic::{Complex, DoubleDouble, Over, Real, Scalar, sincos};
 use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Phase, Sine};
@@ -49,10 +48,8 @@ impl<W: EightLanes> InLanes<W> {
 
     #[inline(always)]
     fn near_sin_cos(self) -> (Self, Self) {
-        let [first, second] = self.0.halves();
-        let (s, c) = sincos::sin_cos(first, <W::Half as Arithmetic>::ZERO);
-        let (other_s, other_c) = sincos::sin_cos(second, <W::Half as Arithmetic>::ZERO);
-        (Self(W::join([s, other_s])), Self(W::join([c, other_c])))
+        let (sin, cos) = sincos::sin_cos(self.0, W::ZERO);
+        (Self(sin), Self(cos))
     }
 }
 
@@ -79,18 +76,12 @@ impl<W: EightLanes> Scalar for InLanes<W> {
 
     #[inline(always)]
     fn sqrt(self) -> Self {
-        let [first, second] = self.0.halves();
-        Self(W::join([first.sqrt(), second.sqrt()]))
+        Self(self.0.sqrt())
     }
 
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
-        let [first, second] = self.0.halves();
-        if first.are_within(sincos::RANGE) && second.are_within(sincos::RANGE) {
-            self.near_sin_cos()
-        } else {
-            self.far_sin_cos()
-        }
+        if self.0.are_within(sincos::RANGE) { self.near_sin_cos() } else { self.far_sin_cos() }
     }
 
     fn exp(self) -> Self {

@@ -8,12 +8,10 @@
 
 use super::super::driven::Driven;
 use super::super::terms::over;
-use super::super::wide::Wide;
-use super::laws::{Laws, half, put, reduced};
-use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store, unit};
+use super::laws::{Laws, reduced};
+use super::{BatchMember, JUDGES, LaneClock, MOST, Team, added, flaw_of, load, moved, pair, store, unit};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::{Mechanism, State};
 use crate::scene::Law;
@@ -55,27 +53,29 @@ struct Power {
     v: Octet,
 }
 
-/// Σ_{j=1..k-1} v_j E_{k-j} and Σ_{j=1..k} v_j E_{k+1-j} of two components E.
+/// Σ_{j=1..k-1} v_j E_{k-j} and Σ_{j=1..k} v_j E_{k+1-j} of some components E.
 macro_rules! older {
-    ($powers:expr, $k:expr, $one:ident, $other:ident) => {{
+    ($powers:expr, $k:expr, $($part:ident),*) => {{
         let (powers, k) = ($powers, $k);
-        let (mut a, mut b, mut next_a, mut next_b) = (W::ZERO, W::ZERO, W::ZERO, W::ZERO);
-        let (mut later_a, mut later_b) = (load::<W>(&powers[k].$one), load::<W>(&powers[k].$other));
+        // The sum, that of the next order, and the factor both share.
+        $(let mut $part = (W::ZERO, W::ZERO, load::<W>(&powers[k].$part));)*
         for (early, late) in powers[1..k].iter().zip(powers[1..k].iter().rev()) {
             let v = load::<W>(&early.v);
-            (next_a, next_b) = (v.mul_add(later_a, next_a), v.mul_add(later_b, next_b));
-            (later_a, later_b) = (load::<W>(&late.$one), load::<W>(&late.$other));
-            (a, b) = (v.mul_add(later_a, a), v.mul_add(later_b, b));
+            $(
+                $part.1 = v.mul_add($part.2, $part.1);
+                $part.2 = load(&late.$part);
+                $part.0 = v.mul_add($part.2, $part.0);
+            )*
         }
         let v = load::<W>(&powers[k].v);
-        [[a, b], [v.mul_add(later_a, next_a), v.mul_add(later_b, next_b)]]
+        [[$($part.0),*], [$(v.mul_add($part.2, $part.1)),*]]
     }};
 }
 
 impl DrivenTeam {
     /// Order k: from the newest coefficients and what the others contribute to e and u, to the next ones.
     #[inline(always)]
-    fn raise<W: EightLanes>(&mut self, k: usize, [e, u]: [[W; 2]; 2]) {
+    fn raise<W: EightLanes>(&mut self, k: usize, [c_older, s_older, x_older, y_older]: [W; 4]) {
         let (newest, start) = (self.powers[k], self.powers[0]);
         let (c, s, x, y) =
             (load::<W>(&newest.c), load::<W>(&newest.s), load::<W>(&newest.x), load::<W>(&newest.y));
@@ -89,8 +89,8 @@ impl DrivenTeam {
         let pull = y.mul_add(load(&high[2]), s.mul_add(load(&high[1]), c.mul_add(load(&high[0]), rest)));
         let v0 = load::<W>(&start.v);
         let slower = v0.sub(load(&self.laws.rate));
-        let (mut c_sum, mut s_sum) = (v0.mul_add(c, e[0]), v0.mul_add(s, e[1]));
-        let (mut x_sum, mut y_sum) = (slower.mul_add(x, u[0]), slower.mul_add(y, u[1]));
+        let (mut c_sum, mut s_sum) = (v0.mul_add(c, c_older), v0.mul_add(s, s_older));
+        let (mut x_sum, mut y_sum) = (slower.mul_add(x, x_older), slower.mul_add(y, y_older));
         if k > 0 {
             let v = load::<W>(&newest.v);
             (c_sum, s_sum) = (v.mul_add(load(&start.c), c_sum), v.mul_add(load(&start.s), s_sum));
@@ -103,18 +103,6 @@ impl DrivenTeam {
             y: store(over(x_sum, k + 1)),
             v: store(over(pull, k + 1)),
         };
-    }
-}
-
-impl DrivenTeam {
-    /// The free body's angle from the driven one's, in the lanes from `F` on.
-    #[inline(always)]
-    fn compare<L: Lanes, const F: usize>(&mut self) {
-        let phi = Wide { hi: half::<L, F>(&self.high[0]), lo: half::<L, F>(&self.low[0]) };
-        let turned = Wide { hi: half::<L, F>(&self.laws.angle[0]), lo: half::<L, F>(&self.laws.angle[1]) };
-        let between = reduced(phi.add(turned.minus()));
-        put::<L, F>(&mut self.between[0], between.hi);
-        put::<L, F>(&mut self.between[1], between.lo);
     }
 }
 
@@ -172,11 +160,12 @@ impl Team for DrivenTeam {
     }
 
     #[inline(always)]
-    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
-        self.laws.begin::<W>(slots);
+    fn begin<W: EightLanes>(&mut self, clock: &LaneClock) {
+        self.laws.begin::<W>(clock);
         self.before = [self.high[0], self.laws.angle[0]];
-        self.compare::<W::Half, 0>();
-        self.compare::<W::Half, 4>();
+        let (phi, turned) = (pair::<W>([&self.high[0], &self.low[0]]), pair(self.laws.angle.each_ref()));
+        let between = reduced(phi.add(turned.minus()));
+        self.between = [store(between.hi), store(between.lo)];
     }
 
     #[inline(always)]
@@ -187,14 +176,18 @@ impl Team for DrivenTeam {
         // Two orders at a time share what they load; the first of all has nothing behind it.
         let mut k = 0;
         while k < order {
-            let (mut e, mut u) = ([[W::ZERO; 2]; 2], [[W::ZERO; 2]; 2]);
-            if k > 0 {
-                e = older!(&self.powers, k, c, s);
-                u = older!(&self.powers, k, x, y);
+            let mut sums = [[W::ZERO; 4]; 2];
+            if k > 0 && W::VECTORS == 1 {
+                // Eight sums keep the multipliers busy.
+                sums = older!(&self.powers, k, c, s, x, y);
+            } else if k > 0 {
+                let ([e, next_e], [u, next_u]) =
+                    (older!(&self.powers, k, c, s), older!(&self.powers, k, x, y));
+                sums = [[e[0], e[1], u[0], u[1]], [next_e[0], next_e[1], next_u[0], next_u[1]]];
             }
-            self.raise(k, [e[0], u[0]]);
+            self.raise(k, sums[0]);
             if k + 1 < order {
-                self.raise(k + 1, [e[1], u[1]]);
+                self.raise(k + 1, sums[1]);
             }
             k += 2;
         }
@@ -219,8 +212,8 @@ impl Team for DrivenTeam {
     }
 
     #[inline(always)]
-    fn is_finite(&self, lane: usize, order: usize) -> bool {
-        self.powers[order].v.0[lane].is_finite()
+    fn flaw<W: EightLanes>(&self, order: usize) -> W {
+        flaw_of(&self.powers[order].v)
     }
 
     #[inline(always)]

@@ -4,7 +4,7 @@
 use super::super::JUDGES;
 use super::super::confirm::{self, Accelerations};
 use super::super::step_size;
-use super::LaneSlot;
+use super::LaneStep;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
@@ -31,10 +31,9 @@ pub(super) struct StepJudge {
     both: Accelerations,
 }
 
-/// Where the step of a lane begins, and the powers of its rates, coordinate by coordinate.
+/// Where the steps of the lanes begin, and the powers of its rates, coordinate by coordinate.
 #[derive(Clone, Copy)]
 pub(super) struct Begun<'a> {
-    pub lane: usize,
     /// Coordinates and rates (2f).
     pub high: &'a [Octet],
     /// Powers ((P+1) × f).
@@ -56,22 +55,23 @@ impl StepJudge {
     }
 
     /// Of the step a lane wants as much as its series carries \[s\].
-    pub(super) fn allowed(&mut self, begun: Begun, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
-        let Begun { lane, rates, coordinates: f, angles, per_length, .. } = begun;
+    pub(super) fn allowed(&mut self, begun: Begun, step: &LaneStep, order: usize, tolerance: f64) -> f64 {
+        let lane = step.lane;
+        let Begun { rates, coordinates: f, angles, per_length, .. } = begun;
         let power = |k: usize, c: usize| rates[k * f + c].0[lane] * if c < angles { 1.0 } else { per_length };
-        let largest = |k: usize| (0..f).fold(0.0, |most: f64, c| most.max(power(k, c).abs())) * slot.unit;
+        let largest = |k: usize| (0..f).fold(0.0, |most: f64, c| most.max(power(k, c).abs())) * step.unit;
         let last: [f64; JUDGES] = std::array::from_fn(|back| largest(order - back));
-        let wanted = step_size::falling(tolerance, order, (&last, largest), slot.wanted);
-        let h = wanted.min(slot.left);
-        let confirmed = self.confirmed(begun, slot, (order, tolerance), h);
+        let wanted = step_size::falling(tolerance, order, (&last, largest), step.wanted);
+        let h = wanted.min(step.left);
+        let confirmed = self.confirmed(begun, step, (order, tolerance), h);
         if confirmed < h { confirmed } else { wanted }
     }
 
     /// Of the step `h` \[s\] as much as the equations confirm.
     fn confirmed(
         &mut self,
-        Begun { lane, high, rates, coordinates: f, .. }: Begun,
-        slot: &LaneSlot,
+        Begun { high, rates, coordinates: f, .. }: Begun,
+        &LaneStep { lane, time: begin, .. }: &LaneStep,
         (order, tolerance): (usize, f64),
         h: f64,
     ) -> f64 {
@@ -98,7 +98,7 @@ impl StepJudge {
                 inside.y[f + c] = start + t * rate;
                 series.push(acceleration);
             }
-            let time = slot.time + t;
+            let time = begin + t;
             match equations {
                 Equations::Independent(equations) => equations.rhs(time, &inside.y, found),
                 Equations::All(equations) => equations.rhs(time, &inside.y, found),

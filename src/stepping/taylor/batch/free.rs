@@ -3,9 +3,9 @@
 
 use super::series::{expand, finish};
 use super::springs::Springs;
-use super::{BatchMember, JUDGES, LaneSlot, MOST, SPRINGS, Team, load, store};
+use super::{BatchMember, JUDGES, LaneClock, MOST, SPRINGS, Team, flaw_of, load, store};
 use crate::arithmetic::angle;
-use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::{Mechanism, State};
 
@@ -107,7 +107,7 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
     }
 
     #[inline(always)]
-    fn begin<W: EightLanes>(&mut self, _: &[LaneSlot; LANES]) {
+    fn begin<W: EightLanes>(&mut self, _: &LaneClock) {
         self.before = self.high[0];
     }
 
@@ -136,8 +136,12 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
     }
 
     #[inline(always)]
-    fn is_finite(&self, lane: usize, order: usize) -> bool {
-        self.powers[order].v.iter().all(|v| v.0[lane].is_finite())
+    fn flaw<W: EightLanes>(&self, order: usize) -> W {
+        let mut flaw = W::ZERO;
+        for v in &self.powers[order].v {
+            flaw = flaw.add(flaw_of(v));
+        }
+        flaw
     }
 
     #[inline(always)]

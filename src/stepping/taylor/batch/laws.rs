@@ -2,10 +2,10 @@
 
 use super::super::terms::over;
 use super::super::wide::Wide;
-use super::{LaneSlot, MOST, load, store};
+use super::{LaneClock, MOST, load, pair, store};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::Arithmetic;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
 use crate::scene::Law;
@@ -70,32 +70,21 @@ impl Laws {
 
     /// Angles and arguments of sines where the steps begin.
     #[inline(always)]
-    pub fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
-        for (lane, slot) in slots.iter().enumerate() {
-            (self.time[0].0[lane], self.time[1].0[lane]) = (slot.time.hi, slot.time.lo);
-        }
-        self.begin_half::<W::Half, 0>();
-        self.begin_half::<W::Half, 4>();
-    }
-
-    /// The same of the lanes from `F` on.
-    #[inline(always)]
-    fn begin_half<L: Lanes, const F: usize>(&mut self) {
-        let time = Wide { hi: half::<L, F>(&self.time[0]), lo: half::<L, F>(&self.time[1]) };
-        let bend = half::<L, F>(&self.acceleration).mul(L::splat(0.5));
-        let mut angle = time.scale(half::<L, F>(&self.rate)).add(Wide::of(half::<L, F>(&self.start)));
+    pub fn begin<W: EightLanes>(&mut self, clock: &LaneClock) {
+        self.time = clock.time;
+        let time = pair::<W>([&self.time[0], &self.time[1]]);
+        let bend = load::<W>(&self.acceleration).mul(W::splat(0.5));
+        let mut angle = time.scale(load(&self.rate)).add(Wide::of(load(&self.start)));
         angle = angle.add(time.mul(time).scale(bend));
         for sine in &mut self.sines {
-            let argument = time.scale(half::<L, F>(&sine.frequency));
-            let argument = reduced(argument.add(Wide::of(half::<L, F>(&sine.phase))));
+            let argument = time.scale(load(&sine.frequency));
+            let argument = reduced(argument.add(Wide::of(load(&sine.phase))));
             let ([sin, rest], [cos, _]) = sincos::sin_cos_pair([argument.hi, argument.lo]);
-            angle = angle.add(Wide { hi: sin, lo: rest }.scale(half::<L, F>(&sine.amplitude)));
-            put::<L, F>(&mut sine.cos, cos);
-            put::<L, F>(&mut sine.sin, sin);
+            angle = angle.add(Wide { hi: sin, lo: rest }.scale(load(&sine.amplitude)));
+            (sine.cos, sine.sin) = (store(cos), store(sin));
         }
         let angle = reduced(angle);
-        put::<L, F>(&mut self.angle[0], angle.hi);
-        put::<L, F>(&mut self.angle[1], angle.lo);
+        self.angle = [store(angle.hi), store(angle.lo)];
     }
 
     /// Powers of the rates.
@@ -125,21 +114,9 @@ impl Laws {
     }
 }
 
-/// Four lanes from `F` on.
-#[inline(always)]
-pub(super) fn half<L: Lanes, const F: usize>(octet: &Octet) -> L {
-    L::of([octet.0[F], octet.0[F + 1], octet.0[F + 2], octet.0[F + 3]])
-}
-
-/// Puts four lanes there.
-#[inline(always)]
-pub(super) fn put<L: Lanes, const F: usize>(octet: &mut Octet, lanes: L) {
-    octet.0[F..F + 4].copy_from_slice(&lanes.array());
-}
-
 /// An angle \[rad\] less whole turns, in [-π, π].
 #[inline(always)]
-pub(super) fn reduced<L: Lanes>(angle: Wide<L>) -> Wide<L> {
+pub(super) fn reduced<L: Arithmetic>(angle: Wide<L>) -> Wide<L> {
     // Adding and taking away 1.5·2⁵² rounds to the nearest integer.
     let shift = L::splat(6_755_399_441_055_744.0);
     let turns = angle.hi.mul_add(L::splat(1.0 / std::f64::consts::TAU), shift).sub(shift);

@@ -20,7 +20,7 @@ mod turn;
 
 use self::matrices::Matrices;
 use self::spring::Spring;
-use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, store, unit};
+use super::{BatchMember, JUDGES, LaneClock, MOST, Team, added, flaw_of, load, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{Complex, angle};
@@ -160,7 +160,7 @@ impl Team for LoopTeam {
     }
 
     #[inline(always)]
-    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
+    fn begin<W: EightLanes>(&mut self, clock: &LaneClock) {
         self.before[0].copy_from_slice(&self.high);
         self.before[1].copy_from_slice(&self.low);
         let n = self.count;
@@ -176,8 +176,7 @@ impl Team for LoopTeam {
         let [x, y] = self.end[..2 * n].split_at(n).into();
         let weakest = self.matrices.face::<W>(x, y);
         self.matrices.combine::<W>();
-        for (lane, slot) in slots.iter().enumerate() {
-            let is_there = slot.member.is_some();
+        for (lane, is_there) in clock.is_going.into_iter().enumerate() {
             self.is_going[lane] = is_there && matrices::is_regular(&weakest, lane);
             self.is_leaving[lane] = is_there && !self.is_going[lane];
         }
@@ -221,9 +220,14 @@ impl Team for LoopTeam {
         sizes
     }
 
-    fn is_finite(&self, lane: usize, order: usize) -> bool {
-        let last = |i: usize| self.x[i * ROOM + order + 1].0[lane] + self.y[i * ROOM + order + 1].0[lane];
-        (0..self.count).all(|i| last(i).is_finite())
+    #[inline(always)]
+    fn flaw<W: EightLanes>(&self, order: usize) -> W {
+        let mut flaw = W::ZERO;
+        for i in 0..self.count {
+            let last = i * ROOM + order + 1;
+            flaw = flaw.add(flaw_of(&self.x[last])).add(flaw_of(&self.y[last]));
+        }
+        flaw
     }
 
     #[inline(always)]

@@ -1,75 +1,41 @@
 //! The lanes, what they do, and which trajectories are in them.
 
+use super::clock::{LaneClock, LaneStep};
 use super::interior::{InLane, Interior};
-use super::{Batch, BatchMember, BatchObserver, Going, JUDGES, Passage, Team};
+use super::{Batch, BatchMember, BatchObserver, Going, Passage, Team};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::{Motion, State, Time};
-use crate::stepping::taylor::step_size::{self, StepSize};
+use crate::stepping::taylor::step_size;
 use crate::stepping::taylor::stop;
 use crate::stepping::{Cause, Statistics, StepError};
 use std::cell::RefCell;
 
-/// What a lane is doing.
-#[derive(Clone, Debug)]
-pub(super) struct LaneSlot {
-    /// Index of its trajectory.
-    pub(super) member: Option<usize>,
-    pub(super) step_size: StepSize,
-    pub(super) time: Time,
-    /// The mechanism's unit of time \[s\].
-    pub(super) unit: f64,
-    /// What is left to go, the last step wanted and the one taken \[s\].
-    pub(super) left: f64,
-    pub(super) wanted: f64,
-    pub(super) taken: f64,
-    /// True where events may end the motion.
-    has_stops: bool,
-    /// True where one is in the step, which is not taken: the trajectory leaves.
-    is_leaving: bool,
-}
-
-impl LaneSlot {
-    /// Why the step just expanded cannot be taken, where it cannot.
-    fn failure(&self, statistics: &Statistics) -> Result<(), StepError> {
-        let hint = "look for a position without inertia";
-        let stop = |cause, what: &str| {
-            stop(cause, &State { time: self.time, ..State::default() }, self.taken, what.into(), hint)
-        };
-        if self.wanted.is_nan() {
-            Err(stop(Cause::NotFinite, "the series is not finite"))
-        } else if self.wanted < 1e-14 * self.time.hi.abs().max(1e-3 * self.unit) {
-            Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
-        } else {
-            statistics.check("taylor", self.time.hi, self.taken)
-        }
-    }
-}
-
-/// Lanes, and what they do.
+/// Lanes, and which trajectories are in them.
 pub(super) struct LaneSlots<T> {
-    pub(super) slots: [LaneSlot; LANES],
+    /// Indices of the trajectories.
+    members: [Option<usize>; LANES],
+    pub(super) clock: LaneClock,
     pub(super) team: Box<T>,
+    /// True where events may end the motion.
+    has_stops: [bool; LANES],
+    /// True where one is in the step, which is not taken: the trajectory leaves.
+    is_leaving: [bool; LANES],
     /// Room for motions inside a step.
     inside: RefCell<Interior>,
 }
 
 impl<T: Team> LaneSlots<T> {
     /// Empty lanes.
-    pub(super) fn new(team: T, order: usize, until: Time) -> Self {
-        let empty = || LaneSlot {
-            member: None,
-            step_size: StepSize::new(1.0, order, 0.0),
-            time: until,
-            unit: 1.0,
-            left: 0.0,
-            wanted: 0.0,
-            taken: 0.0,
-            has_stops: false,
-            is_leaving: false,
-        };
-        let inside = RefCell::default();
-        Self { slots: std::array::from_fn(|_| empty()), team: Box::new(team), inside }
+    pub(super) fn new(team: T, batch: &Batch, until: Time) -> Self {
+        Self {
+            members: [None; LANES],
+            clock: LaneClock::new(batch.tolerance, batch.order, until),
+            team: Box::new(team),
+            has_stops: [false; LANES],
+            is_leaving: [false; LANES],
+            inside: RefCell::default(),
+        }
     }
 
     /// Puts trajectories that wait into the free lanes.
@@ -82,51 +48,49 @@ impl<T: Team> LaneSlots<T> {
         until: Time,
     ) {
         for lane in 0..LANES {
-            if self.slots[lane].member.is_none() {
-                let next = next(fits, members, waiting, until);
-                self.slots[lane].member = next;
-                match next {
-                    Some(index) => self.take_in(lane, batch, &members[index]),
+            if self.members[lane].is_none() {
+                match next(fits, members, waiting, until) {
+                    Some(index) => self.take_in(lane, batch, index, &members[index]),
                     None => self.team.park(lane),
                 }
             }
-            let slot = &mut self.slots[lane];
-            slot.left = if slot.member.is_some() { (until - slot.time).hi } else { 0.0 };
         }
     }
 
     /// Puts a trajectory into a lane.
-    fn take_in(&mut self, lane: usize, batch: &Batch, member: &BatchMember) {
-        let (longest, unit) = (self.team.take_in(lane, member, batch.order), member.mechanism.units.time);
-        let slot = &mut self.slots[lane];
-        slot.step_size = StepSize::new(batch.tolerance, batch.order, longest).over(unit);
-        (slot.time, slot.unit) = (member.state.time, unit);
-        slot.has_stops = member.mechanism.has_stops();
+    fn take_in(&mut self, lane: usize, batch: &Batch, index: usize, member: &BatchMember) {
+        self.members[lane] = Some(index);
+        let longest = self.team.take_in(lane, member, batch.order);
+        self.clock.start(lane, member.state.time, member.mechanism.units.time, longest);
+        self.has_stops[lane] = member.mechanism.has_stops();
+    }
+
+    /// Frees a lane.
+    fn release(&mut self, lane: usize) {
+        self.members[lane] = None;
+        self.clock.stop(lane);
     }
 
     /// True where no lane has a trajectory.
     pub(super) fn is_idle(&self) -> bool {
-        self.slots.iter().all(|slot| slot.member.is_none())
+        self.members.iter().all(Option::is_none)
     }
 
-    /// The steps \[s\] that the series just expanded allow.
+    /// Chooses the steps that the series just expanded allow.
     #[inline(always)]
-    pub(super) fn choose_steps<W: EightLanes>(&mut self, order: usize, tolerance: f64) -> Octet {
-        let (sizes, mut taken) = (self.team.sizes::<W>(order), Octet::splat(0.0));
-        for (lane, (slot, taken)) in self.slots.iter_mut().zip(&mut taken.0).enumerate() {
-            (slot.wanted, slot.taken) = (f64::NAN, 0.0);
-            if self.team.is_finite(lane, order) && !self.team.is_leaving(lane) {
-                let mut own = [0.0; JUDGES];
-                for back in 0..JUDGES {
-                    own[back] = sizes[back].0[lane];
-                }
-                slot.wanted = slot.step_size.step_of(order, &own);
-                slot.wanted = self.team.allowed(lane, slot, order, tolerance);
-                slot.taken = step_size::taken(slot.wanted, slot.left);
+    pub(super) fn choose_steps<W: EightLanes>(&mut self, order: usize, tolerance: f64) {
+        let Self { clock, team, .. } = self;
+        clock.want::<W>(order, &team.sizes::<W>(order), team.flaw::<W>(order));
+        for lane in 0..LANES {
+            clock.taken.0[lane] = 0.0;
+            if team.is_leaving(lane) {
+                clock.wanted.0[lane] = f64::NAN;
             }
-            *taken = slot.taken;
+            if !clock.wanted.0[lane].is_nan() {
+                clock.wanted.0[lane] = team.allowed(&clock.step(lane), order, tolerance);
+                clock.taken.0[lane] = step_size::taken(clock.wanted.0[lane], clock.left.0[lane]);
+            }
         }
-        taken
     }
 
     /// Shows the steps about to be taken where events may end a motion, and takes none with one in it.
@@ -134,55 +98,58 @@ impl<T: Team> LaneSlots<T> {
         &mut self,
         order: usize,
         members: &[BatchMember],
-        taken: &mut Octet,
         observer: &mut dyn BatchObserver,
     ) {
-        let Self { slots, team, inside } = self;
-        for (lane, (slot, taken)) in slots.iter_mut().zip(&mut taken.0).enumerate() {
-            slot.is_leaving = false;
-            let Some(index) = slot.member.filter(|_| slot.has_stops && slot.taken > 0.0) else { continue };
+        let Self { clock, team, inside, .. } = self;
+        for lane in 0..LANES {
+            self.is_leaving[lane] = false;
+            let (from, step) = (clock.at(lane), clock.taken.0[lane]);
+            let Some(index) = self.members[lane].filter(|_| self.has_stops[lane] && step > 0.0) else {
+                continue;
+            };
             let member = &members[index];
-            let (from, step) = (slot.time, slot.taken);
             let series = |body: usize, after: f64| team.at(order, lane, body, after);
             let ends = |body: usize| [0.0, step].map(|after| series(body, after).into());
             inside.borrow_mut().forget();
             let motion = |after: f64, motion: &mut Motion| {
                 inside.borrow_mut().look::<T>(team, member, InLane { order, lane, from }, after, motion);
             };
-            slot.is_leaving = observer.ahead(index, &Passage::new(from, step, &ends, &series, &motion));
-            if slot.is_leaving {
-                (slot.taken, *taken) = (0.0, 0.0);
+            self.is_leaving[lane] = observer.ahead(index, &Passage::new(from, step, &ends, &series, &motion));
+            if self.is_leaving[lane] {
+                clock.taken.0[lane] = 0.0;
             }
         }
     }
 
-    /// Records the steps just taken, and frees the lanes of trajectories that have ended.
+    /// Records the steps just taken, which end at these times, and frees the lanes of trajectories that have
+    /// ended.
     pub(super) fn arrive(
         &mut self,
         order: usize,
         members: &mut [BatchMember],
+        ends: &[Octet; 2],
         until: Time,
         observer: &mut dyn BatchObserver,
     ) {
         for lane in 0..LANES {
-            let slot = &mut self.slots[lane];
-            let Some(index) = slot.member else { continue };
-            let member = &mut members[index];
-            if slot.is_leaving || self.team.is_leaving(lane) {
-                (member.has_left, member.state.time) = (true, slot.time);
+            let Some(index) = self.members[lane] else { continue };
+            let (member, from) = (&mut members[index], self.clock.at(lane));
+            if self.is_leaving[lane] || self.team.is_leaving(lane) {
+                (member.has_left, member.state.time) = (true, from);
                 self.team.leave(lane, &mut member.state);
                 continue;
             }
-            let (from, step) = (slot.time, slot.taken);
-            match slot.failure(&member.statistics) {
+            let (mut time, step) = (from, self.clock.taken.0[lane]);
+            match self.failure(lane, &member.statistics) {
                 Err(stop) => member.stopped = Some(stop),
                 Ok(()) => {
-                    slot.time = if step == slot.left { until } else { from + step };
+                    let is_last = step == self.clock.left.0[lane];
+                    time = if is_last { until } else { Time { hi: ends[0].0[lane], lo: ends[1].0[lane] } };
+                    self.clock.set(lane, time);
                     member.statistics.steps += 1;
                     member.statistics.evaluations += 1;
                 }
             }
-            let time = slot.time;
             let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
             let ends = |body: usize| self.team.ends(lane, body);
             self.inside.get_mut().forget();
@@ -201,13 +168,27 @@ impl<T: Team> LaneSlots<T> {
             if is_over {
                 self.team.leave(lane, &mut member.state);
                 member.state.time = time;
-                self.slots[lane].member = None;
+                self.release(lane);
             }
         }
     }
-}
 
-impl<T: Team> LaneSlots<T> {
+    /// Why the step a lane has just expanded cannot be taken, where it cannot.
+    fn failure(&self, lane: usize, statistics: &Statistics) -> Result<(), StepError> {
+        let LaneStep { time, unit, wanted, .. } = self.clock.step(lane);
+        let taken = self.clock.taken.0[lane];
+        let hint = "look for a position without inertia";
+        let stop =
+            |cause, what: &str| stop(cause, &State { time, ..State::default() }, taken, what.into(), hint);
+        if wanted.is_nan() {
+            Err(stop(Cause::NotFinite, "the series is not finite"))
+        } else if wanted < 1e-14 * time.hi.abs().max(1e-3 * unit) {
+            Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
+        } else {
+            statistics.check("taylor", time.hi, taken)
+        }
+    }
+
     /// Has those taken on that have left, and takes in again those that come back.
     pub(super) fn bring_back(
         &mut self,
@@ -217,15 +198,11 @@ impl<T: Team> LaneSlots<T> {
         observer: &mut dyn BatchObserver,
     ) {
         for lane in 0..LANES {
-            let Some(index) = self.slots[lane].member else { continue };
+            let Some(index) = self.members[lane].filter(|&index| members[index].has_left) else { continue };
             let member = &mut members[index];
-            if !member.has_left {
-                continue;
-            }
-            self.slots[lane].member = None;
+            self.release(lane);
             if observer.alone(index, member) == Going::On && member.state.time < until {
-                self.slots[lane].member = Some(index);
-                self.take_in(lane, batch, member);
+                self.take_in(lane, batch, index, member);
             }
         }
     }

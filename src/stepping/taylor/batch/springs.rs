@@ -4,10 +4,8 @@
 use super::super::terms::over;
 use super::super::wide::Wide;
 use super::free::Power as Motion;
-use super::laws::{half, put};
-use super::{MOST, added, load, moved, store};
+use super::{MOST, added, load, moved, pair, store};
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
 use crate::dynamics::{Mechanism, State};
@@ -147,39 +145,26 @@ impl<const N: usize> Springs<N> {
 
     /// Power zero, and the unit vectors of the bodies.
     #[inline(always)]
-    pub fn begin<W: EightLanes>(&mut self, angles: [&[Octet; N]; 2], motion: &mut Motion<N>) {
-        self.begin_half::<W::Half, 0>(angles);
-        self.begin_half::<W::Half, 4>(angles);
+    pub fn begin<W: EightLanes>(&mut self, [high, low]: [&[Octet; N]; 2], motion: &mut Motion<N>) {
         for i in 0..N {
+            let angle = [load::<W>(&high[i]), load::<W>(&low[i])];
+            let ([sin, sin_low], [cos, cos_low]) = sincos::sin_cos_pair(angle);
+            self.units[i] = [store(cos), store(sin), store(cos_low), store(sin_low)];
             (motion.c[i], motion.s[i]) = (self.units[i][0], self.units[i][1]);
         }
-    }
-
-    /// The same of the lanes from `F` on.
-    #[inline(always)]
-    fn begin_half<L: Lanes, const F: usize>(&mut self, [high, low]: [&[Octet; N]; 2]) {
-        for i in 0..N {
-            let angle = [half::<L, F>(&high[i]), half::<L, F>(&low[i])];
-            let ([sin, sin_low], [cos, cos_low]) = sincos::sin_cos_pair(angle);
-            put::<L, F>(&mut self.units[i][0], cos);
-            put::<L, F>(&mut self.units[i][1], sin);
-            put::<L, F>(&mut self.units[i][2], cos_low);
-            put::<L, F>(&mut self.units[i][3], sin_low);
-        }
         for spring in &mut self.all {
-            let mut x = Wide::of(half::<L, F>(&spring.root[0]));
-            let mut y = Wide::of(half::<L, F>(&spring.root[1]));
+            let mut x = Wide::of(load::<W>(&spring.root[0]));
+            let mut y = Wide::of(load::<W>(&spring.root[1]));
             for i in 0..N {
                 let unit = &self.units[i];
-                let c = Wide { hi: half::<L, F>(&unit[0]), lo: half::<L, F>(&unit[2]) };
-                let s = Wide { hi: half::<L, F>(&unit[1]), lo: half::<L, F>(&unit[3]) };
-                let (re, im) = (half::<L, F>(&spring.gamma[i][0]), half::<L, F>(&spring.gamma[i][1]));
+                let (c, s) = (pair::<W>([&unit[0], &unit[2]]), pair([&unit[1], &unit[3]]));
+                let (re, im) = (load::<W>(&spring.gamma[i][0]), load::<W>(&spring.gamma[i][1]));
                 x = x.add(c.scale(re)).add(s.scale(im).minus());
                 y = y.add(s.scale(re)).add(c.scale(im));
             }
-            let free = half::<L, F>(&spring.free_length);
-            let (stiffness, measured) = (half::<L, F>(&spring.stiffness), half::<L, F>(&spring.measured));
-            let rest = L::ONE.sub(measured);
+            let free = load::<W>(&spring.free_length);
+            let (stiffness, measured) = (load::<W>(&spring.stiffness), load::<W>(&spring.measured));
+            let rest = W::ONE.sub(measured);
             let square = x.mul(x).add(y.mul(y));
             // The stretch is the difference of two lengths: it is taken before anything is rounded.
             let surplus = square.add(Wide::of(free).mul(Wide::of(free)).minus()).hi;
@@ -187,12 +172,10 @@ impl<const N: usize> Springs<N> {
             let length = size.sqrt();
             let relative = surplus.div(length.add(free).mul(length));
             let power = &mut spring.powers[0];
-            put::<L, F>(&mut power.x, x.hi);
-            put::<L, F>(&mut power.y, y.hi);
-            put::<L, F>(&mut power.square, size);
-            put::<L, F>(&mut spring.inverse, L::ONE.div(size));
-            put::<L, F>(&mut power.reciprocal, L::ONE.div(length));
-            put::<L, F>(&mut power.factor, L::ZERO.sub(stiffness).mul(relative.mul_add(measured, rest)));
+            (power.x, power.y, power.square) = (store(x.hi), store(y.hi), store(size));
+            spring.inverse = store(W::ONE.div(size));
+            power.reciprocal = store(W::ONE.div(length));
+            power.factor = store(W::ZERO.sub(stiffness).mul(relative.mul_add(measured, rest)));
         }
     }
 

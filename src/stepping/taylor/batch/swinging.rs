@@ -14,7 +14,7 @@
 use super::super::driven::Driven;
 use super::super::terms::over;
 use super::laws::{Laws, RATES};
-use super::{BatchMember, JUDGES, LaneSlot, MOST, Team, added, load, moved, store, unit};
+use super::{BatchMember, JUDGES, LaneClock, MOST, Team, added, flaw_of, load, moved, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{DoubleDouble, angle};
@@ -197,9 +197,9 @@ impl Team for SwingingTeam {
     }
 
     #[inline(always)]
-    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
+    fn begin<W: EightLanes>(&mut self, clock: &LaneClock) {
         self.before = self.high[0];
-        self.laws.begin::<W>(slots);
+        self.laws.begin::<W>(clock);
         self.laws.expand::<W>();
     }
 
@@ -232,8 +232,8 @@ impl Team for SwingingTeam {
     }
 
     #[inline(always)]
-    fn is_finite(&self, lane: usize, order: usize) -> bool {
-        self.powers[order].v.0[lane].is_finite()
+    fn flaw<W: EightLanes>(&self, order: usize) -> W {
+        flaw_of(&self.powers[order].v)
     }
 
     #[inline(always)]

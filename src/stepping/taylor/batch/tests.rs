@@ -41,7 +41,7 @@ fn ends(vectors: Vectors) -> Vec<State> {
         false => Going::On,
     };
     let team = FreeTeam::<2, false>::new(&members[0], batch.order, vectors);
-    let lanes = LaneSlots::new(team, batch.order, until);
+    let lanes = LaneSlots::new(team, &batch, until);
     let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
     let observer = &mut StepsAlone(&mut watch);
     vectors.run(Integration { lanes, fits, batch, members: members_here, until, observer });

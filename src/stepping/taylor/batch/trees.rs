@@ -9,7 +9,7 @@
 use super::super::terms::over;
 use super::clearance::{self, Clearance, StepFrom};
 use super::formulas::{Begun, LONGEST, StepJudge};
-use super::{BatchMember, JUDGES, LaneSlot, Team, added, load, moved, store};
+use super::{BatchMember, JUDGES, LaneClock, LaneStep, Team, added, flaw_of, load, moved, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
@@ -231,12 +231,10 @@ impl Team for TreeTeam {
         self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
     }
 
-    fn begin<W: EightLanes>(&mut self, slots: &[LaneSlot; LANES]) {
+    fn begin<W: EightLanes>(&mut self, clock: &LaneClock) {
         self.before.copy_from_slice(&self.high[..self.coordinates]);
-        for (lane, slot) in slots.iter().enumerate() {
-            self.times[lane] = slot.time;
-            self.is_going[lane] = slot.member.is_some();
-        }
+        self.times = std::array::from_fn(|lane| clock.at(lane));
+        self.is_going = clock.is_going;
         if let Some([high, low]) = &mut self.kept {
             high.copy_from_slice(&self.high);
             low.copy_from_slice(&self.low);
@@ -279,29 +277,32 @@ impl Team for TreeTeam {
         sizes
     }
 
-    fn is_finite(&self, lane: usize, order: usize) -> bool {
-        let f = self.coordinates;
-        self.series.rates()[order * f..(order + 1) * f].iter().all(|rate| rate.0[lane].is_finite())
+    #[inline(always)]
+    fn flaw<W: EightLanes>(&self, order: usize) -> W {
+        let (f, mut flaw) = (self.coordinates, W::ZERO);
+        for rate in &self.series.rates()[order * f..(order + 1) * f] {
+            flaw = flaw.add(flaw_of(rate));
+        }
+        flaw
     }
 
-    fn allowed(&mut self, lane: usize, slot: &LaneSlot, order: usize, tolerance: f64) -> f64 {
-        let mut wanted = slot.wanted;
+    fn allowed(&mut self, step: &LaneStep, order: usize, tolerance: f64) -> f64 {
+        let LaneStep { lane, time, left, mut wanted, .. } = *step;
         if let Some(judge) = &mut self.judge {
             let begun = Begun {
-                lane,
                 high: &self.high,
                 rates: self.series.rates(),
                 coordinates: self.coordinates,
                 angles: self.angles,
                 per_length: self.per_length.0[lane],
             };
-            wanted = judge.allowed(begun, slot, order, tolerance);
+            wanted = judge.allowed(begun, step, order, tolerance);
         }
         if self.mechanism.contacts.is_empty() {
             return wanted;
         }
-        let length = wanted.min(slot.left);
-        let step = StepFrom { lane, time: slot.time, order, length };
+        let length = wanted.min(left);
+        let step = StepFrom { lane, time, order, length };
         match self.clearance.of(&self.mechanism, &*self.series, step) {
             Some(clear) if clear < length => clear,
             Some(_) => wanted,

@@ -1,8 +1,8 @@
 //! What all teams do with eight lanes.
 
 use super::super::terms::add_to;
+use super::super::wide::Wide;
 use crate::arithmetic::eight::Octet;
-use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
 
@@ -12,6 +12,13 @@ use crate::arithmetic::sincos;
 #[inline(always)]
 pub(super) fn load<W: EightLanes>(octet: &Octet) -> W {
     W::of(&octet.0)
+}
+
+/// Zero in lanes that are finite, elsewhere not a number.
+#[inline(always)]
+pub(super) fn flaw_of<W: EightLanes>(octet: &Octet) -> W {
+    let lanes = load::<W>(octet);
+    lanes.sub(lanes)
 }
 
 #[inline(always)]
@@ -35,15 +42,11 @@ pub(super) fn added<W: EightLanes>([high, low]: [&Octet; 2], increment: W, rest:
 /// Cosine and sine of angles in two terms.
 #[inline(always)]
 pub(super) fn unit<W: EightLanes>(high: &Octet, low: &Octet) -> [Octet; 2] {
-    let ([high, other_high], [low, other_low]) = (load::<W>(high).halves(), load::<W>(low).halves());
-    let (s, c) = sincos::sin_cos::<W::Half>(high, low);
-    let (other_s, other_c) = sincos::sin_cos::<W::Half>(other_high, other_low);
-    [store(W::join([c, other_c])), store(W::join([s, other_s]))]
+    let (sin, cos) = sincos::sin_cos::<W>(load(high), load(low));
+    [store(cos), store(sin)]
 }
-
-/// Square roots.
+/// Numbers in two terms.
 #[inline(always)]
-pub(super) fn root<W: EightLanes>(x: W) -> W {
-    let [first, second] = x.halves();
-    W::join([first.sqrt(), second.sqrt()])
+pub(super) fn pair<W: EightLanes>([high, low]: [&Octet; 2]) -> Wide<W> {
+    Wide { hi: load(high), lo: load(low) }
 }

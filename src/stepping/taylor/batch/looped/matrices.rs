@@ -7,7 +7,7 @@ use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::keeper::CLOSE;
 use crate::dynamics::natural::{Linear, Reduced};
-use crate::stepping::taylor::batch::{load, root, store};
+use crate::stepping::taylor::batch::{load, store};
 
 /// Sweeps onto the unit lengths after the first one, of lanes that are far off.
 const SWEEPS: usize = 6;
@@ -213,7 +213,7 @@ impl Matrices {
                 self.factors[s].0[lane] = self.v[axis][k * n + s].0[lane];
             }
         }
-        let root = root(W::of(&most));
+        let root = W::of(&most).sqrt();
         for i in 0..n {
             let (mut x, mut y) = (ZERO, ZERO);
             for lane in 0..LANES {

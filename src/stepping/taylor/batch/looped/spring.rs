@@ -8,7 +8,7 @@ use super::{MOST, PAIR, Pair, ROOM, ZERO, put};
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::force;
-use crate::stepping::taylor::batch::{load, root, store};
+use crate::stepping::taylor::batch::{load, store};
 
 /// A spring and its series: D, q with its powers' numbers, s.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ impl Spring {
         self.square[m] = store(square);
         self.weighted[m] = store(square.mul(W::splat(m as f64)));
         let inverse = if m == 0 {
-            W::ONE.div(root(square))
+            W::ONE.div(square.sqrt())
         } else {
             let plain = product::<W>(&self.square, &self.inverse, 1, m);
             let weighted = product::<W>(&self.weighted, &self.inverse, 1, m);

@@ -1,7 +1,6 @@
 //! The angle between two vectors in every lane.
 
 use crate::arithmetic::lanes::wide::EightLanes;
-use crate::stepping::taylor::batch::root;
 
 /// The largest turn of a step that is told from one by a whole turn more or less \[rad\].
 pub const MOST: f64 = 5.0;
@@ -14,9 +13,9 @@ const TERMS: usize = 20;
 pub fn between<W: EightLanes>(from: [W; 2], to: [W; 2]) -> W {
     let cross = from[1].neg_mul_add(to[0], from[0].mul(to[1]));
     let dot = from[0].mul_add(to[0], from[1].mul(to[1]));
-    let half = cross.div(root(cross.mul_add(cross, dot.mul(dot))).add(dot));
-    let quarter = half.div(W::ONE.add(root(half.mul_add(half, W::ONE))));
-    let eighth = quarter.div(W::ONE.add(root(quarter.mul_add(quarter, W::ONE))));
+    let half = cross.div(cross.mul_add(cross, dot.mul(dot)).sqrt().add(dot));
+    let quarter = half.div(W::ONE.add(half.mul_add(half, W::ONE).sqrt()));
+    let eighth = quarter.div(W::ONE.add(quarter.mul_add(quarter, W::ONE).sqrt()));
     let square = eighth.mul(eighth);
     let mut sum = W::ZERO;
     let mut k = TERMS;
