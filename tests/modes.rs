@@ -311,6 +311,64 @@ fn what_has_no_equilibrium_says_why() {
     assert!(cart.equilibria.iter().all(|one| one.is_family));
 }
 
+/// A flywheel on a pendulum, hinged at its own centre of mass: nothing brings it back, and its angle counts in
+/// the torque on the pendulum.  J φ'' = -W cos φ + a cos φ sin ψ - d φ', whatever ψ is and whatever the units.
+#[test]
+fn what_nothing_brings_back_has_an_eigenvalue_of_zero_in_all_units() {
+    for (time, length, damping) in
+        [(1.0, 1.0, 0.0), (1.0, 1.0, 0.3), (1e3, 1.0, 0.3), (1e-3, 1e-3, 0.0), (1e-3, 1e3, 4.0)]
+    {
+        let (area, torque) = (length * length, length * length / (time * time));
+        let (gravity, a) = (9.81 * length / (time * time), 1.5 * torque);
+        let scene = parsed(&format!(
+            r#"{{"name": "flywheel", "gravity": [0, {}], "parameters": {{"a": {a}}},
+            "bars": [{{"name": "arm", "mass": 1.2, "centre": [{}, 0], "inertia": {}, "length": {}}},
+                     {{"name": "wheel", "mass": 0.7, "centre": [0, 0], "inertia": {}, "length": {}}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "arm", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "arm", "point": [{}, 0]}}, {{"body": "wheel", "point": [0, 0]}}]}}],
+            "torsion_springs": [{{"name": "D", "body": "arm", "stiffness": 0, "free_angle": 0, "damping": {}}}],
+            "torques": [{{"name": "T", "body": "arm", "torque": "a*arm.cos*wheel.sin"}}],
+            "start": {{"arm": {{"phi": -1, "omega": 0}}, "wheel": {{"phi": 0.4, "omega": 0}}}}, "until": 1, "every": 1}}"#,
+            -gravity,
+            0.25 * length,
+            0.02 * area,
+            0.5 * length,
+            0.01 * area,
+            0.2 * length,
+            0.4 * length,
+            damping * area / time,
+        ));
+        let found = found(&scene, 24);
+        assert!(found.starts[1] > 20, "{:?}", found.starts);
+        let inertia = (0.02 + 1.2 * 0.0625 + 0.7 * 0.16) * area;
+        let weight = (1.2 * 0.25 + 0.7 * 0.4) * length * gravity;
+        let resistance = damping * area / time;
+        for one in &found.equilibria {
+            // Down below it comes back, up above it falls: s² J + s d + (W - a sin ψ) sin φ = 0, φ = ∓π/2.
+            let stiffness = -(weight - a * one.phi[1].sin()) * one.phi[0].sin();
+            let is_below = stiffness > 0.0;
+            assert!(one.phi[0].cos().abs() < 1e-7 && one.is_family, "{one:?}");
+            let expected = if is_below { Stability::Stable } else { Stability::Unstable };
+            assert_eq!((one.stability, one.modes[0].eigenvalue), (expected, [0.0, 0.0]), "{one:?}");
+            assert!(one.modes[0].shape[0][0].abs() < 1e-6 && one.modes[0].shape[1][0] == 1.0, "{one:?}");
+            let square = (resistance / inertia).powi(2) / 4.0 - stiffness / inertia;
+            let re = -0.5 * resistance / inertia;
+            let roots = if square < 0.0 {
+                vec![[re, (-square).sqrt()]]
+            } else {
+                vec![[re + square.sqrt(), 0.0], [re - square.sqrt(), 0.0]]
+            };
+            assert_eq!(one.modes.len(), 1 + roots.len(), "{one:?}");
+            for root in roots {
+                let apart = |at: &[f64; 2]| (at[0] - root[0]).hypot(at[1] - root[1]);
+                let nearest = one.modes[1..].iter().map(|mode| apart(&mode.eigenvalue));
+                let size = root[0].hypot(root[1]);
+                assert!(nearest.fold(f64::INFINITY, f64::min) < 1e-6 * size, "{root:?} {one:?}");
+            }
+        }
+    }
+}
+
 /// Where a torsion spring counts turns, positions a turn apart are two: all roots of the balance of torques are
 /// found, each as it is.
 #[test]

@@ -7,6 +7,9 @@
 //! modes:         (s² - s T' A_w T - T' A_q T) y = 0                 damping ratio -Re s / |s|
 //! ```
 //!
+//! Directions with T' A_q T y = 0 lead to other equilibria.  Each has an eigenvalue of zero, taken out before the
+//! others are computed: of two that are the same, rounding would make a pair of the size of its root.
+//!
 //! A_q and A_w are exact (dual numbers).  To first order the curvature of the constraints has no part in it,
 //! as a(q0, 0) = 0.  Source: L. Meirovitch, *Methods of Analytical Dynamics* (1970), sections 5.3 to 5.6.
 
@@ -46,6 +49,13 @@ const BALANCED: f64 = 1e-7;
 const DISTINCT: f64 = 1e-6;
 /// Real parts below this share of the largest eigenvalue are rounding.
 const ROUNDING: f64 = 1e-7;
+/// Iterations of Newton's method at most from where accelerations count as none.
+const POLISHED: usize = 4;
+/// Eigenvalues below this share of the largest are zero where a direction is neither brought back nor damped.
+const UNDAMPED: f64 = 1e-12;
+/// Singular values of the stiffness below this share of the largest are zero: nothing brings their directions
+/// back.
+const SLACK: f64 = 1e-11;
 /// Singular values of the constraints' Jacobian below this share of the largest are zero.
 const DEPENDENT: f64 = 1e-7;
 /// Below this share ways of motion cross nearby: an equilibrium there is not found to better than its root.

@@ -2,7 +2,8 @@
 
 use super::local::{Local, at_rest};
 use super::{
-    BALANCED, BRANCHES, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, ROUNDING, STILL, Stability,
+    BALANCED, BRANCHES, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, POLISHED, ROUNDING, SLACK, STILL,
+    Stability, UNDAMPED,
 };
 use crate::dynamics::compile::WholeTurns;
 use crate::dynamics::jacobian::Jacobian;
@@ -104,9 +105,7 @@ impl<'a> Search<'a> {
             let [slope, _] = self.linear(&phi, &tangent);
             let scale = slope.amax();
             if left.amax() <= STILL * scale.max(f64::MIN_POSITIVE) {
-                // Once more: Newton's method squares what is left.
-                let last = slope.lu().solve(&-&left).map(|y| self.local.moved(&phi, &tangent, &y));
-                let last = last.and_then(|there| self.local.projected(&there)).unwrap_or(phi);
+                let last = self.polished(phi, (tangent, slope, left));
                 return self.is_balanced(&last).then_some(last);
             }
             // Levenberg and Marquardt: Newton's step, shortened where it does not help.
@@ -145,6 +144,29 @@ impl<'a> Search<'a> {
         None
     }
 
+    /// A position nearly at rest, with its tangent, its slope and what is left of the accelerations, as near as
+    /// Newton's method comes, which does not move it to where all is as it was.
+    fn polished(
+        &mut self,
+        mut phi: Vec<f64>,
+        (mut tangent, mut slope, mut left): (DMatrix<f64>, DMatrix<f64>, DVector<f64>),
+    ) -> Vec<f64> {
+        for _ in 0..POLISHED {
+            let svd = slope.svd(true, true);
+            let least = SLACK * svd.singular_values.amax();
+            let Ok(y) = svd.solve(&-&left, least) else { break };
+            let Some(there) = self.local.projected(&self.local.moved(&phi, &tangent, &y)) else { break };
+            let frame = self.local.tangent(&there);
+            let rest = frame.transpose() * self.local.pull(&there, 0.0);
+            if frame.ncols() != tangent.ncols() || rest.norm() >= left.norm() {
+                break;
+            }
+            slope = self.linear(&there, &frame)[0].clone();
+            (phi, tangent, left) = (there, frame, rest);
+        }
+        phi
+    }
+
     /// True where what is left of the accelerations is small beside others too.
     fn is_balanced(&mut self, phi: &[f64]) -> bool {
         let left = self.local.tangent(phi).transpose() * self.local.pull(phi, 0.0);
@@ -157,14 +179,11 @@ impl<'a> Search<'a> {
         let f = tangent.ncols();
         let is_singular = f != freedom || self.local.conditioning < CROSSING;
         let [stiffness, damping] = self.linear(&phi, &tangent);
-        let mut system = DMatrix::<f64>::zeros(2 * f, 2 * f);
-        system.view_mut((0, f), (f, f)).fill_with_identity();
-        system.view_mut((f, 0), (f, f)).copy_from(&stiffness);
-        system.view_mut((f, f), (f, f)).copy_from(&damping);
-        let values = eigenvalues(&stiffness, &damping, system);
+        let [slack, held] = slack(&stiffness);
+        let values = eigenvalues(&stiffness, &damping, &held);
         let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
-        let is_family = values.iter().any(|value| value.norm() <= ROUNDING.sqrt() * 1e-2 * largest);
         let growth = values.iter().map(|value| value.re).fold(f64::NEG_INFINITY, f64::max);
+        let growth = if slack.ncols() == 0 { growth } else { growth.max(0.0) };
         let stability = if is_singular {
             Stability::Undecided
         } else if growth > ROUNDING * largest {
@@ -177,15 +196,19 @@ impl<'a> Search<'a> {
         let mut listed: Vec<Complex<f64>> =
             values.into_iter().filter(|value| value.im >= -1e-3 * ROUNDING * largest).collect();
         listed.sort_by(|a, b| a.norm().total_cmp(&b.norm()).then(a.re.total_cmp(&b.re)));
-        let modes = listed.into_iter().map(|value| {
+        let of_slack = slack.column_iter().map(|y| {
+            let y = y.map(|y| Complex::new(y, 0.0));
+            Mode { eigenvalue: [0.0; 2], frequency: 0.0, damping_ratio: 0.0, shape: self.shape(&y, &tangent) }
+        });
+        let modes = of_slack.chain(listed.into_iter().map(|value| {
             let frequency = value.norm();
             Mode {
                 eigenvalue: [value.re + 0.0, value.im + 0.0],
                 frequency,
                 damping_ratio: if frequency > 0.0 { 0.0 - value.re / frequency } else { 0.0 },
-                shape: self.shape(value, &stiffness, &damping, &tangent),
+                shape: self.shape(&direction(value, &stiffness, &damping), &tangent),
             }
-        });
+        }));
         let modes = if is_singular { Vec::new() } else { modes.collect() };
         let potential = self.potential(&phi);
         Equilibrium {
@@ -194,7 +217,7 @@ impl<'a> Search<'a> {
             stability,
             modes,
             from_start,
-            is_family: is_family && !is_singular,
+            is_family: slack.ncols() > 0 && !is_singular,
         }
     }
 
@@ -206,23 +229,8 @@ impl<'a> Search<'a> {
             .potential
     }
 
-    /// The shape of a mode in the coordinates.
-    fn shape(
-        &self,
-        value: Complex<f64>,
-        stiffness: &DMatrix<f64>,
-        damping: &DMatrix<f64>,
-        tangent: &DMatrix<f64>,
-    ) -> Vec<[f64; 2]> {
-        let f = stiffness.nrows();
-        let matrix = DMatrix::from_fn(f, f, |i, j| {
-            let own = if i == j { value * value } else { Complex::new(0.0, 0.0) };
-            own - value * damping[(i, j)] - stiffness[(i, j)]
-        });
-        let svd = matrix.svd(false, true);
-        let least = (0..f).min_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
-        let (Some(least), Some(right)) = (least, svd.v_t) else { return Vec::new() };
-        let y = DVector::from_fn(f, |i, _| right[(least, i)].conj());
+    /// The shape of a mode along a direction, in the coordinates.
+    fn shape(&self, y: &DVector<Complex<f64>>, tangent: &DMatrix<f64>) -> Vec<[f64; 2]> {
         let q = tangent.map(|x| Complex::new(x, 0.0)) * y;
         let largest =
             q.iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or(Complex::new(1.0, 0.0));
@@ -236,11 +244,23 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Eigenvalues of the linearized motion.  Without damping they are the square roots of those of the
-/// stiffness, which then have all digits of a problem half the size.
-fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, system: DMatrix<f64>) -> Vec<Complex<f64>> {
+/// Directions that nothing brings back, and all others: orthonormal, one a column.
+fn slack(stiffness: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
+    let f = stiffness.ncols();
+    let svd = stiffness.clone().svd(false, true);
+    let least = SLACK * svd.singular_values.amax();
+    let right = svd.v_t.unwrap_or_else(|| DMatrix::identity(f, f));
+    let (slack, held): (Vec<usize>, Vec<usize>) = (0..f).partition(|&k| svd.singular_values[k] <= least);
+    [slack, held].map(|those| DMatrix::from_fn(f, those.len(), |i, j| right[(those[j], i)]))
+}
+
+/// Eigenvalues of the linearized motion but for those of zero that the directions left out of `held` have, two
+/// each where nothing damps them.  Without damping the others are the square roots of those of the stiffness,
+/// which then have all digits of a problem half the size.
+fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, held: &DMatrix<f64>) -> Vec<Complex<f64>> {
+    let (f, r) = (held.nrows(), held.ncols());
     if damping.amax() == 0.0 {
-        let squares = stiffness.clone().complex_eigenvalues();
+        let squares = (held.transpose() * stiffness * held).complex_eigenvalues();
         let root = |square: &Complex<f64>| {
             // Real where rounding made a pair of two that are equal.
             let real = square.im.abs() <= 1e-9 * square.norm();
@@ -249,5 +269,28 @@ fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, system: DMatrix
         };
         return squares.iter().flat_map(root).collect();
     }
-    system.complex_eigenvalues().iter().copied().collect()
+    // Coordinates along the directions that are held, and all rates.
+    let mut system = DMatrix::<f64>::zeros(r + f, r + f);
+    system.view_mut((0, r), (r, f)).copy_from(&held.transpose());
+    system.view_mut((r, 0), (f, r)).copy_from(&(stiffness * held));
+    system.view_mut((r, r), (f, f)).copy_from(damping);
+    let mut values: Vec<Complex<f64>> = system.complex_eigenvalues().iter().copied().collect();
+    let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
+    values.retain(|value| r == f || value.norm() > UNDAMPED * largest);
+    values
+}
+
+/// The direction that an eigenvalue has.
+fn direction(value: Complex<f64>, stiffness: &DMatrix<f64>, damping: &DMatrix<f64>) -> DVector<Complex<f64>> {
+    let f = stiffness.nrows();
+    let matrix = DMatrix::from_fn(f, f, |i, j| {
+        let own = if i == j { value * value } else { Complex::new(0.0, 0.0) };
+        own - value * damping[(i, j)] - stiffness[(i, j)]
+    });
+    let svd = matrix.svd(false, true);
+    let least = (0..f).min_by(|&a, &b| svd.singular_values[a].total_cmp(&svd.singular_values[b]));
+    match (least, svd.v_t) {
+        (Some(least), Some(right)) => DVector::from_fn(f, |i, _| right[(least, i)].conj()),
+        _ => DVector::zeros(f),
+    }
 }
