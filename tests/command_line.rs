@@ -495,6 +495,35 @@ fn rows_of_points_that_cannot_be_run_have_their_words_in_the_right_columns() {
 }
 
 #[test]
+fn a_fit_leaves_a_record_and_charts_and_tells_what_is_wrong_with_its_data() {
+    let program = Program::with_scenes(&["free"]);
+    program.run("run free.json --until 1 --every 0.05 --no-charts --out runs").exits(0);
+    let table = program.files().into_iter().find(|file| file.ends_with("trajectory.csv")).expect("a table");
+    let rows = program.read(&table);
+    let line = |row: &str| {
+        let cells: Vec<&str> = row.split(',').collect();
+        let number = |cell: &str| cell.parse::<f64>().ok();
+        let (t, phi) = (number(cells[0])?, number(cells[1])?);
+        Some(format!("{},{}\n", t * 1e3, phi.to_degrees()))
+    };
+    let measured: String = rows.lines().filter_map(line).collect();
+    program.write("measured.csv", &format!("t [ms],bar1.phi [deg]\n{measured}"));
+    let fit = "fit free.json --vary gravity[0] --set gravity[0]=9 --out fits --data";
+    let found = program.run(&format!("{fit} measured.csv --json")).exits(0).object();
+    let value = found["numbers"][0]["value"].as_f64().expect("a number");
+    assert!((value - 9.81).abs() < 1e-6, "{found}");
+    let files = program.files();
+    for name in ["fit.json", "fit.csv", "fit.png", "residuals.png"] {
+        assert!(files.iter().any(|file| file.ends_with(name)), "{name} {files:?}");
+    }
+    program.write("other.csv", "t [s],bar1.phi [m]\n0,1\n0.1,1\n");
+    let words = ["other.csv: line 1, column bar1.phi", "`m` does not measure", "hint"];
+    program.run(&format!("{fit} other.csv")).exits(3).says(&words);
+    program.run(&format!("{fit} none.csv")).exits(6).says(&["none.csv", "cannot be read", "hint"]);
+    assert_eq!(program.files().len(), files.len() + 1);
+}
+
+#[test]
 fn modes_leave_a_record_and_charts() {
     let program = Program::with_scenes(&["free", "motor"]);
     let object = program.run("modes free.json --json --gif").exits(0).object();

@@ -19,6 +19,7 @@ impl From<FitError> for Failure {
         let exit = match error {
             FitError::Sensitivity(error) => return error.into(),
             FitError::Asked(_) => Exit::Usage,
+            FitError::Unreadable { .. } => Exit::Io,
             FitError::Data(_) => Exit::Scene,
             FitError::Failed(_) => Exit::Stopped,
             FitError::Interrupted => Exit::Interrupted,

@@ -26,7 +26,7 @@ impl Data {
     pub fn read(path: &Path) -> Result<Self, FitError> {
         let source = path.display().to_string();
         let text = std::fs::read_to_string(path)
-            .map_err(|error| FitError::Data(format!("{source}: cannot be read: {error}")))?;
+            .map_err(|error| FitError::Unreadable { file: source.clone(), why: error.to_string() })?;
         Self::parse(&text, &source)
     }
 

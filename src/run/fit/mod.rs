@@ -63,6 +63,14 @@ impl Default for FitRequest {
 /// Why there is no fit.
 #[derive(Debug, thiserror::Error)]
 pub enum FitError {
+    /// The file of the data.
+    #[error("{file}: cannot be read: {why}\nhint: check the path; --data is a table with a column `t [s]`")]
+    Unreadable {
+        /// Its path.
+        file: String,
+        /// Why.
+        why: String,
+    },
     /// The data.
     #[error("{0}")]
     Data(String),
