@@ -369,6 +369,28 @@ fn what_nothing_brings_back_has_an_eigenvalue_of_zero_in_all_units() {
     }
 }
 
+#[test]
+fn where_nothing_acts_all_places_are_equilibria_damped_or_not() {
+    for damping in [0.0, 0.2] {
+        let scene = parsed(&format!(
+            r#"{{"name": "adrift", "gravity": [0, 0],
+            "bars": [{{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}},
+                     {{"name": "b", "mass": 2, "centre": [0.2, 0], "inertia": 0.1, "length": 0.5}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "a", "point": [1, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "torsion_springs": [{{"name": "D", "body": "a", "stiffness": 0, "free_angle": 0, "damping": {damping}}}],
+            "start": {{"a": {{"phi": 0.3, "omega": 0}}, "b": {{"phi": 1, "omega": 0}}}}, "until": 1, "every": 1}}"#
+        ));
+        let found = found(&scene, 8);
+        assert_eq!(found.starts[0], found.starts[1]);
+        for one in &found.equilibria {
+            assert!(one.is_family && one.stability == Stability::Stable, "{one:?}");
+            assert!(one.modes[..2].iter().all(|mode| mode.eigenvalue == [0.0, 0.0]), "{one:?}");
+            assert_eq!(one.modes.len(), if damping > 0.0 { 3 } else { 2 }, "{one:?}");
+        }
+    }
+}
+
 /// Where a torsion spring counts turns, positions a turn apart are two: all roots of the balance of torques are
 /// found, each as it is.
 #[test]

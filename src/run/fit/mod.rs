@@ -307,7 +307,7 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
         let text = format!("{}: has no column {missing}\nhint: there are: {}", data.source, known.join(", "));
         return Err(FitError::Data(text));
     }
-    for ((name, _), unit) in data.columns.iter().zip(&data.units) {
+    for (k, (name, _)) in data.columns.iter().enumerate() {
         if !request.columns.is_empty() && !request.columns.contains(name) {
             continue;
         }
@@ -319,7 +319,8 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
                 return Err(FitError::Data(text));
             }
             Ok(bound) => {
-                check_unit(unit.as_deref(), &bound.unit).map_err(|(what, hint)| {
+                let unit = data.units.get(k).and_then(Option::as_deref);
+                check_unit(unit, &bound.unit).map_err(|(what, hint)| {
                     let text = format!("{}: line 1, column {name}: {what}\nhint: {hint}", data.source);
                     FitError::Data(text)
                 })?;

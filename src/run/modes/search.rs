@@ -260,6 +260,9 @@ fn slack(stiffness: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
 fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, held: &DMatrix<f64>) -> Vec<Complex<f64>> {
     let (f, r) = (held.nrows(), held.ncols());
     if damping.amax() == 0.0 {
+        if r == 0 {
+            return Vec::new();
+        }
         let squares = (held.transpose() * stiffness * held).complex_eigenvalues();
         let root = |square: &Complex<f64>| {
             // Real where rounding made a pair of two that are equal.
