@@ -58,8 +58,8 @@ fn tight() -> Tolerance {
 }
 
 #[test]
-fn one_to_four_bodies_agree_with_double_double() {
-    for bars in 1..=4 {
+fn one_to_six_bodies_agree_with_double_double() {
+    for bars in 1..=6 {
         let scenes: Vec<Scene> = (0..9).map(|i| chain(bars, 0.05 * i as f64)).collect();
         let mechanisms: Vec<_> = scenes.iter().map(compile).collect();
         let starts: Vec<State> =

@@ -154,9 +154,7 @@ def main():
             continue
         problem = driftless.ask("problem", scene)
         codes = [Ours(driftless, "taylor", order) for order in (16, 20, 24)]
-        # Lanes take four free bodies at most.
-        if scene != "chain6":
-            codes += [Ours(driftless, "batch", order) for order in (16, 20, 24)]
+        codes += [Ours(driftless, "batch", order) for order in (16, 20, 24)]
         codes += [Heyoka(problem, batch) for batch in (1, 4, 8)]
         settings = [setting(code, target) for code in codes]
         times = [[] for _ in codes]

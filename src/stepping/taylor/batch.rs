@@ -1,5 +1,5 @@
-//! Many trajectories at once, one a lane: ensembles of up to four free bodies, with springs or without, or of
-//! two of which one is driven; and ensembles of mechanisms of one structure, any hinge tree, with closed loops
+//! Many trajectories at once, one a lane: ensembles of up to six free bodies, or four with springs, or of two
+//! of which one is driven; and ensembles of mechanisms of one structure, any hinge tree, with closed loops
 //! or without.
 //!
 //! Nothing ever crosses from lane to lane, so that a trajectory has the same bits whoever its neighbours are;
@@ -45,8 +45,9 @@ use std::sync::{Arc, OnceLock};
 
 /// Largest order there is room for.
 const MOST: usize = 24;
-/// Largest number of bodies.
-const BODIES: usize = 4;
+/// Largest number of bodies, and of those with springs.
+const BODIES: usize = 6;
+const SPRUNG: usize = 4;
 /// Largest number of springs.
 const SPRINGS: usize = 8;
 
@@ -171,9 +172,9 @@ impl Batch {
         Taylor::new(Tolerance { relative: self.tolerance, absolute: self.tolerance })
     }
 
-    /// True for what it can integrate: one to four bodies with hinges and centres of mass on their axes,
-    /// beside gravity at most eight springs and dampers that are no formulas, neither motors nor walls; or
-    /// two bodies without springs, one of them driven from the ground by a law that is no formula.  No event
+    /// True for what it can integrate: one to six bodies with hinges and centres of mass on their axes under
+    /// gravity, or up to four with at most eight springs and dampers that are no formulas, neither motors nor
+    /// walls; or two bodies without springs, one of them driven from the ground by a law that is no formula.  No event
     /// ends the motion.
     pub fn takes(mechanism: &Mechanism) -> bool {
         !mechanism.has_stops() && Self::takes_with_stops(mechanism)
@@ -182,7 +183,8 @@ impl Batch {
     /// The same with events that end the motion, which [`BatchObserver::ahead`] looks for.
     pub(crate) fn takes_with_stops(mechanism: &Mechanism) -> bool {
         let springs = mechanism.springs.len();
-        let is_of_few = (1..=BODIES).contains(&mechanism.tree.coordinates) && springs <= SPRINGS;
+        let most = if springs == 0 { BODIES } else { SPRUNG };
+        let is_of_few = (1..=most).contains(&mechanism.tree.coordinates) && springs <= SPRINGS;
         goes_on(mechanism)
             && (is_of_few && free::fits(mechanism) || driven::fits(mechanism) || swinging::fits(mechanism))
     }
@@ -262,6 +264,7 @@ impl Batch {
                 )*};
             }
             try_teams!(FreeTeam<1, false>, FreeTeam<2, false>, FreeTeam<3, false>, FreeTeam<4, false>);
+            try_teams!(FreeTeam<5, false>, FreeTeam<6, false>);
             try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
             try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
             members[next].stopped = Some(unsuited(&members[next]));

@@ -1,4 +1,4 @@
-//! Up to four free bodies, with springs or without: the equation of `bodies` with the lanes over trajectories
+//! Up to six free bodies, four with springs: the equation of `bodies` with the lanes over trajectories
 //! instead of bodies.
 
 use super::series::{expand, finish};
