@@ -340,6 +340,11 @@ fn kinematics_leaves_a_table_charts_and_a_record() {
 fn a_start_is_drawn_and_so_is_what_comes_closest() {
     let program = Program::with_scenes(&["four_bar_motor"]);
     program.run("check four_bar_motor.json --chart start.png").exits(0).says(&["drawn in start.png"]);
+    program.run("check four_bar_motor.json --chart start.bmp").exits(2).says(&[
+        "start.bmp",
+        ".png, .svg or .pdf",
+        "hint: ",
+    ]);
     program
         .run("check four_bar_motor.json --set bars.coupler.length=0.9 --set hinges.C.between[0].point[0]=3 --chart open.png")
         .exits(3)
@@ -447,6 +452,7 @@ fn parts_of_a_sweep_join_to_its_very_bytes() {
         .says(&["parts 2, 5 of 5 missing", "--shard 2/5"]);
     program.run(&format!("merge {} --out few", named[0])).exits(6).says(&["parts 2, 3, 4, 5 of 5 missing"]);
     program.run("merge one --out few").exits(6).says(&["one holds no part of a sweep", "--shard"]);
+    program.run("merge free.json --out few").exits(6).says(&["free.json is a file", "hint: "]);
     program.run("merge nowhere --out few").exits(6).says(&["nowhere is not there", "hint: "]);
     // All are found from the folder above that of the scene.
     program.run("merge parts --out above -q").exits(0);

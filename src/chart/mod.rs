@@ -96,7 +96,7 @@ pub enum ChartError {
         px_per_pt: f64,
     },
     /// The file's name tells no format.
-    #[error("{}: a chart's file ends in .png, .svg or .pdf", path.display())]
+    #[error("{}: a chart's file ends in .png, .svg or .pdf\nhint: --chart start.png", path.display())]
     Format {
         /// The file.
         path: PathBuf,

@@ -202,8 +202,12 @@ impl From<SweepError> for Failure {
 #[cfg(feature = "charts")]
 impl From<crate::chart::ChartError> for Failure {
     fn from(error: crate::chart::ChartError) -> Self {
-        let exit =
-            if matches!(error, crate::chart::ChartError::Write { .. }) { Exit::Io } else { Exit::Other };
+        use crate::chart::ChartError;
+        let exit = match error {
+            ChartError::Write { .. } => Exit::Io,
+            ChartError::Format { .. } => Exit::Usage,
+            _ => Exit::Other,
+        };
         Self::new(exit, error.to_string())
     }
 }

@@ -94,6 +94,12 @@ fn part_folders(given: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
                 folder.display()
             )));
         }
+        if !folder.is_dir() {
+            return Err(refused(format!(
+                "{} is a file\nhint: name the folder of a part, or one that holds parts",
+                folder.display()
+            )));
+        }
         let mut inside = inside(folder).map_err(failed)?;
         // Further down, in a folder of scenes whose folders hold those of sweeps.
         for _ in 0..2 {
