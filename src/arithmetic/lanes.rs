@@ -62,7 +62,7 @@ pub trait Signed: Arithmetic {
     fn neg(self) -> Self;
     /// True where every lane is at most `bound` in magnitude; false where one is not a number.
     fn are_within(self, bound: f64) -> bool;
-    /// A function of two lanes, lane by lane.
+    /// A function of several numbers with as many results, lane by lane.
     fn each<const N: usize>(lanes: [Self; N], f: fn([f64; N]) -> [f64; N]) -> [Self; N];
 }
 

@@ -49,7 +49,7 @@ pub trait EightLanes: Slots + Signed {
     fn bits_above(self, other: Self) -> Self;
     /// The whole numbers below.
     fn floor(self) -> Self;
-    /// These from 1 to 2 times 2 to a whole power from -1000 to 1000.
+    /// Numbers from 1 to 2, times 2 to the power of whole numbers from -1000 to 1000.
     fn times_power(self, exponent: Self) -> Self;
 }
 

@@ -174,8 +174,8 @@ impl Batch {
 
     /// True for what it can integrate: one to six bodies with hinges and centres of mass on their axes under
     /// gravity, or up to four with at most eight springs and dampers that are no formulas, neither motors nor
-    /// walls; or two bodies without springs, one of them driven from the ground by a law that is no formula.  No event
-    /// ends the motion.
+    /// walls; or two bodies without springs, one of them driven from the ground by a law that is no formula.
+    /// No event ends the motion.
     pub fn takes(mechanism: &Mechanism) -> bool {
         !mechanism.has_stops() && Self::takes_with_stops(mechanism)
     }
