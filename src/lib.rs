@@ -10,8 +10,10 @@
 //!
 //! # fn main() -> Result<(), driftless::Error> {
 //! let scene = read_scene("examples/scenes/motor.json".as_ref(), &[])?;
-//! let outcome = Simulation::new(&scene)?.method(MethodId::Taylor).tolerance(1e-15, 1e-15).until(5.0).every(0.5).run_with(|sample| {
-//!     println!("{:4.1} s: second bar at {:7.3} rad, torque {:6.3} N m", sample.t, sample.phi[1], sample.motors[0][0]);
+//! let run = Simulation::new(&scene)?.method(MethodId::Taylor).tolerance(1e-15, 1e-15).until(5.0).every(0.5);
+//! let outcome = run.run_with(|sample| {
+//!     let (t, phi, torque) = (sample.t, sample.phi[1], sample.motors[0][0]);
+//!     println!("{t:4.1} s: second bar at {phi:7.3} rad, torque {torque:6.3} N m");
 //!     Ok(())
 //! })?;
 //! // The energy balance is kept to thirteen digits, and the motor's angle to the last.

@@ -22,6 +22,8 @@ use std::collections::BTreeSet;
 
 /// Longest line of prose, in characters.
 const WIDTH: usize = 110;
+/// Most lines of a source.
+const LONGEST_FILE: usize = 450;
 /// From here on a page is written by a program, whose lines are as long as its tables.
 const GENERATED: [&str; 3] =
     ["<!-- What follows is written by", "<!-- Generated from", "Written by `TABLE=1"];
@@ -211,6 +213,31 @@ fn lines_are_short() {
             assert!(width <= WIDTH, "{}:{number}: {width} characters", page.name);
         }
     }
+}
+
+/// Of the sources as well, and no file of them is long.
+#[test]
+fn sources_have_short_lines_and_short_files() {
+    let mut folders = vec![std::path::PathBuf::from("src")];
+    let mut count = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder of sources") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "rs") {
+                let text = std::fs::read_to_string(&path).expect("a source");
+                for (number, line) in (1..).zip(text.lines()) {
+                    let width = line.chars().count();
+                    assert!(width <= WIDTH, "{}:{number}: {width} characters", path.display());
+                }
+                let lines = text.lines().count();
+                assert!(lines <= LONGEST_FILE, "{}: {lines} lines", path.display());
+                count += 1;
+            }
+        }
+    }
+    assert!(count > 400, "{count} files");
 }
 
 #[test]

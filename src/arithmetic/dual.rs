@@ -1,7 +1,8 @@
 //! Dual numbers: a value and its derivatives in `D` directions at once, exact to rounding.
 //!
 //! ```text
-//! (a, a') + (b, b') = (a + b, a' + b'),     (a, a') (b, b') = (a b, a b' + a' b),     f(a, a') = (f(a), f'(a) a')
+//! (a, a') + (b, b') = (a + b, a' + b'),     (a, a') (b, b') = (a b, a b' + a' b),
+//!     f(a, a') = (f(a), f'(a) a')
 //! ```
 //!
 //! The equations of motion evaluated on them are their own Jacobian.  There are two kinds, with the same

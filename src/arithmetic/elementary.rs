@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! exp x = 2^k (1 + p)^512,   x = k ln 2 + 512 r,   p = exp r - 1 by its series;    (1 + p)² - 1 = 2 p + p²
-//! ln x = y + x exp(-y) - 1,  y = ln of the leading part                            one Newton step: 1e-16 becomes 1e-32
+//! ln x = y + x exp(-y) - 1,  y = ln of the leading part
+//!     one Newton step: 1e-16 becomes 1e-32
 //! tanh x = p / (p + 2),      p = exp(2 x) - 1
 //! atan2(y, x) = a + (y cos a - x sin a) / (x cos a + y sin a),  a = that of the leading parts
 //! ```

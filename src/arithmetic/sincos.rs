@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! phi = q π/2 + r + low, |r| <= π/4;   cos r = 1 - r²/2 + r⁴ C(r²),   sin r = r + r³ S(r²)
-//! m = q - 4 [q/4] = -2…2:   cos phi = (1 - |m|) cos r - m (2 - |m|) sin r,   sin phi = (1 - |m|) sin r + m (2 - |m|) cos r
+//! m = q - 4 [q/4] = -2…2:   cos phi = (1 - |m|) cos r - m (2 - |m|) sin r,
+//!     sin phi = (1 - |m|) sin r + m (2 - |m|) cos r
 //! ```
 //!
 //! π/2 is taken off in three parts.  The first product loses nothing: its difference to phi is a multiple of

@@ -232,7 +232,8 @@ impl<'a> Task<'a> {
         let found = planned(&self.source, growth, within, has_loops, mean)?;
         if !self.flags.scene.tell.quiet {
             message(&format!(
-                "the runs part at t = {reached:.6} s: begun again from the start with more digits, since no later state is known well enough"
+                "the runs part at t = {reached:.6} s: begun again from the start with more digits, since no \
+                    later state is known well enough"
             ));
         }
         self.tell(&found);
@@ -383,7 +384,8 @@ impl<'a> Task<'a> {
         checkpoints.remove()?;
         let parted = summary.parted.map(|t| {
             let text = format!(
-                "the path is known up to t = {:.6} s, not up to {} s: the runs part at t = {t:.6} s\nhint: --within a larger distance, or an earlier time",
+                "the path is known up to t = {:.6} s, not up to {} s: the runs part at t = {t:.6} s\nhint: \
+                    --within a larger distance, or an earlier time",
                 summary.t,
                 self.flags.digits.trusted_until.unwrap_or_default()
             );

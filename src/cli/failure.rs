@@ -100,7 +100,8 @@ impl Failure {
 
     /// `{"kind", "exit_code", "message", "details"}`.
     pub fn object(&self) -> Value {
-        json!({"kind": self.exit.kind(), "exit_code": self.exit as u8, "message": self.message, "details": self.details})
+        json!({"kind": self.exit.kind(), "exit_code": self.exit as u8, "message": self.message,
+            "details": self.details})
     }
 
     /// Says it and chooses the exit code.

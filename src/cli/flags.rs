@@ -35,7 +35,8 @@ Exit codes: 0 done, 1 other failure, 2 usage, 3 scene refused, 4 integration sto
 
 /// Simulates planar mechanisms over long horizons, and tells how far they drift.
 #[derive(Debug, Parser)]
-#[command(name = "driftless", version, max_term_width = 100, after_help = EXIT_CODES, disable_help_subcommand = true)]
+#[command(name = "driftless", version, max_term_width = 100, after_help = EXIT_CODES,
+    disable_help_subcommand = true)]
 pub struct Flags {
     #[allow(missing_docs)]
     #[command(subcommand)]
@@ -176,12 +177,16 @@ const SIGNS: &str = "\
 Signs, in the directions of the ground, torques counter-clockwise:
   hinge, weld      force of the first body of `between` on the second, also where the ground is second
   slider           force across the rail on the body of its `point`
-  motor, lock      torque on its `body`; of a motor on a slider, force along the rail on the body of the slider's `point`
-  NAME.angle       torque of a weld on the second body, of a locked slider on the body of its `point`; on the other body
+  motor, lock      torque on its `body`; of a motor on a slider, force along the rail on the body of the \
+  slider's `point`
+  NAME.angle       torque of a weld on the second body, of a locked slider on the body of its `point`; on \
+  the other body
                    where that is the ground
   power            what the motor feeds in
-A force or torque is minus the multiplier of its constraint; `on` and `from` name both bodies.  Where constraints are
-redundant, forces that rigid bodies leave open are named as indeterminate; those shown are the ones of least norm.";
+A force or torque is minus the multiplier of its constraint; `on` and `from` name both bodies.  Where \
+constraints are
+redundant, forces that rigid bodies leave open are named as indeterminate; those shown are the ones of least \
+norm.";
 
 /// `driftless inspect`.
 #[derive(Debug, Args)]
@@ -211,7 +216,8 @@ pub struct RunFlags {
     /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30
     /// % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations
     /// than --max-evaluations)
-    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(), help_heading = "Trust")]
+    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(),
+        help_heading = "Trust")]
     pub trust: Level,
     #[allow(missing_docs)]
     #[cfg(feature = "digits")]
@@ -224,11 +230,13 @@ pub struct RunFlags {
     pub inputs: bool,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the
     /// tolerance explains, 0.01 of the largest energy there has been at most]
-    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true,
+        help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
     /// Stop with exit code 5 where a constraint is off by more, in rad or m, or that per second [default:
     /// 0.01 rad, or sizes of the mechanism, in position]
-    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true,
+        help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/METHOD-SETTING` is made
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
@@ -266,7 +274,8 @@ pub struct RunFlags {
     /// Show this part of the run in charts, animations and pages, in seconds [default: of charts all of it or
     /// as much as can be told apart, of animations the beginning]
     #[cfg(feature = "charts")]
-    #[arg(long, value_name = "FROM..TO", value_parser = window, allow_hyphen_values = true, help_heading = "Files")]
+    #[arg(long, value_name = "FROM..TO", value_parser = window, allow_hyphen_values = true,
+        help_heading = "Files")]
     pub window: Option<[f64; 2]>,
 }
 

@@ -85,7 +85,8 @@ fn moment(
         (None, Some(event)) if outcome.last.t < until * (1.0 - 1e-9) => {
             let reached = outcome.last.t;
             let text = format!(
-                "--at {at}: the event {event} ends the motion at t = {reached} s\nhint: --at {event}, or an earlier time"
+                "--at {at}: the event {event} ends the motion at t = {reached} s\nhint: --at {event}, or an \
+                    earlier time"
             );
             Err(Failure::new(Exit::Usage, text))
         }

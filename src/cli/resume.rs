@@ -60,7 +60,8 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
     if saved.version != env!("CARGO_PKG_VERSION") {
         let (theirs, ours) = (&saved.version, env!("CARGO_PKG_VERSION"));
         message(&format!(
-            "the run was begun by driftless {theirs}, this is {ours}: its end may differ in the last digits from one run by either alone"
+            "the run was begun by driftless {theirs}, this is {ours}: its end may differ in the last digits \
+                from one run by either alone"
         ));
     }
     if let (Some(max_evaluations), Work::Run(snapshot)) = (flags.max_evaluations, &mut saved.work) {
@@ -76,7 +77,8 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
         #[cfg(feature = "digits")]
         (Command::Run(mut run), Work::Digits(_)) => {
             if flags.until.is_some() || flags.max_evaluations.is_some() {
-                let text = "--until and --max-evaluations: a run in many digits goes on as it was begun\nhint: leave them out";
+                let text = "--until and --max-evaluations: a run in many digits goes on as it was \
+                    begun\nhint: leave them out";
                 return Err(Failure::new(Exit::Usage, text));
             }
             run.scene.tell = flags.tell.clone();

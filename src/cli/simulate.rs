@@ -87,7 +87,8 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
         return super::digits::run(flags, arguments);
     }
     if flags.inputs && flags.trust == Level::Off {
-        let text = "--inputs with --trust off: effects are told up to the horizon, which is not estimated then\nhint: leave --trust out";
+        let text = "--inputs with --trust off: effects are told up to the horizon, which is not estimated \
+            then\nhint: leave --trust out";
         return Err(Failure::new(Exit::Usage, text));
     }
     let text = read_text(&flags.scene.scene)?;

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! of all points that touch and do not move along their normals:
-//! a_c >= 0,    f_c = -lambda_c >= 0,    a_c f_c = 0          a = a0 - S lambda,  S = G M⁻¹ Gᵀ,  the mechanism's rows always in force
+//! a_c >= 0,    f_c = -lambda_c >= 0,    a_c f_c = 0
+//!     a = a0 - S lambda,  S = G M⁻¹ Gᵀ,  the mechanism's rows always in force
 //! ```
 //!
 //! A contact that lasts is a row like any other as long as it presses, and does no work; what dry friction
@@ -29,7 +30,8 @@ pub const REST_HEIGHT: f64 = 1e-11;
 /// Contact force over the force of the contact below which a point is not pressed; rounding makes forces of
 /// this size.
 const LEAST_PRESSURE: f64 = 4e-12;
-/// |G| over the levers of the point below which it stands at a dead centre: there its wall has no hold on it, and a row would be singular.
+/// |G| over the levers of the point below which it stands at a dead centre: there its wall has no hold on it,
+/// and a row would be singular.
 const DEAD_CENTRE: f64 = 1e-5;
 
 impl Mechanism {
@@ -119,8 +121,8 @@ impl Mechanism {
 }
 
 impl Contact {
-    /// True where its wall has no hold on the point, as the gradient of the gap by all coordinates has this square
-    /// \[m²\].
+    /// True where its wall has no hold on the point, as the gradient of the gap by all coordinates has this
+    /// square \[m²\].
     pub(crate) fn is_dead(&self, gradient_squared: f64) -> bool {
         let levers: f64 = self.point.terms.iter().map(|term| term.1.norm_squared()).sum();
         self.point.shifts.is_empty() && gradient_squared < DEAD_CENTRE * DEAD_CENTRE * levers

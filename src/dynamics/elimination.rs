@@ -1,7 +1,8 @@
 //! The mechanism with its driven angles eliminated: coordinates u with q = S u + s(t).
 //!
 //! ```text
-//! Sᵀ M S u'' = Sᵀ (b - M s''),      (Gᵀ lambda)_i = b_i - Σ M_ij a_j,      power of all motors = -(b - M a)·s'
+//! Sᵀ M S u'' = Sᵀ (b - M s''),      (Gᵀ lambda)_i = b_i - Σ M_ij a_j,
+//!     power of all motors = -(b - M a)·s'
 //! ```
 //!
 //! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly,

@@ -11,8 +11,8 @@ use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Real, Scalar};
 use crate::scene::Scene;
 
-/// Share of the energy that gravity on free bodies and applied forces can bring below which what is there at the
-/// start does not count.
+/// Share of the energy that gravity on free bodies and applied forces can bring below which what is there at
+/// the start does not count.
 const LEAST_SCALE: f64 = 1e-3;
 
 /// Energies at one moment \[J\].
@@ -261,8 +261,9 @@ impl Mechanism {
     }
 
     /// Work of gravity from hanging to horizontal, Σ |weight_k|, plus kinetic and spring energy at the start
-    /// \[J\].  Where all of these are less than a thousandth of it, that of gravity on free bodies and of applied
-    /// forces along the size of the mechanism, and of torques over 1 rad; 1 J where these are zero, too.
+    /// \[J\].  Where all of these are less than a thousandth of it, that of gravity on free bodies and of
+    /// applied forces along the size of the mechanism, and of torques over 1 rad; 1 J where these are zero,
+    /// too.
     pub fn scale_of_energy(&self, start: &Motion) -> f64 {
         let mut kernel = Kernel::<DoubleDouble>::without_rows(self);
         let kinetic = self.energy(&mut kernel, &start.phi, &start.omega).kinetic.hi;

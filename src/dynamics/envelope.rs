@@ -1,7 +1,8 @@
 //! Symmetric matrices whose rows begin late: L D Lᵀ inside the envelope, where there is no fill-in beyond it.
 //!
 //! ```text
-//! row i holds columns first_i … i:   g_ij = a_ij - Σ_k g_ik l_jk,   l_ij = g_ij / d_j,   d_i = a_ii - Σ_j g_ij l_ij
+//! row i holds columns first_i … i:   g_ij = a_ij - Σ_k g_ik l_jk,   l_ij = g_ij / d_j,
+//!     d_i = a_ii - Σ_j g_ij l_ij
 //! ```
 //!
 //! Source: A. Jennings, *A compact storage scheme for the solution of symmetric linear simultaneous

@@ -2,9 +2,11 @@
 //! numbers, four directions at once.
 //!
 //! ```text
-//! a(t, q, w):      A_q = da/dq,  A_w = da/dw,  a_t = da/dt                    rows by multipliers included (index 1)
+//! a(t, q, w):      A_q = da/dq,  A_w = da/dw,  a_t = da/dt
+//!     rows by multipliers included (index 1)
 //! y = (q, w, W):   y' = (w, a, P)       dy'/dy = [0 1 0; A_q A_w 0; P_q P_w 0]
-//! q = S u + s(t):  u'' = R a            U_u = R A_q S,  U_v = R A_w S         R takes the rows of the independent coordinates
+//! q = S u + s(t):  u'' = R a
+//!     U_u = R A_q S,  U_v = R A_w S         R takes the rows of the independent coordinates
 //! ```
 //!
 //! The last line holds because given angles keep their rows whatever the independent coordinates do.

@@ -345,7 +345,8 @@ mod tests {
         ) {
             let t = Time::sum(hi, part * f64::EPSILON * hi.abs());
             let sines = vec![Sine { amplitude, frequency: 0.7 * rate + 1.0, phase: start }];
-            let law = Law { start, rate, acceleration: 0.0, sines: if amplitude == 0.0 { Vec::new() } else { sines }, profile: None };
+            let sines = if amplitude == 0.0 { Vec::new() } else { sines };
+            let law = Law { start, rate, acceleration: 0.0, sines, profile: None };
             let exact = law.at::<DoubleDouble>(t);
             let plain = law.at::<f64>(t);
             // The sine itself is rounded.
@@ -354,7 +355,8 @@ mod tests {
             prop_assert!(off(plain.unit.re, exact.unit.re) < 0.9e-16 + slack, "{plain:?} {exact:?}");
             prop_assert!(off(plain.unit.im, exact.unit.im) < 0.9e-16 + slack, "{plain:?} {exact:?}");
             let turned = (exact.angle - DoubleDouble::of(plain.angle)).reduced().0.hi;
-            prop_assert!(turned.abs() < 2.3e-16 + slack && plain.angle.abs() < std::f64::consts::PI * (1.0 + 1e-15), "{plain:?} {exact:?}");
+            prop_assert!(turned.abs() < 2.3e-16 + slack, "{plain:?} {exact:?}");
+            prop_assert!(plain.angle.abs() < std::f64::consts::PI * (1.0 + 1e-15), "{plain:?} {exact:?}");
             prop_assert!(off(plain.rate, exact.rate) <= 1e-14 * (1.0 + rate.abs()));
             prop_assert_eq!(law.rates::<f64>(t), (plain.rate, plain.acceleration));
         }
@@ -368,7 +370,8 @@ mod tests {
             let t = Time::sum(hi, part * f64::EPSILON * hi.abs());
             let found = Reduced::new(t, rate, 0.3);
             let exact = DoubleDouble::of(0.3) + t.scale(rate);
-            let whole = DoubleDouble::PI.ldexp(0.5).scale(found.quarter as f64) + DoubleDouble::sum(found.high, found.low);
+            let quarters = DoubleDouble::PI.ldexp(0.5).scale(found.quarter as f64);
+            let whole = quarters + DoubleDouble::sum(found.high, found.low);
             let error = (exact - whole).reduced().0.hi.abs();
             // Far away the reference itself has so many digits only: 1e-31 of 4e14 rad.
             let bound = if exact.hi.abs() < 6e9 { 1e-18 } else { 1e-16 };

@@ -2,22 +2,23 @@
 //!
 //! ```text
 //! M(q) a + G(q,t)ᵀ lambda = b(t,q,w)        [N m]      n equations of motion, one a coordinate
-//! G(q,t) a                = -gamma(t,q,w)   [rad/s²]   one row per constraint C(q,t) = 0, differentiated twice
+//! G(q,t) a                = -gamma(t,q,w)   [rad/s²]
+//!     one row per constraint C(q,t) = 0, differentiated twice
 //! Baumgarte replaces gamma by gamma + 2 alpha C' + beta² C
 //! ```
 //!
 //! | letter | name in code | meaning | unit | shape | file |
 //! | --- | --- | --- | --- | --- | --- |
-//! | q | `phi` | absolute angles of the bodies, from +x, counter-clockwise; then x and y of translational coordinates that move freely | rad, m | n | here, [`forest`] |
+//! | q | `phi` | angles from +x; then free translational coordinates | rad, m | n | here, [`forest`] |
 //! | w | `omega` | their rates q' | rad/s, m/s | n | here |
-//! | z | `z` | elements: unit vectors exp(i q), and translational coordinates x + iy at the place of their x | 1, m | n | [`forest`] |
+//! | z | `z` | elements: unit vectors exp(i q), and x + iy of what moves freely | 1, m | n | [`forest`] |
 //! | M | `mass` | mass matrix, `M_ij = Re(conj(z_i) H_ij z_j)` | kg m² | n × n | [`tree`] |
 //! | b | `load` | velocity terms, gravity, springs, dampers, applied forces | N m | n | [`tree`], [`force`] |
 //! | C | `position` | a constraint's violation | rad, m | rows | [`constraint`] |
 //! | G | `jacobian` | dC/dq | 1, m | rows × n | [`constraint`] |
 //! | C_t | `drive` | dC/dt at fixed q; C' = G w + C_t | rad/s, m/s | rows | [`constraint`] |
 //! | gamma | `convective` | what is left of C'' at a = 0 | rad/s², m/s² | rows | [`constraint`] |
-//! | lambda | `multiplier` | generalized force of a row is `-G_kᵀ lambda_k`; a motor's torque is `-lambda` | N m, N | rows | [`multiplier`] |
+//! | lambda | `multiplier` | a row's force is `-G_kᵀ lambda_k` | N m, N | rows | [`multiplier`] |
 //!
 //! **Everything planar is a sum of unit vectors.**  In a tree of hinged bodies every point is `P = p0 + Σ
 //! gamma_k z_k` with complex constants ([`point`]), so the constant Hermitian matrix `H_ij = Σ_m m_m

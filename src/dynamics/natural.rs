@@ -3,11 +3,14 @@
 //!
 //! ```text
 //! D z'' + Σ_k mu_k z_k + Σ_r lambda_r g_r = F(z)            [N m, N]   D = H + diag(I), Hermitian, constant
-//! (|z_k|² - 1) / 2             = 0                          one row per body, gradient z_k; none for an origin
+//! (|z_k|² - 1) / 2             = 0
+//!     one row per body, gradient z_k; none for an origin
 //! c + Σ g_k·z_k                = 0                          pins, lines of the ground, locked angles: linear
-//! C(z, t)                      = 0                          slots, travels, motors, locked relative angles: module `guide`;
+//! C(z, t)                      = 0
+//!     slots, travels, motors, locked relative angles: module `guide`;
 //!                                                           gears and cams: module `coupling`
-//! W = D⁻¹ less the linear rows (module `reduced`),   S_pq = g_p·W g_q,   S mu = g·W F + convective terms,   z'' = W (F - g mu)
+//! W = D⁻¹ less the linear rows (module `reduced`),   S_pq = g_p·W g_q,   S mu = g·W F + convective terms,
+//!     z'' = W (F - g mu)
 //! ```
 //!
 //! No sine, no cosine and no velocity term but those of the rows; gravity is a constant force, a force f at a

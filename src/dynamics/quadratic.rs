@@ -1,7 +1,8 @@
 //! A quadratic function of the mechanism's elements, with everything a constraint equation asks of it.
 //!
 //! ```text
-//! Q = c + Σ g_k·e_k + Σ Re(conj(e_j) h_jk e_k)                              e: unit vectors z_k, and translational coordinates zeta that move freely
+//! Q = c + Σ g_k·e_k + Σ Re(conj(e_j) h_jk e_k)
+//!     e: unit vectors z_k, and translational coordinates zeta that move freely
 //! gradient on e_k:  g_k + Σ_j conj(h_jk) e_j + Σ_j h_kj e_j                 dQ = Σ gradient_k·de_k
 //! Q' = Σ gradient_k·e_k',   Q'' = Σ gradient_k·e_k'' + 2 Σ Re(conj(e_j') h_jk e_k')
 //! e' = i z w, e'' = i z a - z w² of a unit vector;  e' = zeta', e'' = zeta'' of an origin

@@ -1,7 +1,8 @@
 //! The rank of constraints: a property of their Jacobian, whatever the masses are.
 //!
 //! ```text
-//! A = G D Gᵀ = L P Lᵀ,   share of constraint r:  P_r / Σ_k b_rk d_k,   |g_rk|² <= b_rk          D: d_k = 1 / max_r b_rk / max_j (b_rj d_j)
+//! A = G D Gᵀ = L P Lᵀ,   share of constraint r:  P_r / Σ_k b_rk d_k,   |g_rk|² <= b_rk
+//!     D: d_k = 1 / max_r b_rk / max_j (b_rj d_j)
 //! ```
 //!
 //! Pivots of S = G M⁻¹ Gᵀ are small where constraints lose their independence, and where members are light or

@@ -6,11 +6,14 @@
 //! found from the outermost bodies inwards; then the accelerations follow outwards.
 //!
 //! ```text
-//! u_k = i z_p r_k                           lever of hinge k about the hinge of its parent p: O_k' = O_p' + u_k w_p
+//! u_k = i z_p r_k
+//!     lever of hinge k about the hinge of its parent p: O_k' = O_p' + u_k w_p
 //! n_k = n_p + i u_k w_p²,  n_ground = -g    hinge acceleration where no coordinate accelerates, less gravity
-//! h_k = i m z_k c_k,   f_k = m n_k + i h_k w_k²,   t_k = Q_k - h_k·n_k          of the body alone, with the generalized force Q on its angle
+//! h_k = i m z_k c_k,   f_k = m n_k + i h_k w_k²,   t_k = Q_k - h_k·n_k
+//!     of the body alone, with the generalized force Q on its angle
 //!
-//! inwards:   B = m + Σ A_j,   h = h_k + Σ A_j u_j,   d = I + m |c|² + Σ u_j·A_j u_j,   f = f_k + Σ b_j,   e = t_k - Σ u_j·b_j
+//! inwards:   B = m + Σ A_j,   h = h_k + Σ A_j u_j,   d = I + m |c|² + Σ u_j·A_j u_j,   f = f_k + Σ b_j,
+//!     e = t_k - Σ u_j·b_j
 //!            A_k = B - h hᵀ/d,   b_k = f + h e/d
 //! outwards:  alpha_k = (e - h·a_k)/d,   a_j = a_k + u_j alpha_k,   a_ground = 0
 //! ```

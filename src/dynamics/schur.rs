@@ -1,7 +1,8 @@
 //! Factors of S = G M⁻¹ Gᵀ that survive singular positions and redundant rows.
 //!
 //! ```text
-//! S = L D Lᵀ,   share of row r:  D_r / Σ_k |g_rk|²/d_k         about the square of how far the mechanism is from a singular position
+//! S = L D Lᵀ,   share of row r:  D_r / Σ_k |g_rk|²/d_k
+//!     about the square of how far the mechanism is from a singular position
 //! ```
 //!
 //! Where a mechanism has all its links in line, rows lose their independence: pivots fall with the square of

@@ -4,7 +4,8 @@
 //! z_k(t) = Σ z_k,m t^m, w_k(t) = Σ w_k,m t^m (not wrapped, t from the step's start), with z' = i w z:
 //! known z_0…z_{m+1}, w_0…w_m:
 //!   f_m+1 = Σ_{j=0..m} w_j z_{m+1-j},  u_m = (m+1) i f_m+1      z'' without its newest term i a_m z_0
-//!   R_m  = Σ_j H_kj u_j,m - F_k,m                               forces F: gravity (m = 0 only), springs, dampers, rows
+//!   R_m  = Σ_j H_kj u_j,m - F_k,m
+//!       forces F: gravity (m = 0 only), springs, dampers, rows
 //!   M_0 a_m = -Σ_{l=0..m} Im(conj(z_l) R_{m-l})                 one factorization of M_0 for all orders
 //!   w_{m+1} = a_m/(m+1),  z_{m+2} = i (f_m+1 + w_{m+1} z_0)/(m+2),  R_m += H i a_m z_0
 //! ```

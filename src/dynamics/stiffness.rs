@@ -2,8 +2,10 @@
 //! or damper makes it.
 //!
 //! ```text
-//! y = (r q, w), r² = |A_q|:      dy'/dy = [0 r; A_q/r A_w],      fastest = |lambda|, decay = -Re lambda of the largest lambda
-//! a spring along g:  gamma = g (M⁻¹ - X S⁻¹ Xᵀ) gᵀ,      lambda² + c gamma lambda + k gamma = 0,      E = k s²/2 + s'²/(2 gamma)
+//! y = (r q, w), r² = |A_q|:      dy'/dy = [0 r; A_q/r A_w],
+//!     fastest = |lambda|, decay = -Re lambda of the largest lambda
+//! a spring along g:  gamma = g (M⁻¹ - X S⁻¹ Xᵀ) gᵀ,      lambda² + c gamma lambda + k gamma = 0,
+//!     E = k s²/2 + s'²/(2 gamma)
 //! ```
 //!
 //! gamma is how much a force along the spring accelerates it, with all rows in force; its mode alone decays

@@ -4,7 +4,8 @@
 //! ```text
 //! p_ij = conj(z_i) H_ij z_j = A cos(q_j-q_i) - B sin(q_j-q_i) + i (A sin(q_j-q_i) + B cos(q_j-q_i))
 //! M_ij = Re p_ij, M_ii = d_i;        b_i += w_j² Im p_ij,  b_j -= w_i² Im p_ij   for i < j
-//! origin f, coordinates x and y:  p_if = conj(z_i) H_if,  M_ix = Im p_if, M_iy = Re p_if, M_xx = M_yy = d_f;   b_x + i b_y += w_i² conj(p_if)
+//! origin f, coordinates x and y:  p_if = conj(z_i) H_if,  M_ix = Im p_if, M_iy = Re p_if, M_xx = M_yy = d_f;
+//!     b_x + i b_y += w_i² conj(p_if)
 //! ```
 //!
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand

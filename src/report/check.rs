@@ -47,6 +47,7 @@ fn left_out(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Vec<&'static s
 /// The report as one JSON object.
 pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
     let names = |names: Vec<&str>| json!(names);
+    let dampers = scene.springs.iter().filter(|spring| spring.damping != 0.0);
     let mut object = json!({
         "scene": scene.name,
         "description": scene.description,
@@ -57,7 +58,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "hinges": names(scene.hinges[..scene.own_hinges()].iter().map(|hinge| hinge.name.as_str()).collect()),
         "motors": names(scene.motors.iter().map(|motor| motor.name.as_str()).collect()),
         "springs": names(scene.springs.iter().map(|spring| spring.name.as_str()).collect()),
-        "dampers": names(scene.springs.iter().filter(|spring| spring.damping != 0.0).map(|spring| spring.name.as_str()).collect()),
+        "dampers": names(dampers.map(|spring| spring.name.as_str()).collect()),
         "walls": names(scene.walls.iter().map(|wall| wall.name.as_str()).collect()),
         "off_axis": mechanism.tree.off_axis,
         "left_out": left_out(scene, mechanism, plan),
@@ -88,7 +89,8 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
 /// How the start was found, as one JSON object.
 pub(super) fn assembly(mechanism: &Mechanism) -> Value {
     let Assembly { changes, singular, conditioning, .. } = &mechanism.assembly;
-    json!({"changes": changes, "redundant": mechanism.redundant(), "singular": singular, "conditioning": conditioning})
+    json!({"changes": changes, "redundant": mechanism.redundant(), "singular": singular,
+        "conditioning": conditioning})
 }
 
 /// Degrees of freedom, rows that say nothing new, and what of the start is not as given.

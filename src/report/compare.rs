@@ -18,11 +18,14 @@ use serde_json::{Value, json};
 pub fn object(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Value {
     let front = comparison.front();
     let truth = &comparison.truth;
+    let rows = comparison.entries.iter().enumerate().map(|(k, entry)| row(entry, front.contains(&k)));
+    let advice = comparison.advice();
+    let advice = advice.iter().map(|advice| recommendation(comparison, advice));
     json!({
         "scene": scene.name,
         "until": comparison.until,
         "energy_kind": Drift::new(mechanism, comparison.until).kind,
-        "rows": comparison.entries.iter().enumerate().map(|(k, entry)| row(entry, front.contains(&k))).collect::<Vec<_>>(),
+        "rows": rows.collect::<Vec<_>>(),
         "reference": {
             "how": truth.how,
             "until": truth.until,
@@ -30,7 +33,7 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> 
             "accuracy": if truth.until > 0.0 { Some(truth.accuracy) } else { None },
             "times": truth.marks().collect::<Vec<_>>(),
         },
-        "recommendations": comparison.advice().iter().map(|advice| recommendation(comparison, advice)).collect::<Vec<_>>(),
+        "recommendations": advice.collect::<Vec<_>>(),
         "notes": comparison.notes,
         "complete": comparison.is_whole,
         "wall_s": comparison.wall.as_secs_f64(),
@@ -174,8 +177,10 @@ fn duration(seconds: f64) -> String {
 
 /// The rows as a table for spreadsheets, with units in its head; what was not measured is empty.
 pub fn csv(comparison: &Comparison) -> String {
-    const HEAD: &str = "method,setting,stabilize,status,error [rad],rate_error [rad/s],energy_drift [1],constraint_drift [rad or m],\
-                        constraint_rate_drift [rad/s or m/s],wall [s],wall_spread [s],evaluations,steps,rejected,pareto\n";
+    const HEAD: &str = "method,setting,stabilize,status,error [rad],rate_error [rad/s],energy_drift \
+        [1],constraint_drift [rad or m],\
+                        constraint_rate_drift [rad/s or m/s],wall [s],wall_spread \
+                        [s],evaluations,steps,rejected,pareto\n";
     let front = comparison.front();
     let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:e}"));
     let mut text = HEAD.to_owned();

@@ -225,7 +225,8 @@ impl Shown<'_> {
 pub fn forecast(forecast: &Forecast, until: f64) -> String {
     let Forecast { growth, run, companion, steps, seconds, .. } = forecast;
     format!(
-        "errors grow by {growth:.1} digits up to t = {until} s: {} digits at order {} and, beside them, {} at order {}; about {steps} steps, {} s of computing",
+        "errors grow by {growth:.1} digits up to t = {until} s: {} digits at order {} and, beside them, {} \
+            at order {}; about {steps} steps, {} s of computing",
         run.digits,
         run.order,
         companion.digits,
@@ -301,7 +302,8 @@ fn holds(pair: &Pair, layout: &Layout) -> Option<Value> {
     let first: Vec<Value> = (holds.iter().take(super::events::NAMED))
         .map(|(LongHold { wall, t, until }, agreement)| {
             let text = |t: &Wide| decimal(t, layout.digits(*agreement));
-            json!({"wall": wall, "t": text(t), "until": until.as_ref().map(text), "agreement_digits": agreement})
+            json!({"wall": wall, "t": text(t), "until": until.as_ref().map(text),
+                "agreement_digits": agreement})
         })
         .collect();
     Some(json!({"count": holds.len(), "first": first}))

@@ -40,7 +40,8 @@ pub fn geometry(scene: &Scene, mechanism: &Mechanism) -> Value {
     let sliders: Vec<Value> = (scene.sliders.iter())
         .map(|slider| {
             let rail = slider.rail.place.bar;
-            json!({"at": place(&slider.point), "rail": at(rail, Complex::new(slider.rail.direction[0], slider.rail.direction[1]))})
+            json!({"at": place(&slider.point),
+                "rail": at(rail, Complex::new(slider.rail.direction[0], slider.rail.direction[1]))})
         })
         .collect();
     let walls: Vec<Value> =

@@ -9,9 +9,9 @@
 //! | slider | force across the rail | the body of its `point` | the body of its `rail` |
 //! | rigid spring | force | the first body in `between` | the second |
 //! | motor, lock | torque | its `body` | what `relative_to` names, else the ground |
-//! | motor on a slider | force along the rail, positive in its direction | the body of the slider's `point` | that of the rail |
-//! | weld's `NAME.angle` | torque | the second body, or the first where the second is the ground | the other |
-//! | locked slider's `NAME.angle` | torque | the body of its `point`, or of the rail where that is of the ground | the other |
+//! | motor on a slider | force along the rail | the body of the slider's `point` | that of the rail |
+//! | weld's `NAME.angle` | torque | the second body, or the first if that is the ground | the other |
+//! | locked slider's `NAME.angle` | torque | that of its `point`, or else of the rail | the other |
 //! | wall | impulse along the normal | its `body` | the ground |
 //!
 //! Forces are in the directions of the ground, torques counter-clockwise; each body that is named `from` gets
@@ -292,7 +292,8 @@ impl Inspection {
             .collect();
         let hinges: Map<String, Value> = (self.hinges.iter())
             .map(|hinge| {
-                let told = json!({"force": hinge.force, "on": hinge.on, "from": hinge.from, "determinate": hinge.is_determinate});
+                let told = json!({"force": hinge.force, "on": hinge.on, "from": hinge.from,
+                    "determinate": hinge.is_determinate});
                 (hinge.name.clone(), told)
             })
             .collect();
@@ -323,7 +324,8 @@ impl Inspection {
             "constraints": constraints,
             "motors": motors,
             "hinges": hinges,
-            "energy": {"kinetic": kinetic, "potential": potential, "total": kinetic + potential, "scale": self.energy_scale},
+            "energy": {"kinetic": kinetic, "potential": potential, "total": kinetic + potential,
+                "scale": self.energy_scale},
             "walls": walls,
         });
         if !self.outputs.is_empty() {

@@ -81,7 +81,11 @@ pub fn text(found: &Kinematics) -> String {
     );
     page.entry("positions", &counted(found.positions.len() as u64, "position", "positions"));
     if found.is_turn && found.limits.is_empty() && !found.is_closed {
-        page.entry("", "after the turn the mechanism is not where it was: it needs more turns, or has changed its branch");
+        page.entry(
+            "",
+            "after the turn the mechanism is not where it was: it needs more turns, or has \
+            changed its branch",
+        );
     }
     for Limit { drive, in_line, is_fold } in &found.limits {
         let kind = if *is_fold { "the range ends" } else { "no way on was found" };

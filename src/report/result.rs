@@ -32,10 +32,14 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Value 
             .collect();
     let stabilizer = (!mechanism.constraints.is_empty())
         .then(|| json!({"energy_j": drift.stabilizer, "max_j": drift.stabilizer_max}));
-    let impacts = (!mechanism.contacts.is_empty())
-        .then(|| json!({"count": outcome.impact_count, "energy_lost_j": outcome.impact_loss, "first": outcome.impacts}));
-    let holds = (!mechanism.contacts.is_empty())
-        .then(|| json!({"count": outcome.persistent_contact_count, "time_s": outcome.persistent_contact_time, "first": outcome.holds}));
+    let impacts = (!mechanism.contacts.is_empty()).then(|| {
+        json!({"count": outcome.impact_count, "energy_lost_j": outcome.impact_loss,
+            "first": outcome.impacts})
+    });
+    let holds = (!mechanism.contacts.is_empty()).then(|| {
+        json!({"count": outcome.persistent_contact_count, "time_s": outcome.persistent_contact_time,
+            "first": outcome.holds})
+    });
     let (trend, trend_error) = drift.energy.trend();
     let mut object = json!({
         "scene": scene.name,

@@ -17,9 +17,10 @@ use serde_json::{Value, json};
 pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
     let axes = sweep.grid().axes().iter().zip(sweep.variables());
     let vary: Vec<Value> = axes
-        .map(
-            |(axis, variable)| json!({"path": variable.path, "unit": variable.unit, "from": axis.from, "to": axis.to, "count": axis.count}),
-        )
+        .map(|(axis, variable)| {
+            json!({"path": variable.path, "unit": variable.unit, "from": axis.from,
+                "to": axis.to, "count": axis.count})
+        })
         .collect();
     let plan = sweep.plan();
     let mut object = json!({

@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 /// where there is no figure.
 pub fn object(trust: Option<&Trust>) -> Value {
     let Some(trust) = trust else {
-        return json!({"error_estimate": null, "horizon_s": null, "how": How::None.word(), "why": "not asked for"});
+        return json!({"error_estimate": null, "horizon_s": null, "how": How::None.word(), "why": "not asked \
+            for"});
     };
     let from = match trust.how {
         How::Extrapolated(from) => Some(from),
@@ -174,7 +175,8 @@ fn beyond(mechanism: &Mechanism, outcome: &Outcome, horizon: f64) -> String {
     };
     let holds = if mechanism.constraints.is_empty() { "still holds" } else { "still hold" };
     format!(
-        "After {} s read the path as a typical motion of the scene, not as the motion of this start. {kept} (drift {}){rows} {holds}; use averages and \
+        "After {} s read the path as a typical motion of the scene, not as the motion of this start. {kept} \
+            (drift {}){rows} {holds}; use averages and \
          distributions, not angles at a time.",
         rough(horizon),
         magnitude(drift.energy.max)

@@ -2,9 +2,11 @@
 //! its tolerance explains.
 //!
 //! ```text
-//! limit = min(1e-2, 20 (N + 10) e),   e = (s + a_w) / E   with errors at the tolerance in every unknown:  d_q = atol + rtol |q| + 1e-14,  d_w likewise
+//! limit = min(1e-2, 20 (N + 10) e),   e = (s + a_w) / E
+//!     with errors at the tolerance in every unknown:  d_q = atol + rtol |q| + 1e-14,  d_w likewise
 //! s = sqrt(E) (Σ r_i d_wi + Σ R d_q) + Σ |W_i| d_q + (Σ r_i |w_i|)² d_q,    a_w = atol E + rtol |work|
-//! r_i = sqrt(2 M_ii),   R = sqrt(2 k) (Σ |gamma|),   M_ii, W_i, gamma: inertia, weights and levers, see `dynamics::tree`
+//! r_i = sqrt(2 M_ii),   R = sqrt(2 k) (Σ |gamma|),
+//!     M_ii, W_i, gamma: inertia, weights and levers, see `dynamics::tree`
 //! absolute tolerances are in the mechanism's own units of length and time
 //! ```
 //!

@@ -39,14 +39,16 @@ impl ContactDriver {
         let name = events.name(event).to_owned();
         let (is_from_outside, at) = (events.is_from_outside(event), events.switch_function(event));
         if std::mem::take(&mut events.memory.slides) {
-            let hint = "sliding along such a surface is not integrated: let the law pass zero smoothly, as tanh(x/0.01) instead of sign(x)";
+            let hint = "sliding along such a surface is not integrated: let the law pass zero smoothly, as \
+                tanh(x/0.01) instead of sign(x)";
             return Err(StepError {
                 cause: Cause::Sliding,
                 method: outcome.plan.method.to_string(),
                 t: self.motion().time.hi,
                 step: 0.0,
                 what: format!(
-                    "a formula of `{name}` changes its branch here, and on both branches the motion is driven back"
+                    "a formula of `{name}` changes its branch here, and on both branches the motion is \
+                        driven back"
                 ),
                 hint: hint.into(),
             });
@@ -137,7 +139,8 @@ impl ContactDriver {
                 return Err(refused(
                     self,
                     format!("switches `{part}`"),
-                    "name a spring, torsion spring, force, torque, wall, or a hinge, motor or lock that the scene switches",
+                    "name a spring, torsion spring, force, torque, wall, or a hinge, motor or lock that the \
+                        scene switches",
                 ));
             }
         };

@@ -4,7 +4,8 @@
 //! "driftless checkpoint\n"   21 bytes
 //! format                     4 bytes, little-endian
 //! length of the content      8 bytes, little-endian
-//! content                    postcard: doubles as their eight bytes, so that what goes on is what stopped, bit for bit
+//! content                    postcard: doubles as their eight bytes, so that what goes on is what stopped,
+//!     bit for bit
 //! SHA-256 of all before      32 bytes
 //! ```
 //!
@@ -56,7 +57,8 @@ pub enum CheckpointError {
         why: &'static str,
     },
     /// Another version of the program wrote it.
-    #[error("{} is of format {found}, and this program reads format {FORMAT}\nhint: resume it with the version of driftless that wrote it", file.display())]
+    #[error("{} is of format {found}, and this program reads format {FORMAT}\nhint: resume it with the \
+        version of driftless that wrote it", file.display())]
     Format {
         /// The file.
         file: PathBuf,
@@ -291,7 +293,8 @@ mod tests {
         fn no_bytes_make_the_reader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..200)) {
             // As they are, and as the content of a sound envelope.
             let _ = opened::<Content>(&bytes, Path::new("x"));
-            let mut sound = [MAGIC, &FORMAT.to_le_bytes(), &(bytes.len() as u64).to_le_bytes(), &bytes].concat();
+            let mut sound = [MAGIC, &FORMAT.to_le_bytes(), &(bytes.len() as u64).to_le_bytes(),
+                &bytes].concat();
             let digest = Sha256::digest(&sound);
             sound.extend_from_slice(&digest);
             let _ = opened::<Content>(&sound, Path::new("x"));

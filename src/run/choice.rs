@@ -3,14 +3,14 @@
 //! | asked | what decides | method |
 //! | --- | --- | --- |
 //! | 1 | extended orders | `taylor` has them |
-//! | 2 | dry friction | `taylor`, a third of the work of `radau9`, which is for damped modes that are stiff; `dp8` where matrices do not pay |
-//! | 3 | more coordinates than matrices pay for | `taylor`, body by body; `dop853`, `dp8` with rows, where there are no matrices at all |
+//! | 2 | dry friction | `taylor`; `radau9` for damped modes that are stiff; `dp8` where matrices do not pay |
+//! | 3 | more coordinates than matrices pay for | `taylor`; `dop853`, `dp8` with rows, without matrices |
 //! | 4 | a rigid spring that vibrates | `dp8`, `dop853`: its mean force is known to them |
 //! | 5 | walls | `dp8` locates impacts, `taylor` over long horizons; `radau9` where a damped mode is stiff |
 //! | 6 | a fixed step | `gauss16`, the most accurate of those |
 //! | 7 | a mode much faster than the rest that dies away | `radau5`, `radau9` below 1e-7 |
-//! | 8 | invariants asked for, without dampers | `taylor` with its first orders in double-double; `gauss16` where coordinates are many |
-//! | 9 | the path | `taylor`; `dop853` where Baumgarte's term is asked for, or coordinates are many and not taken body by body |
+//! | 8 | invariants asked for, without dampers | `taylor`, extended; `gauss16` where coordinates are many |
+//! | 9 | the path | `taylor`; `dop853` with Baumgarte's term, or of many coordinates not taken body by body |
 //!
 //! Everywhere else the series is the faster one at every tolerance measured: a seventh of the time of the
 //! classic pairs at 1e-6, a sixteenth at 1e-9. Over long horizons too: at 1e-15, which leaves rounding as
@@ -48,7 +48,8 @@ const LONG_TOLERANCE: f64 = 1e-13;
 
 /// Why the series is chosen where invariants were asked for: its first orders are then carried in
 /// double-double.
-const EXTENDED: &str = "invariants were asked for, and with its first orders in double-double its series keeps them best for the time";
+const EXTENDED: &str = "invariants were asked for, and with its first orders in double-double its series \
+    keeps them best for the time";
 
 /// What matters more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

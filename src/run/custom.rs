@@ -17,7 +17,8 @@ type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
 /// not is asked for steps that end on output times.
 ///
 /// ```
-/// use driftless::{Custom, OdeSystem, Integrator, Simulation, State, StepError, Statistics, Time, read_scene};
+/// use driftless::{Custom, Integrator, OdeSystem, Simulation, read_scene};
+/// use driftless::{State, Statistics, StepError, Time};
 ///
 /// /// Heun's method with a step of its own: order 2.
 /// struct Heun {
@@ -37,7 +38,13 @@ type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
 ///         Ok(())
 ///     }
 ///
-///     fn step(&mut self, problem: &mut P, state: &mut State, until: Time, statistics: &mut Statistics) -> Result<Option<usize>, StepError> {
+///     fn step(
+///         &mut self,
+///         problem: &mut P,
+///         state: &mut State,
+///         until: Time,
+///         statistics: &mut Statistics,
+///     ) -> Result<Option<usize>, StepError> {
 ///         let left = (until - state.time).hi;
 ///         let h = if left < 1.5 * self.step { left } else { self.step };
 ///         let (mut first, mut second) = (vec![0.0; state.y.len()], vec![0.0; state.y.len()]);

@@ -32,8 +32,8 @@ const FALLS: f64 = 0.3;
 /// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
 const PASSED: f64 = 1e-8;
-/// Part of what an output changes by in one unit of a coordinate or rate that is rounding: what is no more stays
-/// at zero.
+/// Part of what an output changes by in one unit of a coordinate or rate that is rounding: what is no more
+/// stays at zero.
 const ROUNDING: f64 = 1e-13;
 /// Variation up to which an output is constant, over its size.
 const CONSTANT: f64 = 1e-14;
@@ -298,8 +298,8 @@ impl ExtremesDetector {
         }
     }
 
-    /// Looks for the extremes of an output next to its least and its largest value at nodes, by golden sections
-    /// of the output itself: beside a corner the interpolant does not tell where they are.
+    /// Looks for the extremes of an output next to its least and its largest value at nodes, by golden
+    /// sections of the output itself: beside a corner the interpolant does not tell where they are.
     fn look_beside_nodes(
         &mut self,
         inside: &mut dyn Inside,
@@ -409,7 +409,8 @@ mod tests {
     fn rounding_of_an_output_is_not_looked_into() {
         let text = r#"{"name": "bar", "gravity": [0, 0], "outputs": {"one": "b.sin"},
             "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
-            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b",
+             "point": [0, 0]}]}],
             "start": {"b": {"phi": 0, "omega": 0}}, "until": 1, "every": 1}"#;
         let scene = parse_scene(text, "scene", &[]).expect("a scene");
         let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));

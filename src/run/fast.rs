@@ -82,8 +82,13 @@ impl FastMode {
         Err(Refusal {
             is_usage: false,
             what: format!("{} over {until} s", self.name()),
-            reason: format!("it oscillates at {rate:.1e} rad/s, {periods:.1e} periods until t = {until} s, about {:.1e} steps", self.steps),
-            alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --max-evaluations with the evaluations that may take"
+            reason: format!(
+                "it oscillates at {rate:.1e} rad/s, {periods:.1e} periods until t = {until} s, \
+                about {:.1e} steps",
+                self.steps
+            ),
+            alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --max-evaluations with \
+                the evaluations that may take"
                 .into(),
         })
     }
@@ -112,7 +117,8 @@ impl FastMode {
         Some(match method {
             MethodId::Radau(_) if share > EXCITED => {
                 format!(
-                    "{swing}; {method} takes its energy away, {share:.0e} of the scale, wherever its steps are longer than a period"
+                    "{swing}; {method} takes its energy away, {share:.0e} of the scale, wherever its steps \
+                        are longer than a period"
                 )
             }
             _ => format!("{swing}, about {:.1e} steps; energy in it {share:.0e} of the scale", self.steps),

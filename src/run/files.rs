@@ -62,19 +62,22 @@ pub(super) const UNFINISHED: &str = ".unfinished-";
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The folder holds a run already.
-    #[error("{} holds a run already\nhint: --force overwrites it, --out names another folder", folder.display())]
+    #[error("{} holds a run already\nhint: --force overwrites it, --out names another folder",
+        folder.display())]
     Occupied {
         /// The folder.
         folder: PathBuf,
     },
     /// The folder holds a run that can go on.
-    #[error("{} holds an interrupted run\nhint: `driftless resume {}` goes on with it, --force begins anew", folder.display(), quoted(folder))]
+    #[error("{} holds an interrupted run\nhint: `driftless resume {}` goes on with it, --force begins anew",
+        folder.display(), quoted(folder))]
     Interrupted {
         /// The folder.
         folder: PathBuf,
     },
     /// Somebody else is writing into the folder.
-    #[error("another run is writing into {}\nhint: wait for it, or name another folder with --out", folder.display())]
+    #[error("another run is writing into {}\nhint: wait for it, or name another folder with --out",
+        folder.display())]
     Busy {
         /// The folder.
         folder: PathBuf,
@@ -96,7 +99,8 @@ pub enum FileError {
         source: io::Error,
     },
     /// A file cannot be written.
-    #[error("cannot write {}: {source}\nhint: is the disk full, or the folder closed to you?", file.display())]
+    #[error("cannot write {}: {source}\nhint: is the disk full, or the folder closed to you?",
+        file.display())]
     File {
         /// The file.
         file: PathBuf,

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! positions unchanged;   gap = 0;   v_n⁺ = -e v_n⁻;   rates of the other constraints as before or zero
-//! D = Σ (m |Δv|² + J Δω²) / 2 over the bodies:      impulse (1+e) |v_n⁻| = 2 D,      energy lost = D (1-e) / (1+e)
+//! D = Σ (m |Δv|² + J Δω²) / 2 over the bodies:      impulse (1+e) |v_n⁻| = 2 D,
+//!     energy lost = D (1-e) / (1+e)
 //! ```
 //!
 //! With dry friction at the wall, p_t being its impulse: `p_n Δv_n + p_t Δv_t = 2 D`, energy lost
@@ -376,12 +377,17 @@ mod tests {
 
     /// A rod that falls on its lower end, and a cart that carries a driven arm against a stop.
     const SCENES: [&str; 2] = [
-        r#"{"name": "rod", "gravity": [0, -9.81], "bars": [{"name": "rod", "mass": 2, "centre": [0.5, 0], "inertia": 0.2, "length": 1}],
-            "walls": [{"name": "floor", "body": "rod", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.6}],
-            "start": {"rod": {"phi": 0.4, "omega": 1.1, "origin": [3, 0], "velocity": [0.3, -2]}}, "until": 1, "every": 1}"#,
-        r#"{"name": "cart", "gravity": [0, -9.81], "bars": [{"name": "cart", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.1},
+        r#"{"name": "rod", "gravity": [0, -9.81], "bars": [{"name": "rod", "mass": 2, "centre": [0.5, 0],
+         "inertia": 0.2, "length": 1}],
+            "walls": [{"name": "floor", "body": "rod", "point": [0, 0], "line": {"through": [0, 0],
+             "normal": [0, 1]}, "restitution": 0.6}],
+            "start": {"rod": {"phi": 0.4, "omega": 1.1, "origin": [3, 0], "velocity": [0.3, -2]}}, "until": 1,
+             "every": 1}"#,
+        r#"{"name": "cart", "gravity": [0, -9.81], "bars": [{"name": "cart", "mass": 2, "centre": [0, 0],
+         "inertia": 0.1, "length": 0.1},
                 {"name": "arm", "mass": 0.5, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6}],
-            "hinges": [{"name": "H", "between": [{"body": "cart", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]}],
+            "hinges": [{"name": "H", "between": [{"body": "cart", "point": [0, 0]}, {"body": "arm",
+             "point": [0, 0]}]}],
             "sliders": [{"name": "rail", "point": {"body": "cart", "point": [0, 0]},
                 "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "angle": "locked"}],
             "motors": [{"name": "motor", "body": "arm", "law": {"start": 0.7, "rate": -3}}],

@@ -3,10 +3,12 @@
 //!
 //! ```text
 //! C(q, t) = 0,   drive(q) = start + rate t                  by projection from q + q' h + q'' h²/2
-//! G q' = -C_t,   G q'' = -(C_t)' - G' q'                    multipliers, and with them forces, from the same solve
+//! G q' = -C_t,   G q'' = -(C_t)' - G' q'
+//!     multipliers, and with them forces, from the same solve
 //! limit:         q' without bound, 1/q'² -> 0 in proportion to what is left of the drive's range
 //! dead centre:   the rate of another body passes zero
-//! change point:  det G changes its sign: two ways of motion cross, and the one that goes straight on is taken
+//! change point:  det G changes its sign: two ways of motion cross,
+//!     and the one that goes straight on is taken
 //! ```
 //!
 //! Source: E. J. Haug, *Computer Aided Kinematics and Dynamics of Mechanical Systems* (1989), sections 3.6
@@ -14,6 +16,7 @@
 //! 3.7; the law at a limit is that of a fold, q - q* ~ |t - t*|^(1/2).
 
 mod drive;
+mod extremes;
 mod transmission;
 mod walk;
 

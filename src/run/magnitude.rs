@@ -6,8 +6,8 @@ use crate::dynamics::{Mechanism, Motion};
 /// Part of a unit by which coordinates and rates are moved.
 const BESIDE: f64 = 1.0 / 1024.0;
 
-/// What each of some functions changes by where one coordinate or rate moves by a unit, at most; as if it did so
-/// evenly.
+/// What each of some functions changes by where one coordinate or rate moves by a unit, at most; as if it did
+/// so evenly.
 pub(super) fn changes(
     mechanism: &Mechanism,
     motion: &Motion,

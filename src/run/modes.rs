@@ -7,13 +7,14 @@
 //! modes:         (s² - s T' A_w T - T' A_q T) y = 0                 damping ratio -Re s / |s|
 //! ```
 //!
-//! Directions with T' A_q T y = 0 lead to other equilibria.  Each has an eigenvalue of zero, taken out before the
-//! others are computed: of two that are the same, rounding would make a pair of the size of its root.
+//! Directions with T' A_q T y = 0 lead to other equilibria.  Each has an eigenvalue of zero, taken out before
+//! the others are computed: of two that are the same, rounding would make a pair of the size of its root.
 //!
 //! A_q and A_w are exact (dual numbers).  To first order the curvature of the constraints has no part in it,
 //! as a(q0, 0) = 0.  Source: L. Meirovitch, *Methods of Analytical Dynamics* (1970), sections 5.3 to 5.6.
 
 mod local;
+mod period;
 mod periodic;
 mod search;
 
@@ -42,8 +43,8 @@ const FEWEST: usize = 16;
 const LONGEST: f64 = 0.5;
 /// What is left of the accelerations over the largest there are counts as none.
 const STILL: f64 = 1e-11;
-/// What is left of the accelerations over the largest at the starts: beside a spring with a free length that has
-/// lost its length a slope is so large that any accelerations are small against it.
+/// What is left of the accelerations over the largest at the starts: beside a spring with a free length that
+/// has lost its length a slope is so large that any accelerations are small against it.
 const BALANCED: f64 = 1e-7;
 /// Two equilibria that differ by less are the same \[rad, or units of length\].
 const DISTINCT: f64 = 1e-6;
@@ -128,22 +129,26 @@ pub struct Modes {
 pub enum ModesError {
     /// Motors or forces change with time.
     #[error(
-        "`{0}` moves with time: there is no equilibrium\nhint: give it a constant law, or `driftless run` the scene"
+        "`{0}` moves with time: there is no equilibrium\nhint: give it a constant law, or `driftless run` \
+            the scene"
     )]
     Moving(String),
     /// Forces change with time.
     #[error(
-        "forces of the scene change with time: there is no equilibrium\nhint: leave them out, or `driftless run` the scene"
+        "forces of the scene change with time: there is no equilibrium\nhint: leave them out, or `driftless \
+            run` the scene"
     )]
     Forced,
     /// Integrals of controllers are unknowns of their own.
     #[error(
-        "the scene has integrals, whose equilibria are not looked for\nhint: leave the integral part of the controller out"
+        "the scene has integrals, whose equilibria are not looked for\nhint: leave the integral part of the \
+            controller out"
     )]
     Integrals,
     /// Transitions between sticking and sliding.
     #[error(
-        "small differences are not followed through the transitions of dry friction\nhint: leave the friction out"
+        "small differences are not followed through the transitions of dry friction\nhint: leave the \
+            friction out"
     )]
     Friction,
     /// No period is seen.
@@ -151,7 +156,8 @@ pub enum ModesError {
     PeriodUnknown(String),
     /// Not a period.
     #[error(
-        "{period} s is no period of {what}\nhint: `--period S` gives another one; for a motor at a constant rate it is one turn"
+        "{period} s is no period of {what}\nhint: `--period S` gives another one; for a motor at a constant \
+            rate it is one turn"
     )]
     NotPeriodic {
         /// The one asked for \[s\].
@@ -161,7 +167,8 @@ pub enum ModesError {
     },
     /// Motors determine the motion.
     #[error(
-        "the motors leave no freedom: the motion repeats itself after {0} s and has no multipliers\nhint: `driftless kinematics` shows it"
+        "the motors leave no freedom: the motion repeats itself after {0} s and has no multipliers\nhint: \
+            `driftless kinematics` shows it"
     )]
     Driven(f64),
     /// Nothing can move.

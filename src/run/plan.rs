@@ -335,7 +335,8 @@ fn cut_short(
     let reached = max_evaluations as f64 / (steps * fast::evaluations_a_step(method)) * until;
     (reached < until).then(|| {
         format!(
-            "{until} s take {method} up to {steps:.0e} steps, and {max_evaluations:.0e} evaluations are allowed: it may stop from about {reached:.0e} s on; \
+            "{until} s take {method} up to {steps:.0e} steps, and {max_evaluations:.0e} evaluations are \
+                allowed: it may stop from about {reached:.0e} s on; \
              {MORE_IS_ALLOWED}"
         )
     })

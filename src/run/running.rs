@@ -367,17 +367,18 @@ impl Running {
         let Statistics { steps, newton_steps, .. } = self.outcome.statistics;
         if newton_steps > 0 {
             let note = format!(
-                "{newton_steps} of {steps} steps found their stages by Newton's method: sweeps contract slowly there"
+                "{newton_steps} of {steps} steps found their stages by Newton's method: sweeps contract \
+                    slowly there"
             );
             self.outcome.plan.notes.push(note);
         }
         if self.outcome.drift.is_doubtful() {
             let how = if self.outcome.plan.step.is_some() { "a shorter step" } else { "a tighter tolerance" };
             let off = self.outcome.drift.energy_share;
-            self.outcome
-                .plan
-                .notes
-                .push(format!("the energy balance is off by {off:.1e} of its scale, and the motion may be off by more: try {how}"));
+            self.outcome.plan.notes.push(format!(
+                "the energy balance is off by {off:.1e} of its scale, and the motion may be \
+                    off by more: try {how}"
+            ));
         }
         self.outcome.trust = self.error_estimator.take().map(|error_estimator| {
             error_estimator.trust(self.outcome.last.t).with_model(self.outcome.plan.model_error)

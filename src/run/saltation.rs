@@ -2,16 +2,19 @@
 //! transitions of dry friction: neighbours come there earlier or later, by the saltation matrix.
 //!
 //! ```text
-//! dt = -(g_q dq + g_w dw + g_p dp) / g',     dq = dq⁻ + q'⁻ dt,   dw = dw⁻ + a⁻ dt      at the zero of g;      w⁺ = I(t, q, w⁻; p)
-//! dq⁺ = dq - q'⁺ dt,      dw⁺ = dI(dt, dq, dw, dp) - a⁺ dt                               a⁺ with what acts, sticks and is held from then on
-//! ds⁺ = dS(dt, dq, dw, dp)                                                               numbers s that an event sets
+//! dt = -(g_q dq + g_w dw + g_p dp) / g',     dq = dq⁻ + q'⁻ dt,   dw = dw⁻ + a⁻ dt      at the zero of g;
+//!     w⁺ = I(t, q, w⁻; p)
+//! dq⁺ = dq - q'⁺ dt,      dw⁺ = dI(dt, dq, dw, dp) - a⁺ dt
+//!     a⁺ with what acts, sticks and is held from then on
+//! ds⁺ = dS(dt, dq, dw, dp)
+//!     numbers s that an event sets
 //! ```
 //!
 //! g is the gap of a wall, the event function of a switch, or that of a place with friction: the relative
-//! velocity of what slides, `(mu0 N)² - tau²` of what sticks.  I is the law of impact, what a joint that closes
-//! does to the rates, or what is taken off them where a point comes to rest on a wall.  p are numbers that the
-//! mechanism depends on; neighbouring mechanisms tell what they do.  Derivatives along a column are central
-//! differences of the fourth order.
+//! velocity of what slides, `(mu0 N)² - tau²` of what sticks.  I is the law of impact, what a joint that
+//! closes does to the rates, or what is taken off them where a point comes to rest on a wall.  p are numbers
+//! that the mechanism depends on; neighbouring mechanisms tell what they do.  Derivatives along a column are
+//! central differences of the fourth order.
 //!
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
 //! Solitons & Fractals 5 (1995).
@@ -63,8 +66,8 @@ pub(super) struct Passage<'a> {
     pub set: &'a [usize],
     /// The neighbours of a column, by number, as they are after a jump.
     pub follow: &'a Follow<'a>,
-    /// How much later \[s\] each column comes to what has happened before at this very moment, if anything has:
-    /// what a jump makes happen at once, as a sign that an impact turns, comes with it.
+    /// How much later \[s\] each column comes to what has happened before at this very moment, if anything
+    /// has: what a jump makes happen at once, as a sign that an impact turns, comes with it.
     pub earlier: Option<&'a [f64]>,
 }
 
@@ -260,8 +263,8 @@ fn late_at_friction(
     })
 }
 
-/// How much later \[s\] a function of the motion is zero, or a jump at this moment has taken it across, column
-/// by column.
+/// How much later \[s\] a function of the motion is zero, or a jump at this moment has taken it across,
+/// column by column.
 fn late_with(
     passage: &Passage,
     here: &Side,

@@ -244,8 +244,10 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
         #[test]
-        fn numbers_are_written_as_the_standard_library_does(bits in any::<u64>(), near in -20.0..20.0f64, digits in 1u32..1000) {
-            for value in [f64::from_bits(bits), near, 10f64.powf(near), -10f64.powf(near), f64::from(digits) * 1e-7, f64::from(digits) * 1e14] {
+        fn numbers_are_written_as_the_standard_library_does(bits in any::<u64>(), near in -20.0..20.0f64,
+            digits in 1u32..1000) {
+            for value in [f64::from_bits(bits), near, 10f64.powf(near), -10f64.powf(near),
+                f64::from(digits) * 1e-7, f64::from(digits) * 1e14] {
                 let (ours, theirs) = (written(value), format!("{value:?}"));
                 // Of two shortest numbers equally near, either is right: ours ends on an even digit.
                 let is_tie = ours.len() == theirs.len() && ours.parse() == Ok(value);

@@ -168,9 +168,12 @@ mod tests {
 
     /// A ball over a floor, and where it is.
     fn ball() -> (Mechanism, BodyAngles) {
-        let scene = r#"{"name": "ball", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
-            "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]}, "restitution": 0.5}],
-            "start": {"ball": {"phi": 0, "omega": 0, "origin": [3, 1], "velocity": [0, 0]}}, "until": 1, "every": 1}"#;
+        let scene = r#"{"name": "ball", "gravity": [0, -9.81], "bars": [{"name": "ball", "mass": 1,
+         "centre": [0, 0], "inertia": 0.1}],
+            "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0],
+             "normal": [0, 1]}, "restitution": 0.5}],
+            "start": {"ball": {"phi": 0, "omega": 0, "origin": [3, 1], "velocity": [0, 0]}}, "until": 1,
+             "every": 1}"#;
         let scene = crate::scene::parse_scene(scene, "test", &[]).expect("a scene");
         let body_angles =
             BodyAngles { phi: vec![0.0, 3.0, 1.0], turns: vec![0; 3], omega: vec![0.0, 0.0, -2.0] };

@@ -38,7 +38,10 @@ pub fn on(bar: &str, point: [f64; 2]) -> Value {
 ///     .build()?;
 /// assert_eq!(scene.bars.len(), 2);
 /// // A name that is not there: the message says which, and what there is.
-/// let wrong = SceneBuilder::new("wrong").bar("upper", 0.6, 0.5).hinge("A", ground([0.0, 0.0]), on("uper", [0.0, 0.0])).build();
+/// let wrong = SceneBuilder::new("wrong")
+///     .bar("upper", 0.6, 0.5)
+///     .hinge("A", ground([0.0, 0.0]), on("uper", [0.0, 0.0]))
+///     .build();
 /// assert!(wrong.unwrap_err().to_string().contains("upper"));
 /// # Ok(())
 /// # }

@@ -3,8 +3,8 @@
 //! A scene that was read and judged in doubles is gone through once more, number by number, by the digits of
 //! its text: decimals, multiples and fractions of pi on a command line, formulas of parameters.  Formulas of
 //! time and state are kept as texts and read as exactly when the mechanism is compiled.  Points of tables are
-//! numbers of the text too; of those in files the shortest digits count that read as the same double.  Numbers
-//! may also be given beside the text, with derivatives that no text holds.
+//! numbers of the text too; of those in files the shortest digits count that read as the same double.
+//! Numbers may also be given beside the text, with derivatives that no text holds.
 
 mod laws;
 mod parts;

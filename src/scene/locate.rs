@@ -88,7 +88,8 @@ impl Source {
         let json = &self.texts[text].json;
         if json.trim().is_empty() {
             let span = self.span(text, 0, 0);
-            let hint = "a scene is a JSON object: {\"name\": …, \"bars\": […], …}; start from a file in examples/scenes/";
+            let hint = "a scene is a JSON object: {\"name\": …, \"bars\": […], …}; start from a file in \
+                examples/scenes/";
             return Err(self.refusal(span, "", "the file is empty", "must be a JSON object", hint));
         }
         if let Err(error) = serde_json::from_str::<IgnoredAny>(json) {

@@ -14,6 +14,7 @@ pub mod formula;
 mod friction;
 mod law;
 mod locate;
+mod names;
 mod number;
 mod output;
 mod plausible;
@@ -31,10 +32,8 @@ pub use build::{SceneBuilder, ground, on};
 pub use digits::Written;
 pub use error::{Refusal, SceneError};
 pub use friction::{Friction, FrictionPlace};
-pub use law::{
-    Bound, Direction, Integral, Load, LoadLaw, Meaning, NamedPoint, Names, Parameter, PointTable, SceneEvent,
-    Scope, Signal,
-};
+pub use law::{Direction, Integral, Load, LoadLaw, NamedPoint, Parameter, PointTable, SceneEvent, Signal};
+pub use names::{Bound, Meaning, Names, Scope};
 pub(crate) use number::Decimal;
 pub use number::{number, range};
 pub use output::{BoundOutput, Component, Output, OutputNames, Quantity, Source};

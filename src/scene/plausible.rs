@@ -42,7 +42,8 @@ impl Scene {
         (starts.chain(motors).chain(locks).chain(coils).filter(looks).take(MOST))
             .map(|(path, angle)| {
                 format!(
-                    "{path} is {angle} rad, {:.1} turns; if degrees are meant, write \"{angle}*pi/180\" or {:.6}",
+                    "{path} is {angle} rad, {:.1} turns; if degrees are meant, write \"{angle}*pi/180\" or \
+                        {:.6}",
                     angle / TAU,
                     angle.to_radians()
                 )

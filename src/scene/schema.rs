@@ -80,14 +80,17 @@ fn shape(of: &Shape) -> Value {
             let [least, most] = POINTS;
             let point = json!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2});
             let text = json!({"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT});
-            let columns = json!({"type": "object", "properties": {"file": text, "x": text, "y": text}, "required": ["file", "x", "y"], "additionalProperties": false});
+            let columns = json!({"type": "object", "properties": {"file": text, "x": text, "y": text},
+                "required": ["file", "x", "y"], "additionalProperties": false});
             let points = json!({"type": "array", "items": point, "minItems": least, "maxItems": most});
-            json!({"type": "object", "propertyNames": identifier(), "additionalProperties": {"anyOf": [points, text, columns]}})
+            json!({"type": "object", "propertyNames": identifier(),
+                "additionalProperties": {"anyOf": [points, text, columns]}})
         }
         Shape::Names => json!({"type": "array", "items": shape(&Shape::Name)}),
         Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),
         Shape::FolderName => {
-            json!({"type": "string", "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)})
+            json!({"type": "string",
+                "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)})
         }
         Shape::Text => json!({"type": "string", "maxLength": LONGEST_TEXT}),
         Shape::Word(words) => json!({"enum": words}),

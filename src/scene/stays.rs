@@ -38,7 +38,8 @@ pub fn points_that_stay(scene: &Scene, path: &str, length: Option<f64>) -> Optio
     let list = found.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ");
     let word = if found.len() == 1 { "point" } else { "points" };
     Some(format!(
-        "{path} does not move the {word} {list}{more}: {them} on the bar where the scene says; set or vary coordinates to move points"
+        "{path} does not move the {word} {list}{more}: {them} on the bar where the scene says; set or vary \
+            coordinates to move points"
     ))
 }
 

@@ -17,7 +17,10 @@ impl Scene {
         let body = |bar: Option<usize>| bar.map_or(GROUND, |bar| self.bars[bar].name.as_str());
         let place = |place: &Place| json!({"body": body(place.bar), "point": place.point});
         let bars: Vec<_> = (self.bars[..self.own_bars()].iter())
-            .map(|bar| json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre, "inertia": bar.inertia, "length": bar.length}))
+            .map(|bar| {
+                json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre,
+                "inertia": bar.inertia, "length": bar.length})
+            })
             .collect();
         let hinges: Vec<_> = self.hinges[..self.own_hinges()]
             .iter()
@@ -32,7 +35,8 @@ impl Scene {
                 let said = json!({
                     "name": name,
                     "point": place(point),
-                    "rail": {"body": body(rail.place.bar), "point": rail.place.point, "direction": rail.direction},
+                    "rail": {"body": body(rail.place.bar), "point": rail.place.point,
+                        "direction": rail.direction},
                     "angle": if *locked { "locked" } else { "free" },
                 });
                 with(said, "friction", &self.friction((Part::Slider, i)))
@@ -45,7 +49,8 @@ impl Scene {
             .collect();
         let locks: Vec<_> = (self.locks.iter())
             .map(|lock| {
-                let said = json!({"name": lock.name, "body": body(Some(lock.bar)), "relative_to": body(lock.relative_to)});
+                let said = json!({"name": lock.name, "body": body(Some(lock.bar)),
+                    "relative_to": body(lock.relative_to)});
                 with(said, "angle", &lock.angle)
             })
             .collect();
@@ -76,22 +81,32 @@ impl Scene {
         let forces: Vec<_> = (self.forces.iter())
             .map(|Force { name, bar, point, force, follows, law }| {
                 let frame = if *follows { "body" } else { "ground" };
-                let said = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force, "frame": frame});
+                let said = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force,
+                    "frame": frame});
                 with(said, "law", law)
             })
             .collect();
         let torques: Vec<_> = (self.torques.iter())
             .map(|Torque { name, bar, relative_to, torque, law }| {
-                let said = json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to), "torque": torque});
+                let said = json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to),
+                    "torque": torque});
                 with(said, "law", law)
             })
             .collect();
         let motors: Vec<_> = (self.motors.iter())
-            .map(|motor| json!({"name": motor.name, "body": body(Some(motor.bar)), "relative_to": body(motor.relative_to), "law": motor.law}))
-            .chain(self.drives.iter().map(|drive| json!({"name": drive.name, "slider": self.sliders[drive.slider].name, "law": drive.law})))
+            .map(|motor| {
+                json!({"name": motor.name, "body": body(Some(motor.bar)),
+                "relative_to": body(motor.relative_to), "law": motor.law})
+            })
+            .chain(self.drives.iter().map(|drive| {
+                json!({"name": drive.name,
+                "slider": self.sliders[drive.slider].name, "law": drive.law})
+            }))
             .chain(self.couplings.iter().map(|Coupling { name, coupled, aim }| match coupled {
-                Coupled::Angle { bar, relative_to } => json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to), "law": aim}),
-                Coupled::Travel(slider) => json!({"name": name, "slider": self.sliders[*slider].name, "law": aim}),
+                Coupled::Angle { bar, relative_to } => json!({"name": name, "body": body(Some(*bar)),
+                        "relative_to": body(*relative_to), "law": aim}),
+                Coupled::Travel(slider) => json!({"name": name, "slider": self.sliders[*slider].name,
+                    "law": aim}),
             }))
             .collect();
         let walls: Vec<_> = (self.walls.iter().enumerate())
@@ -152,7 +167,8 @@ impl Scene {
             self.parameters.iter().map(|one| (one.name.clone(), json!(one.value))).collect();
         put("parameters", Value::Object(parameters), !self.parameters.is_empty());
         let points: Vec<Value> = (self.points.iter())
-            .map(|NamedPoint { name, place }| json!({"name": name, "body": body(place.bar), "point": place.point}))
+            .map(|NamedPoint { name,
+                place }| json!({"name": name, "body": body(place.bar), "point": place.point}))
             .collect();
         put("points", points.into(), !self.points.is_empty());
         let tables: Map<String, Value> =
@@ -173,11 +189,13 @@ impl Scene {
             let (list, law) = match load {
                 Load::Force { bar, point, force, follows } => {
                     let frame = if *follows { "body" } else { "ground" };
-                    let law = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force, "frame": frame});
+                    let law = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force,
+                        "frame": frame});
                     ("forces", law)
                 }
                 Load::Torque { bar, relative_to, torque } => {
-                    let law = json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to), "torque": torque});
+                    let law = json!({"name": name, "body": body(Some(*bar)),
+                        "relative_to": body(*relative_to), "torque": torque});
                     ("torques", law)
                 }
                 Load::Spring { between, potential, tension } => {

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! position:  S dl = C,              q -= M⁻¹ Gᵀ dl      repeated until C stops falling
-//! velocity:  S dm = G w + C_t,      w -= M⁻¹ Gᵀ dm      with G, S and C_t at the new position and the new time
+//! velocity:  S dm = G w + C_t,      w -= M⁻¹ Gᵀ dm     all at the new position and time
 //! ```
 //!
 //! The shortest way in the metric of the mass matrix; small mechanisms with loops go it in natural
@@ -68,7 +68,8 @@ impl<M> Projected<M> {
         if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
             let row = mechanism.constraints[projector.kernel.weakest.row].name();
             let what = format!(
-                "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion left its branch"
+                "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion \
+                    left its branch"
             );
             return Err(stop(Cause::BranchLost, state, what, past_singular(name)));
         }
@@ -185,14 +186,13 @@ fn hint(mechanism: &Mechanism, kernel: &Kernel<f64>, method: &str) -> &'static s
 /// What to try where a singular position has not been passed.
 fn past_singular(method: &str) -> &'static str {
     if method == "taylor" {
-        "this position is singular: try another tolerance, --method dp8, or a start that does not lead through it"
+        "this position is singular: try another tolerance, --method dp8, or a start that goes elsewhere"
     } else {
         "this position is singular: try --method taylor, or another tolerance"
     }
 }
 
-/// Turns up to this \[rad\] are made without new sines, and without new factors of M and S: these change by
-/// as little.
+/// Turns up to this \[rad\] need no new sines, and no new factors of M and S, which change by as little.
 const SMALL: f64 = 1e-8;
 /// Violation, relative to levers and speeds, that a row left out may have.
 const LEFT_OUT: f64 = 1e-6;

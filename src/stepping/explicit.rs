@@ -1,7 +1,8 @@
 //! The adaptive driver shared by our own Dormand–Prince pairs: stages, step control, events.
 //!
 //! ```text
-//! k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ b_i k_i,    err = |h Σ e_i k_i| / (atol + rtol |y|)
+//! k_i = f(t + c_i h, y + h Σ_j a_ij k_j),    y⁺ = y + h Σ b_i k_i,
+//!     err = |h Σ e_i k_i| / (atol + rtol |y|)
 //! h⁺ = h · clamp(0.9 err^(-1/p), 1/3, 6)
 //! ```
 //!

@@ -10,7 +10,8 @@
 //! there.  In (q, w) the same coefficients are not symplectic.
 //!
 //! ```text
-//! L_j = h b_j f(t + c_j h, Y_j),      Y_i = y + Σ_j mu_ij L_j,      mu_ij = 1/2 + sigma_ij,  sigma_ij = -sigma_ji
+//! L_j = h b_j f(t + c_j h, Y_j),      Y_i = y + Σ_j mu_ij L_j,
+//!     mu_ij = 1/2 + sigma_ij,  sigma_ij = -sigma_ji
 //! y1  = y + Σ_j h b_j f(t + c_j h, Y_j)
 //! ```
 //!
@@ -250,7 +251,8 @@ impl Gauss {
             t: state.time.hi,
             step: self.scratch.step,
             what: format!(
-                "{whose} swings at {:.2e} rad/s, {radians:.1} rad a step, with {:.0e} of the energy scale in it",
+                "{whose} swings at {:.2e} rad/s, {radians:.1} rad a step, with {:.0e} of the energy scale in \
+                    it",
                 found.fastest, found.share
             ),
             hint: format!("a step of {:.1e} s follows it", 1.0 / found.fastest),

@@ -86,7 +86,8 @@ impl Statistics {
             t,
             step,
             what: format!("the maximum of {} evaluations is used up", self.max_evaluations),
-            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with --max-evaluations (of `resume` too)"
+            hint: "loosen the tolerance or lengthen the step, shorten the horizon, or allow more with \
+                --max-evaluations (of `resume` too)"
                 .into(),
         }
     }

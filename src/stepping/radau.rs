@@ -8,8 +8,9 @@
 //!
 //! ```text
 //! z_i = h Σ_j a_ij f(t + c_j h, y + z_j),      y1 = y + z_s
-//! simplified Newton:   (1 - h mu_k J) dw_k = l_k (h A F - Z),      dz = Σ r_k dw_k            one real mode, (s-1)/2 complex ones
-//! err = h mu_0 (1 - h mu_0 J)^-1 (f(y) + Σ e_i z_i / h)            a formula of order s; filtered once more after a rejection
+//! simplified Newton:   (1 - h mu_k J) dw_k = l_k (h A F - Z),      dz = Σ r_k dw_k     1 real mode
+//! err = h mu_0 (1 - h mu_0 J)^-1 (f(y) + Σ e_i z_i / h)
+//!     a formula of order s; filtered once more after a rejection
 //! ```
 //!
 //! Starting values are those of the last step's polynomial, which is also the solution inside a step.  The

@@ -76,7 +76,8 @@ impl Rattle {
 macro_rules! by_bodies {
     ($problem:expr, $state:expr, $object:ident $(. $part:ident)+ ($($argument:expr),*)) => {{
         let turns = $state.turns.len();
-        let (is_plain, bodies) = ($problem.guides().is_empty() && $problem.elements() == turns, if $problem.elements() == turns { turns } else { 0 });
+        let (is_plain, bodies) = ($problem.guides().is_empty() && $problem.elements() == turns,
+            if $problem.elements() == turns { turns } else { 0 });
         match (bodies, is_plain) {
             (1, true) => $object $(. $part)+::<1, false>($($argument),*),
             (2, true) => $object $(. $part)+::<2, false>($($argument),*),

@@ -243,8 +243,8 @@ fn bracketed(curve: &impl Curve, level: f64, mut low: f64, mut high: f64, falls:
         }
         t = next;
     }
-    // Where rounding leaves the same value at many places it goes from one to the next, and the other end of the
-    // bracket stays far off.
+    // Where rounding leaves the same value at many places it goes from one to the next, and the other end of
+    // the bracket stays far off.
     t
 }
 

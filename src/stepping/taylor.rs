@@ -190,7 +190,9 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
             if self.by_series
                 && self.expansion.as_ref().is_some_and(|expansion| singular::is_near(problem, expansion))
             {
-                let what = "the constraints are dependent here, and no way through the singular position is confirmed".into();
+                let what = "the constraints are dependent here, and no way through the singular position is \
+                    confirmed"
+                    .into();
                 return Err(stop(Cause::BranchLost, state, wanted, what, singular::HINT));
             }
             return Err(stop(

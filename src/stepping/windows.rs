@@ -15,8 +15,8 @@
 //! - Fixed-size vectors are 3 to 4 times faster than dynamic ones: chosen here by length.
 //! - What is between two rows is a shorter step from the first of them.
 //! - Rows cannot be changed while a window lasts: no projection, no walls.  `dp5` and `dp8` are for those.
-//! - A window may run into a pole of a law that the motion leaves before: its rows up to there are handed out,
-//!   and only if nobody changes the motion in them does the run stop.
+//! - A window may run into a pole of a law that the motion leaves before: its rows up to there are handed
+//!   out, and only if nobody changes the motion in them does the run stop.
 //!
 //! The step the crate found is passed on to the next window through the state's memory.
 
@@ -115,7 +115,8 @@ macro_rules! integrate {
 macro_rules! by_length {
     ($stepper:path, $window:expr, $y:expr, $span:expr, $settings:expr; $($d:literal)*) => {
         match $y.len() {
-            $($d => integrate!($stepper, $window, SVector::<f64, $d>::from_column_slice($y), $span, $settings),)*
+            $($d => integrate!($stepper, $window, SVector::<f64, $d>::from_column_slice($y), $span,
+                $settings),)*
             _ => integrate!($stepper, $window, DVector::from_column_slice($y), $span, $settings),
         }
     };

@@ -1,8 +1,10 @@
 //! Sine, cosine, exponential, logarithm and the angle of a vector, to all digits asked for.
 //!
 //! ```text
-//! sin, cos:  x = k π/2 + 2^j r,  v = cos r - 1 and s = sin r by their series,   s, v ← 2 s (1 + v), 2 v (2 + v)   j times
-//! exp:       x = k ln 2 + 2^j r, p = exp r - 1 by its series,                   p ← p (2 + p)                     j times
+//! sin, cos:  x = k π/2 + 2^j r,  v = cos r - 1 and s = sin r by their series,
+//!     s, v ← 2 s (1 + v), 2 v (2 + v)   j times
+//! exp:       x = k ln 2 + 2^j r, p = exp r - 1 by its series,                   p ← p (2 + p)
+//!     j times
 //! ln:        y ← y + x exp(-y) - 1;    atan2: a ← a + (y cos a - x sin a)/(x cos a + y sin a)
 //! π = 16 atan 1/5 - 4 atan 1/239 (J. Machin, 1706),   ln 2 = 18 atanh 1/26 - 2 atanh 1/4801 + 8 atanh 1/8749
 //! ```

@@ -1,7 +1,8 @@
 //! Power series as factors of Cauchy products: fixed point on a scaled time.
 //!
 //! ```text
-//! a_m U^m = (V_m - 1/2) 2^e,   0 <= V_m < 1      U = 2^unit seconds: coefficients hardly fall where U is near the radius of convergence
+//! a_m U^m = (V_m - 1/2) 2^e,   0 <= V_m < 1
+//!     U = 2^unit seconds: coefficients hardly fall where U is near the radius of convergence
 //! Σ_j a_j b_{M-j} = 2^(e_a + e_b) U^-M (Σ V V' - (Σ V + Σ V')/2 + n/4)
 //! ```
 //!

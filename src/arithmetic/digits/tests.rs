@@ -53,7 +53,8 @@ proptest! {
         let limbs = a.limbs().min(b.limbs());
         let scale = a.exponent.max(b.exponent);
         for (found, exact) in [(a + b, integer(&a) + integer(&b)), (a - b, integer(&a) - integer(&b))] {
-            prop_assert!(off(&found, &exact, scale.max(found.exponent), limbs) <= BigInt::from(1), "{a:?} {b:?} {found:?}");
+            prop_assert!(off(&found, &exact, scale.max(found.exponent), limbs) <= BigInt::from(1), "{a:?} \
+                {b:?} {found:?}");
             prop_assert!(found.limbs() == limbs || found.is_zero() || a.is_zero() || b.is_zero());
         }
     }
@@ -80,7 +81,8 @@ proptest! {
         let exact: BigInt = terms.iter().map(|(a, b)| (integer(a) * integer(b)) >> (64 * PLACES)).sum();
         let counted = || terms.iter().filter(|(a, b)| !a.is_zero() && !b.is_zero());
         let limbs = counted().map(|(a, b)| a.limbs().min(b.limbs())).min().unwrap_or(8);
-        let size: BigInt = counted().map(|(a, b)| (integer(&a.abs()) * integer(&b.abs())) >> (64 * PLACES)).sum();
+        let size = |(a, b): &(Number, Number)| (integer(&a.abs()) * integer(&b.abs())) >> (64 * PLACES);
+        let size: BigInt = counted().map(size).sum();
         // Of every term as much as of a single product.
         let off = BigInt::from((integer(&found) - exact).magnitude().clone());
         prop_assert!(off << (64 * (limbs - 1)) <= size * 10 + 10, "{found:?}");
@@ -117,9 +119,11 @@ proptest! {
             let found = factors[0].product(&factors[1], &scale, total, first..=total);
             let term = |j: usize| (integer(&a[j]) * integer(&b[total - j])) >> (64 * PLACES);
             let exact: BigInt = (first..=total).map(term).sum();
-            let off = (integer(&found) - &exact).bits() as f64 - 64.0 * f64::from(PLACES) + total as f64 * step;
+            let apart = (integer(&found) - &exact).bits() as f64;
+            let off = apart - 64.0 * f64::from(PLACES) + total as f64 * step;
             let allowed = 2.0 * largest.max(0.0) - bits as f64;
-            prop_assert!(off <= allowed || (integer(&found) - exact).bits() < 8, "{total}: 2^{off} > 2^{allowed}");
+            prop_assert!(off <= allowed || (integer(&found) - exact).bits() < 8, "{total}: 2^{off} > \
+                2^{allowed}");
         }
     }
 
@@ -167,31 +171,38 @@ fn published_constants_have_a_hundred_digits() {
     for (found, digits) in [
         (
             elementary::pi(),
-            "3.141592653589793238462643383279502884197169399375105820974944592307816406286208998628034825342117068",
+            "3.141592653589793238462643383279502884197169399375105820974\
+             944592307816406286208998628034825342117068",
         ),
         (
             one.exp(),
-            "2.718281828459045235360287471352662497757247093699959574966967627724076630353547594571382178525166427",
+            "2.718281828459045235360287471352662497757247093699959574966\
+             967627724076630353547594571382178525166427",
         ),
         (
             Number::whole(2).ln(),
-            "0.6931471805599453094172321214581765680755001343602552541206800094933936219696947156058633269964186875",
+            "0.693147180559945309417232121458176568075500134360255254120\
+             6800094933936219696947156058633269964186875",
         ),
         (
             one.sin_cos().0,
-            "0.8414709848078965066525023216302989996225630607983710656727517099919104043912396689486397435430526958",
+            "0.841470984807896506652502321630298999622563060798371065672\
+             7517099919104043912396689486397435430526958",
         ),
         (
             one.sin_cos().1,
-            "0.5403023058681397174009366074429766037323104206179222276700972553811003947744717645179518560871830893",
+            "0.540302305868139717400936607442976603732310420617922227670\
+             0972553811003947744717645179518560871830893",
         ),
         (
             one.tanh(),
-            "0.7615941559557648881194582826047935904127685972579365515968105001219532445766384834589475216736767144",
+            "0.761594155955764888119458282604793590412768597257936551596\
+             8105001219532445766384834589475216736767144",
         ),
         (
             Number::whole(2).sqrt(),
-            "1.414213562373095048801688724209698078569671875376948073176679737990732478462107038850387534327641572",
+            "1.414213562373095048801688724209698078569671875376948073176\
+             679737990732478462107038850387534327641572",
         ),
     ] {
         let expected = Number::from_decimal(digits).expect("digits");

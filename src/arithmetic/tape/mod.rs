@@ -116,8 +116,8 @@ pub struct Tape {
 }
 
 impl Tape {
-    /// The same formula with its constants as inputs, of which `input` gives the number; and where its results
-    /// are then.
+    /// The same formula with its constants as inputs, of which `input` gives the number; and where its
+    /// results are then.
     pub fn lifted(&self, mut input: impl FnMut(f64) -> u32) -> (Self, Vec<Slot>) {
         let (mut operations, mut new) = (Vec::with_capacity(self.operations.len()), Vec::<Slot>::new());
         for &operation in &self.operations {

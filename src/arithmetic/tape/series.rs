@@ -1,12 +1,15 @@
 //! A tape on power series in time, order by order.
 //!
 //! ```text
-//! c = a b:      c_m = Σ_{j=0..m} a_j b_{m-j}             c = a / b:   c_m = (a_m - Σ_{j=1..m} b_j c_{m-j}) / b_0
+//! c = a b:      c_m = Σ_{j=0..m} a_j b_{m-j}
+//!     c = a / b:   c_m = (a_m - Σ_{j=1..m} b_j c_{m-j}) / b_0
 //! c = sqrt a:   c_m = (a_m - Σ_{j=1..m-1} c_j c_{m-j}) / (2 c_0)
-//! c = exp a:    m c_m = Σ_{j=1..m} j a_j c_{m-j}         c = ln a:    c_m = (a_m - Σ_{j=1..m-1} j c_j a_{m-j} / m) / a_0
+//! c = exp a:    m c_m = Σ_{j=1..m} j a_j c_{m-j}
+//!     c = ln a:    c_m = (a_m - Σ_{j=1..m-1} j c_j a_{m-j} / m) / a_0
 //! s = sin a:    m s_m = Σ_{j=1..m} j a_j k_{m-j},  k = cos a:  m k_m = -Σ_{j=1..m} j a_j s_{m-j}
 //! c = tanh a:   m c_m = Σ_{j=1..m} j a_j v_{m-j},  v = 1 - c²
-//! c = atan2(y, x):  m r_0 c_m = Σ_{j=1..m} j (y_j x_{m-j} - x_j y_{m-j}) - Σ_{j=1..m-1} j c_j r_{m-j},  r = x² + y²
+//! c = atan2(y, x):  m r_0 c_m = Σ_{j=1..m} j (y_j x_{m-j} - x_j y_{m-j}) - Σ_{j=1..m-1} j c_j r_{m-j},
+//!     r = x² + y²
 //! ```
 //!
 //! Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99, proposition 2.1; A. Griewank, A. Walther,

@@ -17,10 +17,12 @@ pub struct DigitsFlags {
     pub show_digits: Option<u16>,
     /// Choose the digits so that the path is known up to this time in seconds, and prove it by a second run
     /// with more digits and another order; exit code 0 only where both agree
-    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, conflicts_with_all = ["digits", "until"])]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true,
+        conflicts_with_all = ["digits", "until"])]
     pub trusted_until: Option<f64>,
     /// How near the two runs must be, in rad, m and their rates [default: 1e-3]
-    #[arg(long, value_name = "E", value_parser = positive, allow_hyphen_values = true, requires = "trusted_until")]
+    #[arg(long, value_name = "E", value_parser = positive, allow_hyphen_values = true,
+        requires = "trusted_until")]
     pub within: Option<f64>,
 }
 

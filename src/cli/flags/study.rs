@@ -24,7 +24,8 @@ pub struct SweepFlags {
     #[arg(long, help_heading = "Points")]
     pub to_flip: bool,
     /// Threads [default: all processors]; the table is the same whatever their number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024), help_heading = "Points")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
+        help_heading = "Points")]
     pub threads: Option<u16>,
     /// Run part I of N alone, into a folder shard-I-of-N of the sweep's own; `driftless merge` joins them
     #[arg(long, value_name = "I/N", value_parser = clap::value_parser!(Shard), help_heading = "Points")]
@@ -35,15 +36,18 @@ pub struct SweepFlags {
     /// Estimate the error of every point and the time up to which it can be trusted, in two more columns:
     /// off, auto (in lanes a second sweep at a hundredth of the tolerance: about 2.2 times the work), full
     /// (as single runs)
-    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(), help_heading = "Trust")]
+    #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Off.name(),
+        help_heading = "Trust")]
     pub trust: Level,
     /// Stop a point where its energy is off by more than this share of its scale [default: what the tolerance
     /// explains, 0.01 at most]
-    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    #[arg(long, value_name = "SHARE", value_parser = limit, allow_hyphen_values = true,
+        help_heading = "Limits")]
     pub max_energy_drift: Option<f64>,
     /// Stop a point where a constraint is off by more, in rad or m, or that per second [default: 0.01 rad, or
     /// sizes of the mechanism, in position]
-    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true, help_heading = "Limits")]
+    #[arg(long, value_name = "SIZE", value_parser = limit, allow_hyphen_values = true,
+        help_heading = "Limits")]
     pub max_constraint_drift: Option<f64>,
     /// Folder under which `SCENE/sweep-NAMES-METHOD-SETTING` is made
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
@@ -79,10 +83,12 @@ pub struct StressFlags {
     #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
     pub methods: Vec<MethodId>,
     /// Evaluations allowed for each scene and method
-    #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS,
+        value_parser = clap::value_parser!(u64).range(1..))]
     pub max_evaluations: u64,
     /// What the end of a scene given may be off, in rad
-    #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true, requires = "scenes")]
+    #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true,
+        requires = "scenes")]
     pub tolerance: f64,
     /// Threads [default: all processors]; the cells are the same whatever their number
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -110,13 +116,15 @@ pub struct KinematicsFlags {
     pub scene: SceneFlags,
     /// What is driven, and from where to where in rad or m: a motor, a body or a slider, as crank,
     /// crank=0..2pi or slider=-0.1..0.1 [default: the first motor, one turn from the start]
-    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(Drive), allow_hyphen_values = true)]
+    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(Drive),
+        allow_hyphen_values = true)]
     pub drive: Option<Drive>,
     /// Rate of the drive in rad/s or m/s [default: that of the motor at the start, 1 elsewhere]
     #[arg(long, value_name = "RATE", value_parser = number, allow_hyphen_values = true)]
     pub rate: Option<f64>,
     /// Positions at equal distances over the range; one more stands at its end
-    #[arg(long, value_name = "N", default_value_t = 360, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 360,
+        value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub positions: u32,
     /// Folder under which `SCENE/kinematics-DRIVE` is made
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
@@ -137,7 +145,8 @@ pub struct ModesFlags {
     #[command(flatten)]
     pub scene: SceneFlags,
     /// Positions from which equilibria or periodic motions are looked for, beside the scene's start
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 64,
+        value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
     pub starts: u32,
     /// Look for motions of this period in seconds; by default that of motors at a constant rate and of sines
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
@@ -165,18 +174,22 @@ pub struct CompareFlags {
     #[command(flatten)]
     pub scene: SceneFlags,
     /// Methods, joined by commas [default: all]
-    #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',', help_heading = "Comparison")]
+    #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',',
+        help_heading = "Comparison")]
     pub methods: Vec<MethodId>,
     /// How constraints are kept; several, joined by commas, are compared with one another [default: each
     /// method's usual way]
-    #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',', help_heading = "Comparison")]
+    #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',',
+        help_heading = "Comparison")]
     pub stabilize: Vec<Stabilization>,
     /// Horizon in seconds [default: the scene's, or what there is time for]
-    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true, help_heading = "Comparison")]
+    #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true,
+        help_heading = "Comparison")]
     pub until: Option<f64>,
     /// Seconds to spend: for the reference, for one run of each setting, and for repetitions that make their
     /// times sure
-    #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true, help_heading = "Comparison")]
+    #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true,
+        help_heading = "Comparison")]
     pub budget: f64,
     /// Folder under which `SCENE/compare` is made
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
@@ -257,7 +270,8 @@ pub struct FitFlags {
     pub sigma: Vec<(String, f64)>,
     /// Parts of the data for multiple shooting, short against the growth of small differences of a chaotic
     /// motion
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, value_name = "N", default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub segments: u32,
     /// Tolerance of the motion [default: 1e-14]
     #[arg(long, value_name = "TOL", value_parser = positive, allow_hyphen_values = true)]

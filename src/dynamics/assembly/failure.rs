@@ -30,7 +30,8 @@ impl std::fmt::Display for Closest {
         match self.apart {
             Some(apart) => write!(
                 f,
-                "closest: {}, {apart:.3} rad or sizes of the mechanism from what is given; {closed} of {tried} guesses close all loops",
+                "closest: {}, {apart:.3} rad or sizes of the mechanism from what is given; {closed} of \
+                    {tried} guesses close all loops",
                 self.written
             ),
             None => write!(f, "closest: {}; none of {tried} guesses closes all loops", self.written),

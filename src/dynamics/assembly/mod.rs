@@ -2,8 +2,10 @@
 //! kept, the rest is found from the rows.
 //!
 //! ```text
-//! all that is given fits:      it stays to the last bit, and the shortest way from the guesses closes the rows
-//! some of it does not fit:     of what is given, in the order of the bars, as much stays as the rows leave free; the rest is taken as a rough guess
+//! all that is given fits:
+//!     it stays to the last bit, and the shortest way from the guesses closes the rows
+//! some of it does not fit:     of what is given, in the order of the bars,
+//!     as much stays as the rows leave free; the rest is taken as a rough guess
 //! everything is given:         all of it changes as little as may be
 //! ```
 //!

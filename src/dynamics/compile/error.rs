@@ -11,17 +11,21 @@ pub enum CompileError {
     Redundant(String),
     /// Too many rows that act on one another.
     #[error(
-        "{0} constraint rows that act on one another through the bodies they hang on; at most about {DENSE_LIMIT} are taken"
+        "{0} constraint rows that act on one another through the bodies they hang on; at most about \
+            {DENSE_LIMIT} are taken"
     )]
     TooMany(usize),
     /// The mass matrix is singular: some body has no inertia about its hinge.
     #[error(
-        "the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its hinge"
+        "the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its \
+            hinge"
     )]
     Massless(String),
     /// No start closes the rows, or none near what is given.
     #[error(
-        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\n{closest}\nhint: check lengths and places, and whether what `start` gives can be reached; `driftless check SCENE --chart FILE` draws the closest"
+        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\n{closest}\nhint: \
+            check lengths and places, and whether what `start` gives can be reached; `driftless check SCENE \
+            --chart FILE` draws the closest"
     )]
     Impossible {
         /// The row that is off most.
@@ -35,7 +39,8 @@ pub enum CompileError {
     },
     /// No rates keep the rows at the start.
     #[error(
-        "no rates fit the start: constraint `{row}` slips by {left:.3e} {unit}\nhint: check motors against locks, and whether the start is a dead centre for the motor"
+        "no rates fit the start: constraint `{row}` slips by {left:.3e} {unit}\nhint: check motors against \
+            locks, and whether the start is a dead centre for the motor"
     )]
     ImpossibleRates {
         /// The row that slips most.
@@ -46,11 +51,13 @@ pub enum CompileError {
         unit: &'static str,
     },
     /// Coordinates, or rates, that neither the rows nor the scene give: as many as have to be added.
-    #[error("the start leaves {} open: no constraint gives {}\nhint: add {} to the scene", quoted(.0), them(.0), them(.0))]
+    #[error("the start leaves {} open: no constraint gives {}\nhint: add {} to the scene", quoted(.0),
+        them(.0), them(.0))]
     Undetermined(Vec<String>),
     /// More than one start fits what is given.
     #[error(
-        "the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}, and {count} configurations are found that fit\nhint: {advice}"
+        "the start is ambiguous: `{what}` may be {one:.6} or {other:.6} {unit}, and {count} configurations \
+            are found that fit\nhint: {advice}"
     )]
     Ambiguous {
         /// Where the scene could say which.
@@ -68,12 +75,15 @@ pub enum CompileError {
     },
     /// A spring with a free length starts without a direction.
     #[error(
-        "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; start elsewhere, move an end, or set free_length to 0"
+        "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; \
+            start elsewhere, move an end, or set free_length to 0"
     )]
     SpringWithoutLength(String),
     /// A rigid spring that vibrates is not the only constraint.
     #[error(
-        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only where no other constraint, wall or damper is\nhint: start it at its free length and without a rate along it, or leave its `model` out"
+        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only \
+            where no other constraint, wall or damper is\nhint: start it at its free length and without a \
+            rate along it, or leave its `model` out"
     )]
     NotAlone {
         /// The spring.
@@ -83,7 +93,8 @@ pub enum CompileError {
     },
     /// The line of a wall moves with the point that meets it, which has dry friction there.
     #[error(
-        "wall `{0}` has friction and a law that depends on where its own point is: it is a curve, and friction acts along the line\nhint: leave the friction out, or let the law depend on other parts"
+        "wall `{0}` has friction and a law that depends on where its own point is: it is a curve, and \
+            friction acts along the line\nhint: leave the friction out, or let the law depend on other parts"
     )]
     FrictionOnCurve(String),
     /// The scene was put together by hand and makes no sense.
@@ -100,7 +111,8 @@ pub enum CompileError {
     NoSuchBar(String),
     /// A point starts behind its wall.
     #[error(
-        "wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the wall, or turn its normal"
+        "wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the \
+            wall, or turn its normal"
     )]
     BehindWall {
         /// The wall.

@@ -175,8 +175,8 @@ impl Mechanism {
             || self.aims().any(|aim| aim.counted_angles().next().is_some())
     }
 
-    /// The state of these unknowns, of which the first are angles that lack whole `turns`: a winding mechanism
-    /// gets them back.
+    /// The state of these unknowns, of which the first are angles that lack whole `turns`: a winding
+    /// mechanism gets them back.
     pub(crate) fn state(&self, time: Time, unknowns: &[DoubleDouble], turns: &[i64]) -> State {
         let mut state = State::new(unknowns, turns.len());
         state.time = time;

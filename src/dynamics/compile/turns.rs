@@ -43,8 +43,8 @@ impl WholeTurns {
         Self { with }
     }
 
-    /// The same beside motors, locks and welds as they stand at one time: they count turns, so that the bodies
-    /// whose angles they measure turn together.
+    /// The same beside motors, locks and welds as they stand at one time: they count turns, so that the
+    /// bodies whose angles they measure turn together.
     pub fn beside_rows(mechanism: &Mechanism) -> Self {
         let pairs = mechanism.angles_given().map(|(body, base, _)| (body, base));
         Self::joined(mechanism, pairs)
@@ -91,8 +91,8 @@ impl Mechanism {
         })
     }
 
-    /// Turns bodies by whole turns until motors, locks and welds, which count them, are where they are given at
-    /// t = 0: from the ground on, and from the first body of those that nothing ties to it.
+    /// Turns bodies by whole turns until motors, locks and welds, which count them, are where they are given
+    /// at t = 0: from the ground on, and from the first body of those that nothing ties to it.
     pub(crate) fn wind(&self, phi: &mut [f64]) {
         let ground = self.bodies.len();
         let mut is_placed = vec![false; ground + 1];

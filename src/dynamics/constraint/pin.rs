@@ -1,7 +1,8 @@
 //! Two points that coincide: a hinge that closes a loop, as two rows, one along each axis.
 //!
 //! ```text
-//! C = Re(conj(n) D),  D = P_a - P_b,   G_k = Re(conj(n) i gamma_k z_k),   C_t = 0,   gamma = Re(conj(n) Pi_D),   n = 1, i
+//! C = Re(conj(n) D),  D = P_a - P_b,   G_k = Re(conj(n) i gamma_k z_k),   C_t = 0,
+//!     gamma = Re(conj(n) Pi_D),   n = 1, i
 //! ```
 //!
 //! The force on the first point is -lambda n, on the second lambda n.

@@ -1,7 +1,8 @@
 //! Two points at a fixed distance: a rod without mass.
 //!
 //! ```text
-//! C = (|D|² - L²) / 2L,  D = P_a - P_b,   G_k = Re(conj(D) i gamma_k z_k) / L,   C_t = 0,   gamma = (Re(conj(D) Pi_D) + |D'|²) / L
+//! C = (|D|² - L²) / 2L,  D = P_a - P_b,   G_k = Re(conj(D) i gamma_k z_k) / L,   C_t = 0,
+//!     gamma = (Re(conj(D) Pi_D) + |D'|²) / L
 //! ```
 //!
 //! Near the distance kept C is what the distance is off.  The force on the first point is -lambda D/L, on the

@@ -1,7 +1,8 @@
 //! Constraints and contacts of one moment in coordinates in which the mass matrix is one.
 //!
 //! ```text
-//! T M T = L Lᵀ,  T_ii = M_ii^(-1/2)          v = Lᵀ T⁻¹ w,   c = L⁻¹ T gᵀ of a row g:   g w = c·v,  g M⁻¹ hᵀ = c·d,  wᵀ M w = v·v
+//! T M T = L Lᵀ,  T_ii = M_ii^(-1/2)
+//!     v = Lᵀ T⁻¹ w,   c = L⁻¹ T gᵀ of a row g:   g w = c·v,  g M⁻¹ hᵀ = c·d,  wᵀ M w = v·v
 //! columns of several rows:  C = Q R           Q: orthonormal;  R: upper triangular
 //! least v with Cᵀ v = b:  Q R⁻ᵀ b             what the rows leave of c:  c - Q Qᵀ c
 //! ```

@@ -2,8 +2,10 @@
 //! unit.
 //!
 //! ```text
-//! length = Σ |gamma_k| + |gap at the start|              levers of the point, and how far it is from its wall
-//! force  = E / length + |g| Σ m + Σ |F|,                 E: kinetic and elastic energy at the start, torques, inertia times the square of driven rates
+//! length = Σ |gamma_k| + |gap at the start|
+//!     levers of the point, and how far it is from its wall
+//! force  = E / length + |g| Σ m + Σ |F|,
+//!     E: kinetic and elastic energy at the start, torques, inertia times the square of driven rates
 //! ```
 //!
 //! A point without levers that starts on its wall takes the largest length of the other contacts, else the

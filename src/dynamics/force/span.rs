@@ -121,11 +121,16 @@ mod tests {
     fn law(law: &str) -> UserForce {
         let text = format!(
             r#"{{"name": "s", "gravity": [0, 0], "parameters": {{"k": 7.3}}, "signals": {{"tilt": "b.phi"}},
-            "bars": [{{"name": "a", "mass": 1, "centre": [0.3, 0], "inertia": 0.1}}, {{"name": "b", "mass": 1, "centre": [0.2, 0.1], "inertia": 0.1}}],
-            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
-                {{"name": "B", "between": [{{"body": "a", "point": [0.6, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
-            "springs": [{{"name": "s", "between": [{{"body": "ground", "point": [-0.4, 0.7]}}, {{"body": "b", "point": [0.4, 0.2]}}], {law}}}],
-            "start": {{"a": {{"phi": 0.3, "omega": 0}}, "b": {{"phi": 1, "omega": 0}}}}, "until": 1, "every": 1}}"#
+            "bars": [{{"name": "a", "mass": 1, "centre": [0.3, 0], "inertia": 0.1}}, {{"name": "b", "mass": 1,
+             "centre": [0.2, 0.1], "inertia": 0.1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a",
+             "point": [0, 0]}}]}},
+                {{"name": "B", "between": [{{"body": "a", "point": [0.6, 0]}}, {{"body": "b",
+                 "point": [0, 0]}}]}}],
+            "springs": [{{"name": "s", "between": [{{"body": "ground", "point": [-0.4, 0.7]}}, {{"body": "b",
+             "point": [0.4, 0.2]}}], {law}}}],
+            "start": {{"a": {{"phi": 0.3, "omega": 0}}, "b": {{"phi": 1, "omega": 0}}}}, "until": 1,
+             "every": 1}}"#
         );
         let scene = parse_scene(&text, "test", &[]).unwrap_or_else(|error| panic!("{error}"));
         Mechanism::new(&scene).expect("equations").forces[0].clone()

@@ -1,7 +1,8 @@
 //! A torsion spring with a damper beside it, between the angles of two bodies or of a body and the ground.
 //!
 //! ```text
-//! theta = q_a - q_b:   torque on a = -(k (theta - theta0) + c theta'),   the opposite on b,   V = k (theta - theta0)² / 2
+//! theta = q_a - q_b:   torque on a = -(k (theta - theta0) + c theta'),   the opposite on b,
+//!     V = k (theta - theta0)² / 2
 //! ```
 //!
 //! Whole turns count: a mechanism with a torsion spring is integrated in winding angles.

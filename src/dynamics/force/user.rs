@@ -5,7 +5,8 @@
 //! methods) and as power series.  The potential is differentiated on the tape:
 //!
 //! ```text
-//! F_P = -∂V/∂P  at every point it depends on,   torque = -∂V/∂q - (-sin q ∂V/∂cos q + cos q ∂V/∂sin q)  on every body
+//! F_P = -∂V/∂P  at every point it depends on,
+//!     torque = -∂V/∂q - (-sin q ∂V/∂cos q + cos q ∂V/∂sin q)  on every body
 //! power accounted as work = Σ F·P' + Σ torque w  of what is applied beside
 //! ```
 

@@ -3,7 +3,8 @@
 //! ```text
 //! dv_n = a_nn dp_n + a_nt dp_t,    dv_t = a_nt dp_n + a_tt dp_t      along the growing normal impulse p_n
 //! slides   dp_t = -sign(v_t) mu dp_n          until v_t = 0
-//! sticks   dp_t = -a_nt / a_tt dp_n           where that is at most mu0 dp_n, else it slides as a_nt drives it
+//! sticks   dp_t = -a_nt / a_tt dp_n
+//!     where that is at most mu0 dp_n, else it slides as a_nt drives it
 //! ends     Poisson: p_n = (1+e) p_c, v_n(p_c) = 0      Newton: v_n = -e v_n⁻
 //! ```
 //!

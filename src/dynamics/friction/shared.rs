@@ -102,8 +102,8 @@ impl Mechanism {
         Room::new(self, at, contacts, &others)
     }
 
-    /// Relative velocities of all places, zero of those that closed contacts hold: the speed with which a point
-    /// has come to its wall, and with it other places move, is taken off.
+    /// Relative velocities of all places, zero of those that closed contacts hold: the speed with which a
+    /// point has come to its wall, and with it other places move, is taken off.
     pub(super) fn rates_beside(
         &self,
         evidence: &dyn Evidence,

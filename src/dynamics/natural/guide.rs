@@ -2,7 +2,8 @@
 //! elements.
 //!
 //! ```text
-//! angle:  C = Im(conj(u) z_a conj(z_b)),  u = exp(i theta(t))      gradients i u z_b and -i conj(u) z_a;  i u from the ground
+//! angle:  C = Im(conj(u) z_a conj(z_b)),  u = exp(i theta(t))
+//!     gradients i u z_b and -i conj(u) z_a;  i u from the ground
 //! place:  C = Q(z) - s(t)                                           gradients of Q
 //! ```
 //!

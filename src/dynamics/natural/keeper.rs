@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! linear rows:   x -= R (C x + c),   v -= R C v                             constant, once for all
-//! unit lengths:  x -= V S⁻¹ (|z|² - 1)/2,   v -= V S⁻¹ z·v                  V_j = W_·j z_j,  S_kj = z_k·V_kj,  which leaves the linear rows kept
+//! unit lengths:  x -= V S⁻¹ (|z|² - 1)/2,   v -= V S⁻¹ z·v
+//!     V_j = W_·j z_j,  S_kj = z_k·V_kj,  which leaves the linear rows kept
 //! ```
 //!
 //! The shortest way in the metric of the mass matrix, as that of the angle form to first order; with one set

@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! D x + Cᵀ lambda = y,  C x = 0:    x = W y,  lambda = Rᵀ y
-//! R = D⁻¹ Cᵀ (C D⁻¹ Cᵀ)⁻¹,          W = D⁻¹ - R C D⁻¹,       x - R (C x + c)  puts the rows back, by the shortest way in the metric of D
+//! R = D⁻¹ Cᵀ (C D⁻¹ Cᵀ)⁻¹,
+//!     W = D⁻¹ - R C D⁻¹,       x - R (C x + c)  puts the rows back, by the shortest way in the metric of D
 //! ```
 //!
 //! Rows are orthonormalised in the metric of D⁻¹ one after another; one of which less than [`DEPENDENT`] is

@@ -1,9 +1,12 @@
 //! Passes over the trees for power series, which ask the same posture for one order after another.
 //!
 //! ```text
-//! R = H x + (forces taken off), without the diagonal of H:    outwards  A_k = A_p + r_k x_p;    inwards  G_k = c_k x_k + Σ G_j,  R_k = conj(c_k) A_k + Σ conj(r_j) G_j
-//! M alpha = Q - Im(conj(z) R):     inwards   e_k = Q_k - z_k × R_k - Σ (u_j·F_j + b_j e_j),   F_k = Σ (F_j + s_j e_j)          with s = h/d, b = u·s of the posture
-//!                                  outwards  alpha_k = e_k/d - s_k·a_p - b_k alpha_p,         a_k = a_p + u_k alpha_p
+//! R = H x + (forces taken off), without the diagonal of H:    outwards  A_k = A_p + r_k x_p;
+//!     inwards  G_k = c_k x_k + Σ G_j,  R_k = conj(c_k) A_k + Σ conj(r_j) G_j
+//! M alpha = Q - Im(conj(z) R):     inwards   e_k = Q_k - z_k × R_k - Σ (u_j·F_j + b_j e_j),
+//!     F_k = Σ (F_j + s_j e_j)          with s = h/d, b = u·s of the posture
+//!                                  outwards  alpha_k = e_k/d - s_k·a_p - b_k alpha_p,
+//!                                      a_k = a_p + u_k alpha_p
 //! ```
 //!
 //! p is what body k hangs on, and j what hangs on it; c_k = Σ m gamma_k over all bodies that k carries:

@@ -1,7 +1,8 @@
 //! The series of applied forces and torques, and of torsion springs.
 //!
 //! ```text
-//! s(t) = Σ s_m t^m:   F_m = f s_m,  or  Σ_j f z_j s_{m-j} where it turns with its body;   power_m = Σ_j F_j · P'_{m-j},  P'_m = (m+1) P_{m+1}
+//! s(t) = Σ s_m t^m:   F_m = f s_m,  or  Σ_j f z_j s_{m-j} where it turns with its body;
+//!     power_m = Σ_j F_j · P'_{m-j},  P'_m = (m+1) P_{m+1}
 //! theta_0 = q_a - q_b,  theta_m = w_{m-1}/m:   torque_m = -k theta_m - c w_m
 //! ```
 

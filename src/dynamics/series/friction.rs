@@ -233,8 +233,8 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         [slide, self.stuck.iter().map(|place| normal(&place.friction)).collect()]
     }
 
-    /// A tau of the size that forces of the mechanism may have, a power of two: what normal forces have of one is a
-    /// difference, and is told to as many digits as these forces are.
+    /// A tau of the size that forces of the mechanism may have, a power of two: what normal forces have of
+    /// one is a difference, and is told to as many digits as these forces are.
     fn test_load(&self, mechanism: &Mechanism, z: &[Complex<T>], rows: &RowSeries<T>) -> f64 {
         let n = mechanism.coordinates();
         let size = |force: Complex<T>| libm::hypot(force.re.value(), force.im.value());

@@ -1,10 +1,13 @@
 //! Constraint equations in the series: the multipliers are solved for with every order.
 //!
 //! ```text
-//! linear in elements:   C = c + Σ g_k·e_k - s,      J_k = g_k·(i z_k,0),   J a_m = s''_m - Σ g_k·u_k,m     force lambda g_k on e_k
-//! bilinear in them:     C = Re(conj(e_j) h e_k),    products of the powers of e_j and e_k,            force lambda conj(h) e_j on e_k
+//! linear in elements:   C = c + Σ g_k·e_k - s,
+//!     J_k = g_k·(i z_k,0),   J a_m = s''_m - Σ g_k·u_k,m     force lambda g_k on e_k
+//! bilinear in them:     C = Re(conj(e_j) h e_k),    products of the powers of e_j and e_k,
+//!     force lambda conj(h) e_j on e_k
 //! less an aim f:           - f(t, q) in C, see [`aim`](super::aim)
-//! a given angle:        C = q_a - q_b - theta,      J = (1, -1),           J a_m = theta''_m          torque lambda
+//! a given angle:        C = q_a - q_b - theta,      J = (1, -1),
+//!     J a_m = theta''_m          torque lambda
 //! M_0 a_m + Jᵀ lambda_m = load_m:   S = J M_0⁻¹ Jᵀ,   S lambda_m = J M_0⁻¹ load_m - (J a)_m
 //! ```
 //!

@@ -137,14 +137,16 @@ impl Inspection {
             all.iter().filter(|(_, known)| *known == Some(false)).map(|(name, _)| name.as_str()).collect();
         if !open.is_empty() {
             let text = format!(
-                "{}: constraints are redundant here, and rigid bodies do not tell how these joints share the load; shown are the forces of least norm",
+                "{}: constraints are redundant here, and rigid bodies do not tell how these joints share the \
+                    load; shown are the forces of least norm",
                 open.join(", ")
             );
             page.entry("indeterminate", &text);
         } else if all.iter().any(|(_, known)| known.is_none()) {
             page.entry(
                 "indeterminate",
-                "some forces may be: constraints are redundant, and too many to tell which forces that leaves open",
+                "some forces may be: constraints are redundant, and too many to tell which forces that \
+                    leaves open",
             );
         }
     }

@@ -8,13 +8,15 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// There is no run.
-    #[error("{} holds no run\nhint: `driftless run SCENE` makes one; a folder of runs, or a run's own, is shown", folder.display())]
+    #[error("{} holds no run\nhint: `driftless run SCENE` makes one; a folder of runs, or a run's own, is \
+        shown", folder.display())]
     None {
         /// The folder.
         folder: PathBuf,
     },
     /// There are runs of several scenes.
-    #[error("{} holds the runs of {} scenes\nhint: name the folder of one: {}", folder.display(), scenes.len(), listed(scenes))]
+    #[error("{} holds the runs of {} scenes\nhint: name the folder of one: {}", folder.display(),
+        scenes.len(), listed(scenes))]
     Several {
         /// The folder.
         folder: PathBuf,
@@ -22,7 +24,8 @@ pub enum ViewError {
         scenes: Vec<PathBuf>,
     },
     /// The run is in many digits.
-    #[error("{} holds a run in many digits, which has no page\nhint: without --digits and --trusted-until a run has one", folder.display())]
+    #[error("{} holds a run in many digits, which has no page\nhint: without --digits and --trusted-until a \
+        run has one", folder.display())]
     Digits {
         /// The folder.
         folder: PathBuf,
@@ -36,7 +39,8 @@ pub enum ViewError {
         why: String,
     },
     /// The trajectory is not one of the scene in the record.
-    #[error("{}: column {column}: `{found}` stands where `{expected}` belongs\nhint: run.json beside it is of another run", file.display())]
+    #[error("{}: column {column}: `{found}` stands where `{expected}` belongs\nhint: run.json beside it is \
+        of another run", file.display())]
     Column {
         /// The file.
         file: PathBuf,
@@ -51,7 +55,8 @@ pub enum ViewError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// No row lies in the window asked for.
-    #[error("--from {} --to {}: no row of {} lies in it\nhint: the run goes from 0 to {until} s", window[0], window[1], file.display())]
+    #[error("--from {} --to {}: no row of {} lies in it\nhint: the run goes from 0 to {until} s", window[0],
+        window[1], file.display())]
     Window {
         /// The file.
         file: PathBuf,
@@ -70,7 +75,8 @@ pub enum ViewError {
     },
     /// More points than a page can hold.
     #[error(
-        "--html: {count} points are more than a page can hold ({most})\nhint: a coarser grid, or the picture alone, without --html"
+        "--html: {count} points are more than a page can hold ({most})\nhint: a coarser grid, or the picture \
+            alone, without --html"
     )]
     Points {
         /// How many there are.

@@ -114,8 +114,8 @@ fn kept(
     }
 }
 
-/// The folders of runs meant by a folder: itself, or those in it, in the order of their names; or those of the
-/// only folder in it that holds any.
+/// The folders of runs meant by a folder: itself, or those in it, in the order of their names; or those of
+/// the only folder in it that holds any.
 ///
 /// # Errors
 /// It holds none, or those of several scenes.

@@ -31,7 +31,8 @@ pub fn swept(sweep: &Sweep, curve: &Curve, totals: &Totals) -> Document {
     let labels = curve.labels(sweep);
     let axes: Vec<Value> = (sweep.grid().axes().iter().zip(sweep.variables()))
         .map(|(axis, variable)| {
-            json!({"name": variable.path, "unit": variable.unit, "from": axis.from, "to": axis.to, "count": axis.count})
+            json!({"name": variable.path, "unit": variable.unit, "from": axis.from, "to": axis.to,
+                "count": axis.count})
         })
         .collect();
     let rows = (sweep.plan().until / EVERY).clamp(ROWS[0], ROWS[1]);
@@ -58,6 +59,7 @@ pub fn swept(sweep: &Sweep, curve: &Curve, totals: &Totals) -> Document {
         told["record"] = Value::Null;
         told
     };
+    let caption: Vec<_> = labels.caption.iter().map(|words| crate::chart::unmarked(words)).collect();
     Document {
         title: format!("{}: {}", sweep.scene().name, labels.title),
         data: json!({
@@ -65,7 +67,7 @@ pub fn swept(sweep: &Sweep, curve: &Curve, totals: &Totals) -> Document {
             "scene": sweep.scene().name,
             "description": sweep.scene().description,
             "title": labels.title,
-            "caption": labels.caption.iter().map(|words| crate::chart::unmarked(words)).collect::<Vec<_>>().join(" · "),
+            "caption": caption.join(" · "),
             "axes": axes,
             "value": labels.value,
             "log": labels.is_log,

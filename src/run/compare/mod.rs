@@ -5,7 +5,8 @@
 //! together    two runs from starts an ulp apart: until when a path means anything
 //! truth       the reference motion up to there
 //! measure     each setting once, watched: error, drift, counts        rung by rung, all methods in turn
-//! time        each setting again and again, unwatched                 round by round, so that noise hits all alike
+//! time        each setting again and again, unwatched
+//!     round by round, so that noise hits all alike
 //! ```
 //!
 //! Settings go from coarse to fine, and end where finer ones bring nothing more.  What a method refuses or

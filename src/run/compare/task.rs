@@ -106,7 +106,8 @@ impl Task<'_> {
             until =
                 if near.horizon.is_some() { possible.max(ladder::round_down(measured)) } else { possible };
             notes.push(format!(
-                "the horizon is {until} s, which all methods can be taken to in the time given; --until or --budget change that"
+                "the horizon is {until} s, which all methods can be taken to in the time given; --until or \
+                    --budget change that"
             ));
         }
         measured = measured.min(until);

@@ -3,7 +3,8 @@
 //! ```text
 //! v_k = e^k v      v: rebound where the search for impacts ends,  a: acceleration towards the wall
 //! end      Σ 2 v_k / a = 2 v / (a (1 - e))
-//! impulse  what all bounces give, less what the wall gives from now on to their end:  -v / a_nn, friction with it
+//! impulse  what all bounces give, less what the wall gives from now on to their end:  -v / a_nn,
+//!     friction with it
 //! ```
 //!
 //! Holding the point at once with that impulse leaves the rates where all bounces would, and the place to the

@@ -1,8 +1,8 @@
-//! What acts on a motion in many digits changes: events switch parts and set parameters, formulas come to their
-//! corners.
+//! What acts on a motion in many digits changes: events switch parts and set parameters, formulas come to
+//! their corners.
 //!
-//! What closes does so plastically, as in all methods (`run/latch.rs`): its points have to meet, a motor and a
-//! lock without an angle go on from where they are, and the energy lost is booked with the event.
+//! What closes does so plastically, as in all methods (`run/latch.rs`): its points have to meet, a motor and
+//! a lock without an angle go on from where they are, and the energy lost is booked with the event.
 
 use super::branches::Branches;
 use super::confirm::Probe;
@@ -149,8 +149,8 @@ impl<const W: usize> Motion<W> {
         Ok(())
     }
 
-    /// The shifts with which those rows that close and are motors, or locks without an angle, go on from where
-    /// they are; `None` where none of them is.
+    /// The shifts with which those rows that close and are motors, or locks without an angle, go on from
+    /// where they are; `None` where none of them is.
     fn engaged(&mut self, closing: &[usize], shifts: &[Digits<W>]) -> Option<Vec<Digits<W>>> {
         let clutches = &self.mechanism.structure.switches.clutches;
         let names = self.mechanism.constraints.iter().map(|row| clutches.contains(&row.name));

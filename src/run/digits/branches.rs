@@ -2,8 +2,8 @@
 //!
 //! A formula with corners is recorded on the branches that its conditions choose.  A step ends at the first
 //! zero of a condition, by Newton's iteration on its series; the next one begins on the other branch.  A
-//! condition is zero where it is rounding to three quarters of the digits; which side it is on then is told by
-//! its value a little later.  That there is a zero inside a step is told in doubles
+//! condition is zero where it is rounding to three quarters of the digits; which side it is on then is told
+//! by its value a little later.  That there is a zero inside a step is told in doubles
 //! ([`search`](crate::stepping::search)), as it is for events.
 
 use super::functions::{Functions, LEAVES, SAME, magnitude};
@@ -111,7 +111,8 @@ impl<const W: usize> Branches<W> {
         let what = format!(
             "a formula of `{name}` changes its branch here, and on both branches the motion is driven back"
         );
-        let hint = "sliding along such a surface is not integrated: let the law pass zero smoothly, as tanh(x/0.01) instead of sign(x)";
+        let hint = "sliding along such a surface is not integrated: let the law pass zero smoothly, as \
+            tanh(x/0.01) instead of sign(x)";
         motion.stop(Cause::Sliding, 0.0, &what, hint)
     }
 }

@@ -1,4 +1,5 @@
-//! Events of a scene in many digits: the zeros of their formulas, by Newton's iteration on the formulas' series.
+//! Events of a scene in many digits: the zeros of their formulas, by Newton's iteration on the formulas'
+//! series.
 //!
 //! A step ends at the first event that changes what acts.
 //!
@@ -44,8 +45,8 @@ pub struct Watch<const W: usize> {
     ends: Vec<i8>,
     /// The sides they were on at the end of the last one: -1, 1, or 0 where that is not known.
     pub sides: Vec<i8>,
-    /// Events of the moment at which another one has changed what acts, and whether their functions rise: they
-    /// happen where the next step begins; and those of the end of the step that is next.
+    /// Events of the moment at which another one has changed what acts, and whether their functions rise:
+    /// they happen where the next step begins; and those of the end of the step that is next.
     pub due: Vec<(usize, bool)>,
     put_off: Vec<(usize, bool)>,
     /// What happened before.
@@ -68,8 +69,8 @@ impl<const W: usize> Watch<W> {
         Self { functions, sides: vec![0; mechanism.events.len()], ..Self::default() }
     }
 
-    /// The same where another mechanism acts than before: functions of parameters that are others now may have
-    /// jumped, which is no passage; at a corner of their own it is one.
+    /// The same where another mechanism acts than before: functions of parameters that are others now may
+    /// have jumped, which is no passage; at a corner of their own it is one.
     pub fn renewed(self, [before, now]: [&ExactMechanism<Digits<W>>; 2], order: usize) -> Self {
         let functions = Functions::new(&now.functions, order);
         let keeps = before.acting.parameters == now.acting.parameters;
@@ -79,9 +80,9 @@ impl<const W: usize> Watch<W> {
         Self { functions, sides: sides.collect(), due: self.due, happened: self.happened, ..Self::default() }
     }
 
-    /// Looks for what happens in a step of so many seconds, of those for which the series is made; where an event
-    /// changes what acts, the step is to end there, after so many seconds.  A function that is zero where the step
-    /// `ends_at_corner` of a formula may only touch zero: that is told by the next step.
+    /// Looks for what happens in a step of so many seconds, of those for which the series is made; where an
+    /// event changes what acts, the step is to end there, after so many seconds.  A function that is zero
+    /// where the step `ends_at_corner` of a formula may only touch zero: that is told by the next step.
     pub fn look(
         &mut self,
         motion: &Motion<W>,
@@ -124,8 +125,8 @@ impl<const W: usize> Watch<W> {
         Some(last.after)
     }
 
-    /// The passages that count in a step of so many seconds, in the order of their times, and the sides of all
-    /// functions at its end.
+    /// The passages that count in a step of so many seconds, in the order of their times, and the sides of
+    /// all functions at its end.
     fn passing(
         &self,
         motion: &Motion<W>,
@@ -203,8 +204,9 @@ impl<const W: usize> Watch<W> {
 }
 
 /// Passages of a formula through zero up to `end`, in shares of what its series is made for, and whether it
-/// rises, and its side there; `began` says that one of them ended the step before.  What nowhere is larger than
-/// `least` is rounding, as of a point that is kept at rest.  Zeros at a corner at the end are left to the next step.
+/// rises, and its side there; `began` says that one of them ended the step before.  What nowhere is larger
+/// than `least` is rounding, as of a point that is kept at rest.  Zeros at a corner at the end are left to
+/// the next step.
 fn passages(
     shares: &[f64],
     (end, ends_at_corner): (f64, bool),

@@ -106,8 +106,8 @@ pub fn planned(
     Ok(forecast)
 }
 
-/// ln of the largest growth of a small distance between any two times up to `until` \[s\]; `None` where it was
-/// paused.
+/// ln of the largest growth of a small distance between any two times up to `until` \[s\]; `None` where it
+/// was paused.
 fn measured(
     motion: &mut Motion<ROOM>,
     until: f64,

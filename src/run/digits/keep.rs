@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! position:  q ← q - M⁻¹ Gᵀ S⁻¹ C,  S = G M⁻¹ Gᵀ,   until C is rounding;    rates:  w ← w - M⁻¹ Gᵀ S⁻¹ C'
-//! start:     only coordinates the scene leaves open move; of those it gives, the last ones where that is not enough
+//! start:     only coordinates the scene leaves open move; of those it gives,
+//!     the last ones where that is not enough
 //! ```
 
 use super::precision::Precision;

@@ -1,15 +1,16 @@
 //! The state of a run in many digits, and its steps by power series.
 //!
 //! ```text
-//! u(t+h) = u + Σ w_m h^(m+1)/(m+1),  w(t+h) = Σ w_m h^m,   h = (tolerance / |w_k|)^(1/k), least over the last five powers k
+//! u(t+h) = u + Σ w_m h^(m+1)/(m+1),  w(t+h) = Σ w_m h^m,
+//!     h = (tolerance / |w_k|)^(1/k), least over the last five powers k
 //! ```
 //!
 //! The series is that of all methods ([`Series`]), over numbers of `W` limbs; the m-th power is kept to as
 //! many limbs as it weighs.  A step's length is a double, so that time is a sum of such and exact, and output
 //! times are read off the steps.  Angles are not wrapped: turns cost no digits worth the name.  Rows that are
 //! not eliminated are put back by Newton's iteration after every step (module `keep`), walls located by it
-//! (module `wall`), and so are events (module `events`) and the corners of formulas (module `branches`): a step
-//! ends where one of them changes the equations.
+//! (module `wall`), and so are events (module `events`) and the corners of formulas (module `branches`): a
+//! step ends where one of them changes the equations.
 
 use super::branches::Branches;
 use super::confirm::{Probe, confirmed};
@@ -215,8 +216,8 @@ impl<const W: usize> Motion<W> {
         &self.state
     }
 
-    /// Makes steps until the one that holds `until`, or an event that ends the run, is the next; pauses after a
-    /// step where `pause` is true.  True where it is there.
+    /// Makes steps until the one that holds `until`, or an event that ends the run, is the next; pauses after
+    /// a step where `pause` is true.  True where it is there.
     ///
     /// # Errors
     /// The series is not finite, or steps become too small.
@@ -255,8 +256,8 @@ impl<const W: usize> Motion<W> {
         self.watch.stop(&self.mechanism).map(|(event, after)| (event, self.state.t + after))
     }
 
-    /// The series of the state, and the length of the step it makes, which ends where a wall is met or lets its
-    /// point go, a formula has a corner, or an event changes what acts.
+    /// The series of the state, and the length of the step it makes, which ends where a wall is met or lets
+    /// its point go, a formula has a corner, or an event changes what acts.
     fn ready(&mut self) -> Result<(Digits<W>, Option<Ends>), StepError> {
         if let Some(step) = self.step {
             return Ok(step);

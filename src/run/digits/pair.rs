@@ -178,8 +178,8 @@ impl Pair {
             return Err(stop);
         }
         if !found.iter().all(|gathered| gathered.is_through) {
-            // Runs that have come to rows of which others are not through do them again; those on their way to
-            // the first one go on from there.
+            // Runs that have come to rows of which others are not through do them again; those on their way
+            // to the first one go on from there.
             let mut saved = std::mem::take(&mut self.saved);
             for ((run, saved), gathered) in self.runs.iter().zip(&mut saved).zip(&found) {
                 if gathered.rows.is_empty() {

@@ -28,8 +28,8 @@ impl<const W: usize> Motion<W> {
             }
             least = least.min((self.precision.tolerance() + first - size) / k as f64);
         }
-        // The work of a force is a product, and may converge later than its factors; a force of friction has the
-        // root of a normal force in it.
+        // The work of a force is a product, and may converge later than its factors; a force of friction has
+        // the root of a normal force in it.
         let allowed = self.precision.tolerance() + WORK + libm::log2(self.mechanism.structure.energy_scale);
         let allows = |least: f64, powers: &[Digits<W>]| {
             let last = powers.iter().enumerate().skip(order - JUDGES);
@@ -52,7 +52,8 @@ impl<const W: usize> Motion<W> {
         !(0..=self.precision.order).any(far)
     }
 
-    /// Coordinates, rates, and the work done and the energy lost in friction since the state's time at a time after that.
+    /// Coordinates, rates, and the work done and the energy lost in friction since the state's time at a time
+    /// after that.
     pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, [Digits<W>; 2]) {
         let f = self.state.u.len();
         let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();

@@ -55,8 +55,8 @@ impl Precision {
         -BITS * (self.digits as f64 + 1.5)
     }
 
-    /// log2 of what may be rounding of numbers of order one, known to this part of their digits. Steps keep the
-    /// digits, however many bits more are carried.
+    /// log2 of what may be rounding of numbers of order one, known to this part of their digits. Steps keep
+    /// the digits, however many bits more are carried.
     pub(super) fn rounding(&self, part: f64) -> f64 {
         -part * BITS * self.digits as f64
     }

@@ -135,8 +135,8 @@ fn reverses<const W: usize>(
     Ok(time)
 }
 
-/// The sign of the force by which a place breaks loose; where there is none, as without a load, that of a moment
-/// later.
+/// The sign of the force by which a place breaks loose; where there is none, as without a load, that of a
+/// moment later.
 fn side<const W: usize>(motion: &Motion<W>, tau: &[Digits<W>], time: Digits<W>, step: f64) -> f64 {
     let limbs = motion.precision.limbs;
     let at = |sum: Digits<W>, power: &Digits<W>| (sum * time).shortened(limbs) + *power;

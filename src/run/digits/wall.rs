@@ -166,7 +166,8 @@ pub(super) fn distance<const W: usize>(motion: &Motion<W>, row: &ConstraintEquat
     row.gap(&z) - travel - row.aim.as_ref().map_or(Digits::ZERO, aim)
 }
 
-/// How fast a wall moves along its normal, or a motor, but for what its formula says of the state \[m/s, rad/s\].
+/// How fast a wall moves along its normal, or a motor, but for what its formula says of the state \[m/s,
+/// rad/s\].
 pub(super) fn travel_rate<const W: usize>(
     row: &ConstraintEquation<Digits<W>>,
     t: Digits<W>,
@@ -275,7 +276,8 @@ fn no_way_back<const W: usize>(motion: &Motion<W>, wall: usize) -> StepError {
     motion.stop(Cause::RestingContact, 0.0, &what, hint)
 }
 
-/// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap \[m/s\].
+/// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap
+/// \[m/s\].
 pub(super) fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> GapRate<W> {
     let (t, posture) = (motion.state.t, motion.state_posture());
     let z = motion.mechanism.elements(&posture.phi);

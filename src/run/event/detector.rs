@@ -27,8 +27,8 @@ const KEPT: usize = 100_000;
 pub(in crate::run) struct EventMemory {
     /// The side of zero each function was on last: -1, 1, or 0 where that is not known.
     pub(super) sides: Vec<i8>,
-    /// The largest magnitude of each function so far, or what it changes by in one unit of a coordinate or rate
-    /// where it was seen first.
+    /// The largest magnitude of each function so far, or what it changes by in one unit of a coordinate or
+    /// rate where it was seen first.
     pub(super) largest: Vec<f64>,
     /// The events of the moment at which one happened last.
     pub(super) last: Vec<(usize, Time)>,
@@ -43,8 +43,8 @@ pub(in crate::run) struct EventMemory {
     pub(super) resting: Vec<usize>,
     /// Those that rested until the last step.
     pub(super) woken: Vec<usize>,
-    /// Those whose functions were at zero throughout the last part of a step, as rates are of what sticks or lies
-    /// on a wall.
+    /// Those whose functions were at zero throughout the last part of a step, as rates are of what sticks or
+    /// lies on a wall.
     pub(super) still: Vec<usize>,
     /// True where what is to be done cannot be: the motion is driven back onto that condition from both
     /// sides.
@@ -327,8 +327,8 @@ impl EventDetector {
         }
     }
 
-    /// Which conditions are at their zeros, to rounding, before and after the motion changes and parameters are
-    /// set.
+    /// Which conditions are at their zeros, to rounding, before and after the motion changes and parameters
+    /// are set.
     pub fn conditions_at_zero(&self, [before, after]: [&Motion; 2], set: &[f64]) -> Vec<bool> {
         let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Vec::new() };
         let values = |motion: &Motion, parameters: &[f64]| {

@@ -1,7 +1,7 @@
 //! Zeros of event functions in a step: they are interpolated at Chebyshev points, by as high a degree as they
 //! ask for, and searched by the same root finding as walls and flips ([`search`](crate::stepping)); a zero is
-//! then polished on the dense output itself.  Of functions that no interpolant resolves, as those with corners
-//! and jumps, the changes of sign between the nodes are bisected.
+//! then polished on the dense output itself.  Of functions that no interpolant resolves, as those with
+//! corners and jumps, the changes of sign between the nodes are bisected.
 
 use super::detector::{EventDetector, EventMemory, Owner, SAME};
 use crate::dynamics::Time;
@@ -28,8 +28,8 @@ pub(super) const NO_VALUE: f64 = 1e-12;
 /// while.
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
-/// Share of a step after which a function has left a corner that began it, and share of its largest value there
-/// that tells a side.
+/// Share of a step after which a function has left a corner that began it, and share of its largest value
+/// there that tells a side.
 const AFTER: f64 = 1e-6;
 const BEYOND: f64 = 1e-4;
 /// Steps of this share of the time are rounding.
@@ -133,8 +133,8 @@ impl EventDetector {
         if is_of_laws && most <= NO_VALUE * self.memory.largest[event].max(most) {
             return;
         }
-        // It lies on the side its laws are recorded for, and leaves it at once where it turns away.  An impact may
-        // have carried it across.
+        // It lies on the side its laws are recorded for, and leaves it at once where it turns away.  An
+        // impact may have carried it across.
         let other = if mode { -1 } else { 1 };
         let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
         let left = is_there.then(|| left(curve, first, self.resolved)).flatten();
@@ -208,8 +208,8 @@ impl EventDetector {
         }
     }
 
-    /// The passage of a function that comes to zero where the step ends, as the height of a point does on its wall:
-    /// on which side rounding has it there does not matter.
+    /// The passage of a function that comes to zero where the step ends, as the height of a point does on its
+    /// wall: on which side rounding has it there does not matter.
     fn end_at_zero(&mut self, part: &Part, event: usize, end: Time, all: &mut Vec<Passage>) {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
         let off = self.resolved.max(NO_VALUE) * part.curve.most();
@@ -246,8 +246,8 @@ impl EventDetector {
         }
     }
 
-    /// Passages of a function between the nodes, the first of which is left out where what it shows `is_behind`.
-    /// Values that its interpolant may be off by tell no side.
+    /// Passages of a function between the nodes, the first of which is left out where what it shows
+    /// `is_behind`. Values that its interpolant may be off by tell no side.
     fn between(
         &mut self,
         inside: &mut dyn Inside,

@@ -3,7 +3,8 @@
 //!
 //! ```text
 //! min Σ ((y_i - Y(t_i; p)) / σ_i)²                                     Levenberg and Marquardt
-//! several parts: unknown states s_k at their beginnings as well,  s_k+1 = x(t_k+1; s_k, p)  by growing weights
+//! several parts: unknown states s_k at their beginnings as well,  s_k+1 = x(t_k+1; s_k,
+//!     p)  by growing weights
 //! covariance of p = (JᵀJ)⁻¹ at the minimum
 //! ```
 //!
@@ -285,8 +286,8 @@ fn indices(study: &Study, columns: &[FittedColumn]) -> Vec<usize> {
     columns.iter().filter_map(|column| heads.iter().position(|head| *head == column.name)).collect()
 }
 
-/// What the noise of columns is measured by: their spread, or where constraints keep them in one place, for the
-/// rounding of values there not to outweigh all others, a part of what a unit of a coordinate changes.
+/// What the noise of columns is measured by: their spread, or where constraints keep them in one place, for
+/// the rounding of values there not to outweigh all others, a part of what a unit of a coordinate changes.
 fn sizes(study: &Study, indices: &[usize], columns: &[FittedColumn]) -> Vec<f64> {
     let detector = ExtremesDetector::new(&study.mechanism);
     let changes = detector.map(|mut detector| detector.changes(&study.start)).unwrap_or_default();
@@ -335,7 +336,8 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
     }
     match outputs.is_empty() {
         true => Err(FitError::Data(format!(
-            "{}: no column is named after a quantity of the scene\nhint: name them as in trajectory.csv, as bar1.phi [rad]",
+            "{}: no column is named after a quantity of the scene\nhint: name them as in trajectory.csv, as \
+                bar1.phi [rad]",
             data.source
         ))),
         false => Ok((outputs, ignored)),

@@ -1,7 +1,7 @@
 //! The least-squares problem: residuals of all parts and the steps between them, with their Jacobian.
 //!
 //! ```text
-//! x = (p / scale, ξ_1 … ξ_m)        ξ_k  local coordinates of the state that part k begins with, m parts but the first
+//! x = (p / scale, ξ_1 … ξ_m)       ξ_k  local coordinates of the state where part k begins, not the first
 //! r = ((Y - y) / σ,  w (x_k(t_k+1) - s_k+1))
 //! ```
 

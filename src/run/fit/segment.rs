@@ -41,8 +41,8 @@ pub(super) struct Passed {
 }
 
 /// Integrates from `from` (time and state; from the scene's start where there is none) to `until` \[s\],
-/// looking at `times`, with columns for the numbers of a study and then for these directions of the start; one of
-/// several parts is to leave nothing but a state.
+/// looking at `times`, with columns for the numbers of a study and then for these directions of the start;
+/// one of several parts is to leave nothing but a state.
 ///
 /// # Errors
 /// Why there is no such motion, or no derivatives.
@@ -97,7 +97,8 @@ pub(super) fn pass(
         && variation.mechanism.held.is_empty()
         && !changes.any(|event| outcome.events.iter().any(|happened| happened.name == event.name));
     if is_one_of_several && !is_known {
-        let what = "what sticks, rests on a wall, or is switched or set by events, does not go on from a place alone: leave --segments out";
+        let what = "what sticks, rests on a wall, or is switched or set by events, does not go on from a \
+            place alone: leave --segments out";
         return Err(what.into());
     }
     let end = sampler.end.ok_or("the motion ends before the data")?;

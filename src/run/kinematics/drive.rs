@@ -61,7 +61,8 @@ pub enum KinematicsError {
     NoRange(String),
     /// So many turns are walked in no reasonable time.
     #[error(
-        "`{name}` would go from {start} to {value:e} rad\nhint: at most {FARTHEST:e} rad from the start, as {name}=0..2pi"
+        "`{name}` would go from {start} to {value:e} rad\nhint: at most {FARTHEST:e} rad from the start, as \
+            {name}=0..2pi"
     )]
     Far {
         /// The drive.
@@ -73,7 +74,8 @@ pub enum KinematicsError {
     },
     /// More moves than the drive gives.
     #[error(
-        "`{name}` leaves {left} degree(s) of freedom, and kinematics none\nhint: `driftless run` integrates what the drive does not give; or add motors or locks"
+        "`{name}` leaves {left} degree(s) of freedom, and kinematics none\nhint: `driftless run` integrates \
+            what the drive does not give; or add motors or locks"
     )]
     Free {
         /// The drive.

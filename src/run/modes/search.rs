@@ -144,8 +144,8 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// A position nearly at rest, with its tangent, its slope and what is left of the accelerations, as near as
-    /// Newton's method comes, which does not move it to where all is as it was.
+    /// A position nearly at rest, with its tangent, its slope and what is left of the accelerations, as near
+    /// as Newton's method comes, which does not move it to where all is as it was.
     fn polished(
         &mut self,
         mut phi: Vec<f64>,
@@ -254,9 +254,9 @@ fn slack(stiffness: &DMatrix<f64>) -> [DMatrix<f64>; 2] {
     [slack, held].map(|those| DMatrix::from_fn(f, those.len(), |i, j| right[(those[j], i)]))
 }
 
-/// Eigenvalues of the linearized motion but for those of zero that the directions left out of `held` have, two
-/// each where nothing damps them.  Without damping the others are the square roots of those of the stiffness,
-/// which then have all digits of a problem half the size.
+/// Eigenvalues of the linearized motion but for those of zero that the directions left out of `held` have,
+/// two each where nothing damps them.  Without damping the others are the square roots of those of the
+/// stiffness, which then have all digits of a problem half the size.
 fn eigenvalues(stiffness: &DMatrix<f64>, damping: &DMatrix<f64>, held: &DMatrix<f64>) -> Vec<Complex<f64>> {
     let (f, r) = (held.nrows(), held.ncols());
     if damping.amax() == 0.0 {

@@ -106,7 +106,8 @@ pub(super) fn pair(
         (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte)
             if usual(mechanism) == Stabilization::Projection =>
         {
-            let reason = "a Gauss method keeps loops and sliders by symmetric projection, and nothing else keeps its energy";
+            let reason = "a Gauss method keeps loops and sliders by symmetric projection, and nothing else \
+                keeps its energy";
             Err(mismatch(
                 format!("{method} with --stabilize {asked}"),
                 reason,
@@ -114,7 +115,8 @@ pub(super) fn pair(
             ))
         }
         (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
-            let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated";
+            let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is \
+                eliminated";
             Err(mismatch(
                 format!("{method} with --stabilize {asked}"),
                 reason,
@@ -181,7 +183,8 @@ pub(super) fn check_vibration(
         method,
         MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)
     ) {
-        let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows no derivative";
+        let reason = "the mean force of its vibration comes from the mass matrix, of which this method knows \
+            no derivative";
         return Err(mismatch(
             format!("{method} with the rigid spring `{name}`"),
             reason,
@@ -190,7 +193,8 @@ pub(super) fn check_vibration(
     }
     if *frequency < SEPARATE * rate {
         let reason = format!(
-            "it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to {rate:.3e} rad/s"
+            "it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to \
+                {rate:.3e} rad/s"
         );
         return Err(mismatch(
             format!("the rigid spring `{name}`"),
@@ -200,7 +204,8 @@ pub(super) fn check_vibration(
     }
     let share = energy / mechanism.energy_scale;
     notes.push(format!(
-        "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} rad/s act on average; its force is a mean"
+        "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} \
+            rad/s act on average; its force is a mean"
     ));
     Ok(())
 }
@@ -211,7 +216,8 @@ pub(in crate::run) fn check_forces_of_joints(mechanism: &Mechanism) -> Result<()
         return Ok(());
     };
     let what = format!("dry friction ({} {}) here", friction.kind(), friction.name);
-    let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are not determined";
+    let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are \
+        not determined";
     Err(mismatch(what, reason, "leave out a constraint that others imply already"))
 }
 

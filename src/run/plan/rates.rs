@@ -110,7 +110,8 @@ pub(super) fn model_error(mechanism: &Mechanism, rate: f64, notes: &mut Vec<Stri
     let share = rate / mechanism.rigid_rate?;
     let error = if mechanism.vibration.is_some() { 2.0 * share } else { share * share };
     notes.push(format!(
-        "rigid springs are a model: angles may be off by about {error:.0e} rad, whatever the tolerance, and more where errors grow"
+        "rigid springs are a model: angles may be off by about {error:.0e} rad, whatever the tolerance, and \
+            more where errors grow"
     ));
     Some(error)
 }

@@ -36,8 +36,14 @@ pub(super) fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<
         t: sample.t,
         step: plan.step.unwrap_or(0.0),
         what: match drift.singular {
-            Some(_) => format!("the energy balance is off by {off:.1e} of its scale: constraint {weakest} or its like has let go"),
-            None => format!("the energy balance is off by {off:.1e} of its scale, and nothing puts loops and sliders back"),
+            Some(_) => format!(
+                "the energy balance is off by {off:.1e} of its scale: constraint {weakest} or \
+                its like has let go"
+            ),
+            None => format!(
+                "the energy balance is off by {off:.1e} of its scale, and nothing puts loops and \
+                sliders back"
+            ),
         },
         hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
     })

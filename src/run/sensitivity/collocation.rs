@@ -1,7 +1,8 @@
 //! A step of the variational equation along a known motion, by Gauss collocation.
 //!
 //! ```text
-//! K_i = B_i (dq + c_i h dw + h² Σ_j (a a)_ij K_j) + C_i (dw + h Σ_j a_ij K_j) + F_i        B, C = da/dq, da/dw on dual numbers; F = da/dp
+//! K_i = B_i (dq + c_i h dw + h² Σ_j (a a)_ij K_j) + C_i (dw + h Σ_j a_ij K_j) + F_i
+//!     B, C = da/dq, da/dw on dual numbers; F = da/dp
 //! dq += h dw + h² Σ_i b_i (1 - c_i) K_i,   dw += h Σ_i b_i K_i
 //! ```
 //!

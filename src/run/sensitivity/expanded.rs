@@ -1,9 +1,12 @@
 //! Small differences on a step of the motion as power series, beside the motion's own.
 //!
 //! ```text
-//! scene, its numbers p seeded  →  mechanism, all constants (c, c')  →  series (w_m, w_m') about (q + dq, w + dw; p + dp)
-//! du(h) = du + Σ w_m' h^(m+1)/(m+1),   dw(h) = Σ w_m' h^m,   m = 0…P          driven angles: dq_i = du_base + Σ ± theta'
-//! G dq + C_p dp = 0,  (G w + C_t)' (dq, dw) + C'_p dp = 0                      residuals on the same numbers, after every step
+//! scene, its numbers p seeded  →  mechanism, all constants (c, c')  →  series (w_m, w_m') about (q + dq,
+//!     w + dw; p + dp)
+//! du(h) = du + Σ w_m' h^(m+1)/(m+1),   dw(h) = Σ w_m' h^m,   m = 0…P
+//!     driven angles: dq_i = du_base + Σ ± theta'
+//! G dq + C_p dp = 0,  (G w + C_t)' (dq, dw) + C'_p dp = 0
+//!     residuals on the same numbers, after every step
 //! ```
 //!
 //! The scene is read once more on [`Varied`] numbers, in which the numbers asked for are seeds, and compiled

@@ -1,8 +1,10 @@
 //! The Lyapunov spectrum of a motion: how fast small differences grow, in every direction.
 //!
 //! ```text
-//! columns (dq, dw) tangent to the constraints, made orthonormal after every step (Benettin):   λ_k = lim (1/t) Σ log r_kk
-//! ⟨x, y⟩ = ν² dqᵀ M dq + (P dw)ᵀ M (P dw)         P  onto the directions that the constraints allow, ν = 1/unit of time
+//! columns (dq, dw) tangent to the constraints, made orthonormal after every step (Benettin):
+//!     λ_k = lim (1/t) Σ log r_kk
+//! ⟨x, y⟩ = ν² dqᵀ M dq + (P dw)ᵀ M (P dw)
+//!     P  onto the directions that the constraints allow, ν = 1/unit of time
 //! ```
 //!
 //! In this product volumes are those of the phase space of positions and momenta of the constrained
@@ -359,7 +361,8 @@ impl Look for Orthonormal {
             return variation.lose("a joint closes or opens, and there are fewer or more directions");
         }
         if variation.met_several || variation.set.differ() {
-            let why = "several walls are met at once, or an event sets a number otherwise beside it, and volumes are not followed";
+            let why = "several walls are met at once, or an event sets a number otherwise beside it, and \
+                volumes are not followed";
             return variation.lose(why);
         }
         self.renew(variation, motion);

@@ -10,8 +10,10 @@
 //!
 //! ```text
 //! dy/dp = Y_x δ + Y_p       of an output Y(t, x; p)       δ  the column of p
-//! dt/dp = -(g_x δ + g_p)/g'  of the time of g = 0          extremes: as of an output at their own time, which counts
-//!                                                           at corners, jumps and the end of a run: dy/dp + y' dt/dp
+//! dt/dp = -(g_x δ + g_p)/g'  of the time of g = 0
+//!     extremes: as of an output at their own time, which counts
+//!                                                           at corners, jumps and the end of a run:
+//!                                                               dy/dp + y' dt/dp
 //! ```
 
 mod collocation;
@@ -136,7 +138,8 @@ impl Study {
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
         if mechanism.vibration.is_some() || !mechanism.tree.is_dense() {
-            let what = "small differences are followed beside `taylor`, which does not take this scene: rigid springs that vibrate have no series, and very many bodies are too many";
+            let what = "small differences are followed beside `taylor`, which does not take this scene: \
+                rigid springs that vibrate have no series, and very many bodies are too many";
             return Err(SensitivityError::Unsuited(what.into()));
         }
         let until = request.at.unwrap_or(scene.until);

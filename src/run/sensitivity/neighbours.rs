@@ -1,7 +1,8 @@
 //! What a number of the scene does to the equations: mechanisms at neighbouring values of it.
 //!
 //! ```text
-//! dF/dp = Σ_k c_k F(p + k e) / e        k = -2, -1, 1, 2: c = 1/12, -2/3, 2/3, -1/12;  or on one side k = 0…4: c = -25/12, 4, -3, 4/3, -1/4
+//! dF/dp = Σ_k c_k F(p + k e) / e
+//!     k = -2, -1, 1, 2: c = 1/12, -2/3, 2/3, -1/12;  or on one side k = 0…4: c = -25/12, 4, -3, 4/3, -1/4
 //! ```
 //!
 //! F stands for accelerations, constraints, gaps, impacts, outputs and the start, all at one and the same

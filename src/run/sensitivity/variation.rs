@@ -1,7 +1,8 @@
 //! Small differences beside a motion: of its start and of the numbers of its scene.
 //!
 //! ```text
-//! dq' = dw,    dw' = A_q dq + A_w dw + a_p dp          a(t, q, w; p) with the multipliers in it, all coordinates (index 1)
+//! dq' = dw,    dw' = A_q dq + A_w dw + a_p dp
+//!     a(t, q, w; p) with the multipliers in it, all coordinates (index 1)
 //! G dq + C_p dp = 0,  (G w + C_t)' (dq, dw) + C'_p dp = 0        kept after every step
 //! ```
 //!

@@ -7,9 +7,9 @@
 //!
 //! | verdict | what it means |
 //! | --- | --- |
-//! | right | confirmed, and within the tolerance of the known end; or refused or stopped where that is the only right answer |
+//! | right | confirmed, and near enough to the known end; or refused or stopped where only that is right |
 //! | refused | the pairing makes no sense, and the reason and an alternative were given |
-//! | stopped | a typed stop: a limit, the effort allowed, a step that does not converge, or an end that nothing confirms |
+//! | stopped | a limit, the effort allowed, a step that does not converge, an end that nothing confirms |
 //! | wrong | returned as a success, and it is not: a defect of this program |
 
 mod set;

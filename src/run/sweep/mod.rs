@@ -87,8 +87,8 @@ pub struct Sweep {
     stop: Option<Arc<AtomicBool>>,
     /// True where only starts are varied in which nothing else has a say: all points share one mechanism.
     shares: bool,
-    /// True where points of one structure are integrated beside each other: fewer with numbers of their own are
-    /// faster one by one.
+    /// True where points of one structure are integrated beside each other: fewer with numbers of their own
+    /// are faster one by one.
     is_many: bool,
 }
 

@@ -272,7 +272,11 @@ impl ErrorEstimator {
         Err(stop.unwrap_or_else(|| match measured.level {
             Level::Full => {
                 let expansions = reference_run.expansions();
-                format!("{CUT} was used up after t = {} s, by {expansions} expansions and the tangent flow along them", measured.until)
+                format!(
+                    "{CUT} was used up after t = {} s, by {expansions} expansions and the tangent flow \
+                    along them",
+                    measured.until
+                )
             }
             Level::Off | Level::Auto => "more would have taken too large a share of the run".into(),
         }))

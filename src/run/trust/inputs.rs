@@ -1,8 +1,10 @@
 //! What the digits of a scene's numbers leave uncertain in its motion, number by number.
 //!
 //! ```text
-//! effect of p = u max over times t <= at of |x(t; p + h) - x(t; p - h)| / 2h          u  half a unit of the last digit of p, as written
-//! total       = root of the sum of the squares of all effects                          x  angles, and positions over the longest bar
+//! effect of p = u max over times t <= at of |x(t; p + h) - x(t; p - h)| / 2h
+//!     u  half a unit of the last digit of p, as written
+//! total       = root of the sum of the squares of all effects
+//!     x  angles, and positions over the longest bar
 //! ```
 //!
 //! x(t; p ± h) are runs from neighbouring scenes by the series in doubles, at the tolerance of a reference

@@ -212,7 +212,8 @@ impl Measured {
                 let seconds =
                     if followed >= 0.01 { format!("{followed:.2}") } else { format!("{followed:.1e}") };
                 format!(
-                    "it was followed to t = {seconds} s only, more would have taken too large a share of the run (see --trust full)"
+                    "it was followed to t = {seconds} s only, more would have taken too large a share of the \
+                        run (see --trust full)"
                 )
             };
             self.no_growth.get_or_insert_with(why);
@@ -302,7 +303,8 @@ pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
 }
 
 /// The power of time with which the error of a regular motion grew over the last three quarters of the
-/// logarithm of time; `None` where it is not known to be regular, over many turns or half of that way at least.
+/// logarithm of time; `None` where it is not known to be regular, over many turns or half of that way at
+/// least.
 fn power(record: &[[f64; 2]], history: &[[f64; 2]], nature: Nature) -> Option<f64> {
     let (last, end) = (history.last()?, record.last()?);
     let half = history.iter().rev().find(|point| point[0] <= 0.5 * last[0])?;

@@ -7,8 +7,9 @@
 //! own, which depend neither on output times nor on rests:
 //!
 //! ```text
-//! E(t) = max over the looks up to t of sqrt(d² + R²)      d  largest difference of an angle [rad], or of a position over the longest bar
-//!                                                          R  the reference solution's own rounding where it is in doubles, carried along by the tangent flow
+//! E(t) = max over the looks up to t of sqrt(d² + R²)
+//!     d  largest difference of an angle [rad], or of a position over the longest bar
+//!     R  the reference solution's own rounding where it is in doubles, carried along by the tangent flow
 //! ```
 //!
 //! d is exact whatever the motion does, R matters near rounding only.  The *error estimate* is 1.2 E, the

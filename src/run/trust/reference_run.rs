@@ -194,8 +194,8 @@ impl ReferenceRun {
     /// Why the reference solution stopped, or `None` where the budget was used up.
     pub(super) fn go(&mut self, until: Time, purse: &mut WorkBudget) -> Result<(), Option<String>> {
         while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
-            // After an event that came in a long step of the flow its steps may be so short that they end before
-            // the step in which the motion is known.
+            // After an event that came in a long step of the flow its steps may be so short that they end
+            // before the step in which the motion is known.
             let is_behind = next < self.motion.time.hi && next < self.contact_driver.step_begin().hi;
             if !is_behind {
                 self.integrate(Time::from(next), purse)?;

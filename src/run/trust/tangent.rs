@@ -1,11 +1,14 @@
 //! The tangent flow along a motion: how small differences grow.
 //!
 //! ```text
-//! V' = (dq', dw') = (dw, da),    da = A_q dq + A_w dw        columns of V expanded beside the motion on dual numbers (module `beside`)
+//! V' = (dq', dw') = (dw, da),    da = A_q dq + A_w dw
+//!     columns of V expanded beside the motion on dual numbers (module `beside`)
 //! G dq = 0,  (G w + C_t)' (dq, dw) = 0                       kept after every step (module `ground`)
-//! Phi(t, 0) = product of the steps' matrices                 through impacts by the saltation matrix (module `impact`)
+//! Phi(t, 0) = product of the steps' matrices
+//!     through impacts by the saltation matrix (module `impact`)
 //! P <- Phi (P + Q_a) Phiᵀ + Q_b                              covariance of what rounding left
-//! s <- Phi s + h (σ a)                                       what a relative change of every force by 1, of random sign, and of the start comes to
+//! s <- Phi s + h (σ a)
+//!     what a relative change of every force by 1, of random sign, and of the start comes to
 //! ```
 //!
 //! The motion is that of the reference solution at the flow's own times, the ends of its steps.  Up to three

@@ -27,7 +27,8 @@ impl<'a, C: Decimal> Reader<'a, C> {
         self.root.items(of).into_iter().filter(|at| !is_law(at)).collect()
     }
 
-    /// Tables: numbers that stand in the text by their digits, those of files as the nearest doubles' shortest.
+    /// Tables: numbers that stand in the text by their digits, those of files as the nearest doubles'
+    /// shortest.
     pub(super) fn tables(&self, plain: &Scene) -> Vec<PointTable<C>> {
         let holder = self.root.child("tables");
         let table = |plain: &PointTable| {

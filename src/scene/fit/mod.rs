@@ -45,7 +45,8 @@ pub(super) fn fitted(
         for key in ["origin", "velocity"] {
             if let Some(at) = entry.as_ref().and_then(|entry| entry.fields.optional(key)) {
                 let problem = format!("is given, but bar `{}` hangs on the ground", scene.bars[bar].name);
-                let allowed = "only a bar that no hinge or weld ties to the ground, by itself or through others, has it to give";
+                let allowed = "only a bar that no hinge or weld ties to the ground, by itself or through \
+                    others, has it to give";
                 return Err(at.refuse(&problem, allowed, "leave it out; it follows from the angles"));
             }
         }

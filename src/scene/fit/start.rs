@@ -151,7 +151,8 @@ impl<'a> AngleConstraints<'a> {
         }
         match first.flatten() {
             Some(error) if entries.len() > 1 => Err(error.with_hint(format!(
-                "{} bars have no whole start; add \"start\": {{{}}}, with values for 0; only bars that a motor drives or a lock holds may be left out",
+                "{} bars have no whole start; add \"start\": {{{}}}, with values for 0; only bars that a \
+                    motor drives or a lock holds may be left out",
                 entries.len(),
                 entries.join(", ")
             ))),
@@ -260,11 +261,13 @@ pub(in crate::scene) fn written_starts(scene: &Scene) -> Vec<bool> {
 fn missing_start(root: &At, bar: &str, tied: bool) -> SceneError {
     let hint = if tied {
         format!(
-            "its motors and locks only tie it to other bars; add \"start\": {{\"{bar}\": {{\"phi\": 0, \"omega\": 0}}}} or that of one of those"
+            "its motors and locks only tie it to other bars; add \"start\": {{\"{bar}\": {{\"phi\": 0, \
+                \"omega\": 0}}}} or that of one of those"
         )
     } else {
         format!(
-            "add \"start\": {{\"{bar}\": {{\"phi\": 0, \"omega\": 0}}}}; only bars that a motor drives or a lock holds may be left out"
+            "add \"start\": {{\"{bar}\": {{\"phi\": 0, \"omega\": 0}}}}; only bars that a motor drives or a \
+                lock holds may be left out"
         )
     };
     root.missing("start", bar, "must be {\"phi\": angle in rad, \"omega\": rate in rad/s}", &hint)
@@ -286,7 +289,8 @@ fn agrees(
     let turns = (given - exact) / std::f64::consts::TAU;
     let hint = if unit == "rad" && turns.abs() >= 0.5 && (turns - turns.round()).abs() < 1e-9 {
         format!(
-            "leave it out, or write {exact:?}; angles are not taken modulo a turn, and this one is {turns:.0} turns off"
+            "leave it out, or write {exact:?}; angles are not taken modulo a turn, and this one is \
+                {turns:.0} turns off"
         )
     } else {
         format!("leave the bar out of \"start\", or write {exact:?}")

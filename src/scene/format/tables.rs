@@ -16,7 +16,8 @@ use super::{
 /// The whole scene.
 pub(in crate::scene) static SCENE: Table = Table {
     title: "a scene",
-    about: "A planar mechanism of bars, joints, springs, forces, motors and walls, in SI units; angles are absolute, from +x, counter-clockwise.",
+    about: "A planar mechanism of bars, joints, springs, forces, motors and walls, in SI units; angles are \
+        absolute, from +x, counter-clockwise.",
     fields: &[
         required(
             "name",
@@ -62,7 +63,9 @@ pub(in crate::scene) static SCENE: Table = Table {
             "tables",
             Shape::Tables,
             "{\"gust\": [[0, 0], [1, 2.5], [3, 0]]}",
-            "Functions by name, smooth through points (x, y), for formulas as gust(t): the points, a CSV file of two columns as \"gust.csv\", or two of its columns as {\"file\": \"log.csv\", \"x\": \"time\", \"y\": \"wind\"}; none if absent.",
+            "Functions by name, smooth through points (x, y), for formulas as gust(t): the points, a CSV \
+                file of two columns as \"gust.csv\", or two of its columns as \
+                {\"file\": \"log.csv\", \"x\": \"time\", \"y\": \"wind\"}; none if absent.",
         ),
         optional(
             "signals",
@@ -74,7 +77,8 @@ pub(in crate::scene) static SCENE: Table = Table {
             "integrals",
             Shape::Signals,
             "{\"sum\": \"aim - bar1.phi\"}",
-            "Integrals of formulas over time by name, from 0 on, for other formulas, as those of controllers; none if absent.",
+            "Integrals of formulas over time by name, from 0 on, for other formulas, as those of \
+                controllers; none if absent.",
         ),
         optional(
             "springs",
@@ -113,19 +117,22 @@ pub(in crate::scene) static SCENE: Table = Table {
             "outputs",
             Shape::Outputs,
             "{\"bearing\": \"A.force\", \"pen\": \"tip.x\"}",
-            "Columns of the trajectory beside those of every run, as formulas of the state and of what parts carry, by name; or a list of formulas, which then are their own names; none if absent.",
+            "Columns of the trajectory beside those of every run, as formulas of the state and of what parts \
+                carry, by name; or a list of formulas, which then are their own names; none if absent.",
         ),
         optional(
             "inactive",
             Shape::Names,
             "[\"latch\"]",
-            "Springs, torsion springs, forces, torques and potentials that do not act until an event switches them on; none if absent.",
+            "Springs, torsion springs, forces, torques and potentials that do not act until an event \
+                switches them on; none if absent.",
         ),
         optional(
             "start",
             Shape::ByBar(&START),
             "{\"bar1\": {\"phi\": 0, \"omega\": 0}}",
-            "What is known of each bar at t = 0, by bar name.  In a tree of hinges on the ground a bar that no motor drives must have its angle and rate; \
+            "What is known of each bar at t = 0, by bar name.  In a tree of hinges on the ground a bar that \
+                no motor drives must have its angle and rate; \
              where loops, sliders, welds or free bars are, the rest is found from what is given.",
         ),
         required("until", Shape::Number(positive("s")), "10", "Horizon: the run ends at this time."),
@@ -136,7 +143,8 @@ pub(in crate::scene) static SCENE: Table = Table {
 /// A bar by its shape.
 pub(in crate::scene) static UNIFORM_BAR: Table = Table {
     title: "a uniform bar",
-    about: "A bar is given either by length, width, thickness and density or by mass, centre and inertia; its frame has the origin at one \
+    about: "A bar is given either by length, width, thickness and density or by mass, centre and inertia; \
+        its frame has the origin at one \
             end and x along the bar.",
     fields: &[
         required("name", Shape::Name, "\"bar1\"", BAR_NAME),
@@ -148,7 +156,8 @@ pub(in crate::scene) static UNIFORM_BAR: Table = Table {
             "inertia",
             Shape::Inertia(INERTIA),
             "\"full\"",
-            "Inertia about the centre: \"full\" m(l² + w²)/12, \"slender\" m l²/12, or a number; \"full\" if absent.",
+            "Inertia about the centre: \"full\" m(l² + w²)/12, \"slender\" m l²/12, or a number; \"full\" if \
+                absent.",
         ),
     ],
 };
@@ -171,7 +180,8 @@ pub(in crate::scene) static OUTRIGHT_BAR: Table = Table {
             "length",
             Shape::Number(not_negative("m")),
             "0.6",
-            "Length in drawings; if absent, twice the distance of the centre, or twice the radius of gyration where that is zero.",
+            "Length in drawings; if absent, twice the distance of the centre, or twice the radius of \
+                gyration where that is zero.",
         ),
     ],
 };
@@ -220,7 +230,8 @@ pub(in crate::scene) static NAMED_POINT: Table = Table {
 /// An event.
 pub(in crate::scene) static EVENT: Table = Table {
     title: "an event",
-    about: "Where a formula of time and state passes zero; it is recorded, and may end the run or switch parts.",
+    about: "Where a formula of time and state passes zero; it is recorded, and may end the run or switch \
+        parts.",
     fields: &[
         required("name", Shape::Name, "\"upright\"", "Name, unique among events."),
         required(
@@ -233,7 +244,8 @@ pub(in crate::scene) static EVENT: Table = Table {
             "direction",
             Shape::Word(&["either", "rising", "falling"]),
             "\"rising\"",
-            "Which zeros count: \"rising\" from negative to positive, \"falling\" the others; \"either\" if absent.",
+            "Which zeros count: \"rising\" from negative to positive, \"falling\" the others; \"either\" if \
+                absent.",
         ),
         optional(
             "action",
@@ -260,7 +272,8 @@ pub(in crate::scene) static EVENT: Table = Table {
 /// The start of a bar.
 pub(in crate::scene) static START: Table = Table {
     title: "a start",
-    about: "What is known of a bar at t = 0; its origin and velocity only where no hinge or weld ties it, or the bars it hangs together with, to the ground.",
+    about: "What is known of a bar at t = 0; its origin and velocity only where no hinge or weld ties it, or \
+        the bars it hangs together with, to the ground.",
     fields: &[
         optional("phi", Shape::Number(ANGLE), "0", "Absolute angle; may be many turns."),
         optional("omega", Shape::Number(RATE), "0", "Rate."),

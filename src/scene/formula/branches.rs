@@ -18,7 +18,8 @@ pub(super) trait Branches<S> {
     /// True where the condition of this number, with this value, chooses its first branch.
     fn is_positive(&mut self, condition: usize, value: S) -> bool;
 
-    /// The piece of a table at `x`, whose conditions begin with number `first`; `knot` gives the x of a point.
+    /// The piece of a table at `x`, whose conditions begin with number `first`; `knot` gives the x of a
+    /// point.
     fn piece(&mut self, first: usize, knots: &Knots, x: S, knot: impl Fn(usize) -> S) -> usize;
 }
 

@@ -395,7 +395,8 @@ impl Formula {
 
     fn misfit(&self, node: usize, mismatch: &Mismatch) -> FormulaError {
         let (start, end) = self.places[node];
-        let hint = "numbers without a unit fit anything, as in sin(1*t); units stand behind numbers, as 5 mm or 30 deg";
+        let hint = "numbers without a unit fit anything, as in sin(1*t); units stand behind numbers, as 5 mm \
+            or 30 deg";
         FormulaError::new(&self.text, start as usize, end as usize, mismatch.to_string(), hint.into())
     }
 }

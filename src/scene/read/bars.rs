@@ -51,7 +51,8 @@ fn outright_bar(fields: &Fields, name: String) -> Result<Bar, SceneError> {
     let centre = fields.pair("centre")?;
     let at = fields.required("inertia")?;
     if matches!(&at.node.value, Value::Text(word) if word == "full" || word == "slender") {
-        let hint = "\"full\" and \"slender\" are for bars by width, thickness and density; of a slender bar of mass m and length l it is m l²/12";
+        let hint = "\"full\" and \"slender\" are for bars by width, thickness and density; of a slender bar \
+            of mass m and length l it is m l²/12";
         return Err(at.refuse_value("must be a number for a bar by its mass", hint));
     }
     let inertia = fields.number("inertia")?;

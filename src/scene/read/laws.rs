@@ -7,10 +7,9 @@ use super::resolve::{Known, check_name, fits, refused};
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, Quantity, SCENE, Shape};
 use crate::scene::formula::unit::Dimension;
-use crate::scene::law::{
-    Bound, Direction, Integral, Load, LoadLaw, NamedPoint, Names, SceneEvent, Scope, Signal,
-};
+use crate::scene::law::{Direction, Integral, Load, LoadLaw, NamedPoint, SceneEvent, Signal};
 use crate::scene::locate::{Member, Node, Value};
+use crate::scene::names::{Bound, Names, Scope};
 use crate::scene::set::hint;
 use crate::scene::{Coupling, Force, Scene, Spring, Torque, TorsionSpring};
 
@@ -308,11 +307,13 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> R
             let problem = format!("depends on {name}");
             let (allowed, hint) = match list {
                 "motors" => (
-                    "the aim of a motor is a formula of time, angles and positions; one of rates would be a non-holonomic constraint",
+                    "the aim of a motor is a formula of time, angles and positions; one of rates would be a \
+                        non-holonomic constraint",
                     "what acts on rates is a torque, as \"kp*(aim - arm.phi) - kd*arm.omega\" in torques",
                 ),
                 _ => (
-                    "a wall moves by a formula of time, angles and positions; rates jump where it is met, and the wall would jump with them",
+                    "a wall moves by a formula of time, angles and positions; rates jump where it is met, \
+                        and the wall would jump with them",
                     "carry the wall by a bar that a torque or a force drives by rates",
                 ),
             };
@@ -416,7 +417,8 @@ impl<'a> Parts<'a> {
                 None if self.0.is_empty() => "the scene has none".to_owned(),
                 None => format!("there are: {}", listed(&self.0)),
             };
-            let allowed = "must be the name of a spring, torsion spring, force, torque, potential, hinge, motor, lock or wall";
+            let allowed = "must be the name of a spring, torsion spring, force, torque, potential, hinge, \
+                motor, lock or wall";
             return Err(at.refuse_value(allowed, &hint));
         }
         Ok(())

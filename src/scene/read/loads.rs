@@ -28,7 +28,8 @@ pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spri
         let at = fields.required("damping")?;
         return Err(at.refuse(
             "is not 0",
-            "must be 0 for a spring of model \"rigid\": a damped vibration decays, and its mean force with it",
+            "must be 0 for a spring of model \"rigid\": a damped vibration decays, and its mean force with \
+                it",
             elastic,
         ));
     }

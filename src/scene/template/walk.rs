@@ -33,7 +33,9 @@ impl Walk<'_> {
             if node.is_none() && steps.peek().is_some() {
                 return Err((
                     format!("{walked} is not in the scene"),
-                    "a part of the start that is found or that a motor gives cannot be varied; else add it to the file".into(),
+                    "a part of the start that is found or that a motor gives cannot be varied; else add it \
+                        to the file"
+                        .into(),
                 ));
             }
             match (&field.shape, steps.peek()) {

@@ -2,7 +2,8 @@
 //! the unit lengths, both levels with one set of factors ([`keeper`](crate::dynamics::natural::keeper)).
 //!
 //! ```text
-//! z -> z - dz:   q -= atan(z × dz / (1 - z·dz));        v = i z w at the new place,  v -> v - dv:   w -= z × dv
+//! z -> z - dz:   q -= atan(z × dz / (1 - z·dz));
+//!     v = i z w at the new place,  v -> v - dv:   w -= z × dv
 //! ```
 //!
 //! The shortest way in the metric of the mass matrix, as in angles, for about a fifth of the time.

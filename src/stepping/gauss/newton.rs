@@ -1,8 +1,10 @@
 //! Stages by Newton's method, where iterations contract slowly or not at all.
 //!
 //! ```text
-//! R_j = h b_j f(Y_j) - L_j,      (1 - h A⊗J) dK = R/(h b),      L_j += h b_j dK_j                 J at the middle of the step, once a step
-//! A = Σ mu_k r_k l_k,  l_k r_k = 1:    dK = Σ r_k (1 - h mu_k J)^-1 l_k R/(h b)                   pairs of complex modes share their factors
+//! R_j = h b_j f(Y_j) - L_j,      (1 - h A⊗J) dK = R/(h b),      L_j += h b_j dK_j
+//!     J at the middle of the step, once a step
+//! A = Σ mu_k r_k l_k,  l_k r_k = 1:    dK = Σ r_k (1 - h mu_k J)^-1 l_k R/(h b)
+//!     pairs of complex modes share their factors
 //! ```
 //!
 //! The residual is that of the iterations, at the end in pairs of doubles, so that what is solved for is the

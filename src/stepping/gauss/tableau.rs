@@ -13,7 +13,8 @@
 //! whatever its entries:
 //!
 //! ```text
-//! Σ_j sigma_ij L_j = ± Σ_j eta_ij (L_j + L_j') - Σ_j eta_ji (L_j - L_j')      (j <= s/2; + for i <= s/2, - for its mirror image)
+//! Σ_j sigma_ij L_j = ± Σ_j eta_ij (L_j + L_j') - Σ_j eta_ji (L_j - L_j')
+//!     (j <= s/2; + for i <= s/2, - for its mirror image)
 //! eta_ij = (sigma_ij + sigma_ij')/2,    eta_ij = sigma_ij where j = j'
 //! ```
 //!

@@ -117,14 +117,16 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 256, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn no_sample_of_a_polynomial_is_negative_before_its_passage(powers in prop::collection::vec(-1.0..1.0_f64, 2..22), start in 1e-6..1.0_f64) {
+    fn no_sample_of_a_polynomial_is_negative_before_its_passage(powers in prop::collection::vec(-1.0..1.0_f64,
+        2..22), start in 1e-6..1.0_f64) {
         let mut powers = powers;
         powers[0] = start;
         agrees(&Powers { powers: &powers, end: 1.0 }, crossing(&powers, 1.0))?;
     }
 
     #[test]
-    fn the_first_of_random_zeros_is_found(first in 0.01..0.9_f64, apart in -8.0..-0.5_f64, others in prop::collection::vec(1.1..3.0_f64, 0..8)) {
+    fn the_first_of_random_zeros_is_found(first in 0.01..0.9_f64, apart in -8.0..-0.5_f64,
+        others in prop::collection::vec(1.1..3.0_f64, 0..8)) {
         // Two zeros close together, the others beyond the step.
         let mut roots = vec![first, first + 10_f64.powf(apart)];
         roots.extend(&others);
@@ -139,7 +141,8 @@ proptest! {
     }
 
     #[test]
-    fn an_interpolant_finds_what_its_function_has(slow in 0.5..9.0_f64, phase in 0.0..6.0_f64, shift in -0.95..0.95_f64) {
+    fn an_interpolant_finds_what_its_function_has(slow in 0.5..9.0_f64, phase in 0.0..6.0_f64,
+        shift in -0.95..0.95_f64) {
         let function = |t: f64| (slow * t + phase).cos() * (0.3 * t).exp() + shift;
         let values: Vec<f64> = chebyshev::Nodes::new(32).places.into_iter().map(function).collect();
         let curve = Chebyshev::through(&values);

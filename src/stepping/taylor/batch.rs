@@ -190,10 +190,10 @@ impl Batch {
     }
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
-    /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off their
-    /// axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls, all by
-    /// smooth formulas or without, and no friction; and the same with closed loops, sliders, gears and cams,
-    /// their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
+    /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off
+    /// their axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls,
+    /// all by smooth formulas or without, and no friction; and the same with closed loops, sliders, gears and
+    /// cams, their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
     pub fn takes_alike(mechanism: &Mechanism) -> bool {
         !mechanism.has_stops() && Self::takes_alike_with_stops(mechanism)
     }
@@ -203,9 +203,10 @@ impl Batch {
         goes_on(mechanism) && trees::fits(mechanism)
     }
 
-    /// True for those of the latter whose trajectories may have numbers of their own: all of them, with closed
-    /// loops or without.  Beside each other are mechanisms that differ in nothing but their numbers, have the
-    /// same ones zero and the same redundant constraints; numbers in laws of motors by formulas are equal.
+    /// True for those of the latter whose trajectories may have numbers of their own: all of them, with
+    /// closed loops or without.  Beside each other are mechanisms that differ in nothing but their numbers,
+    /// have the same ones zero and the same redundant constraints; numbers in laws of motors by formulas are
+    /// equal.
     pub fn takes_own_numbers(mechanism: &Mechanism) -> bool {
         Self::takes_alike(mechanism)
     }
@@ -256,7 +257,8 @@ impl Batch {
                             is_same || goes_on(one.mechanism) && <$team>::fits(one, &members[next])
                         };
                         let fits: Vec<bool> =
-                            members.iter().zip(&is_done).map(|(one, is_done)| !is_done && fits(one)).collect();
+                            members.iter().zip(&is_done).map(|(one,
+                                is_done)| !is_done && fits(one)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
                         self.integrate_those::<$team>(next, &fits, members, until, observer);
                         continue;

@@ -5,7 +5,8 @@
 //! two sums over the bodies, one after the other:
 //!
 //! ```text
-//! e_{k+1} = left(f_k)/(k+1),    g = Σ_{j=0..k} v_j e_{k+1-j}                   f_{k+1} without its newest term
+//! e_{k+1} = left(f_k)/(k+1),    g = Σ_{j=0..k} v_j e_{k+1-j}
+//!     f_{k+1} without its newest term
 //! r = (e_k × W - Σ_{m=1..k} e_{k+1-m}·P_m)/(k+1),    P_m = A m f_m
 //! v_{k+1} = M_0⁻¹ r - C g_x - S g_y,    C = M_0⁻¹ c_0 A,  S = M_0⁻¹ s_0 A,    f_{k+1} = g + v_{k+1} e_0
 //! ```

@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! phi = q π/2 + r + rest, |r| <= π/4;   cos r = 1 - r²/2 + r⁴ C(r²),   sin r = r + r³ S(r²)
-//! cos phi = (1 - |q|) cos r - q (2 - |q|) sin r,    sin phi = (1 - |q|) sin r + q (2 - |q|) cos r,    q = -2…2
+//! cos phi = (1 - |q|) cos r - q (2 - |q|) sin r,    sin phi = (1 - |q|) sin r + q (2 - |q|) cos r,
+//!     q = -2…2
 //! ```
 //!
 //! Both series are the Taylor series to r¹⁸ and r¹⁷, whose next terms are below 3e-21 and 1e-19: no fitted
@@ -100,7 +101,8 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
         #[test]
-        fn unit_vectors_are_rounded_almost_correctly(angle in -std::f64::consts::PI..=std::f64::consts::PI, rest in -1e-17..1e-17f64) {
+        fn unit_vectors_are_rounded_almost_correctly(angle in -std::f64::consts::PI..=std::f64::consts::PI,
+            rest in -1e-17..1e-17f64) {
             prop_assert!(error(angle, rest) < 0.75, "{angle}: {} ulp", error(angle, rest));
         }
     }

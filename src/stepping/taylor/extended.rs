@@ -7,7 +7,8 @@
 //!
 //! ```text
 //! e_{k+1} = left(f_k)/(k+1),   g = Σ_{j=0..k} v_j e_{k+1-j}
-//! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A Σ_{m=1..k} m e_{k+1-m}·f_{j,m} - A (k+1) e_0·g_j),   f_{k+1} = g + v_{k+1} e_0
+//! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A Σ_{m=1..k} m e_{k+1-m}·f_{j,m} - A (k+1) e_0·g_j),
+//!     f_{k+1} = g + v_{k+1} e_0
 //! ```
 
 use super::pair::{self, Flow, Newest, Pair, Start};

@@ -3,7 +3,8 @@
 //! ```text
 //! z = Σ z_k h^k, multipliers mu_k of |z| = 1;  W, and the pins in it, constant: see `dynamics::natural`
 //! f_m = F_m - Σ_{j<m} mu_j z_{m-j},    q_m = (m+1)(m+2)/2 Σ_{j=1..m+1} z_j·z_{m+2-j}
-//! mu_m = S⁻¹ q_m + Uᵀ f_m,    (m+1)(m+2) z_{m+2} = P f_m - U q_m,    V_j = W_·j z_j,  U = V S⁻¹,  P = W - U Vᵀ
+//! mu_m = S⁻¹ q_m + Uᵀ f_m,    (m+1)(m+2) z_{m+2} = P f_m - U q_m,
+//!     V_j = W_·j z_j,  U = V S⁻¹,  P = W - U Vᵀ
 //! ```
 //!
 //! Three Cauchy products a body and order, no sine beyond the first, and one stage of constant matrices

@@ -5,7 +5,8 @@
 //!
 //! ```text
 //! e' = left(f),    d_i v_i' + A e_i·f_j' = e_i × W_i
-//! (k+1) e_{k+1} = left(f_k),   f_k = Σ v_j e_{k-j},   (k+1) M_0 v_{k+1} = e_k × W - A Σ_{m=1..k+1} m e_{k+1-m}·f_{j,m} without v_{k+1}
+//! (k+1) e_{k+1} = left(f_k),   f_k = Σ v_j e_{k-j},
+//!     (k+1) M_0 v_{k+1} = e_k × W - A Σ_{m=1..k+1} m e_{k+1-m}·f_{j,m} without v_{k+1}
 //! ```
 //!
 //! No second derivatives of sines and no angle differences; two Cauchy products share one operand.  M_0⁻¹ is
@@ -15,7 +16,8 @@
 //! ```text
 //! f_k = g_k + v_k e_0,    B = Σ_{j=1..k-1} v_j e_{k+1-j},    g_{k+1} = B + v_k e_1 + v_0 e_{k+1}
 //! X = Σ_{m=1..k-1} m e_{k+1-m}·f_{j,m} + (k+1) e_0·B_j - (k v_0 - v_{j,0}) (s, -c)_0·g_{j,k}
-//! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A X) + M_0⁻¹ T_k (v_2, v_1)_k,    T_k = ± A sin(phi_1 - phi_2) (k v_0 - (k+2) v_{j,0})
+//! (k+1) v_{k+1} = M_0⁻¹ (e_k × W - A X) + M_0⁻¹ T_k (v_2, v_1)_k,
+//!     T_k = ± A sin(phi_1 - phi_2) (k v_0 - (k+2) v_{j,0})
 //! ```
 //!
 //! **A constant rounded once and used in every step is a drift**, since its error has the same sign for ever.

@@ -200,7 +200,8 @@ mod tests {
     proptest! {
         #[test]
         fn lanes_compute_as_double_double_does(a in pair(), b in pair(), c in pair()) {
-            let close = |found: Wide<Portable>, exact: DoubleDouble, size: f64| (narrow(found, 2) - exact).hi.abs() <= 1e-30 * size;
+            let close = |found: Wide<Portable>, exact: DoubleDouble,
+            size: f64| (narrow(found, 2) - exact).hi.abs() <= 1e-30 * size;
             prop_assert!(close(wide(a).add(wide(b)), a + b, 6.0));
             prop_assert!(close(wide(a).mul(wide(b)), a * b, 9.0));
             prop_assert!(close(wide(a).with(wide(b), wide(c)).formed(), a + b * c, 12.0));

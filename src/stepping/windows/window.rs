@@ -9,8 +9,8 @@ use std::cell::RefCell;
 /// singularity, which may be one of a law that the motion has left before.
 const STALLED: (u64, f64) = (1000, 1e-3);
 
-/// Writes y' at (t, y), of a field of any type: the crate's methods are compiled once for each number of unknowns,
-/// and not for each field.
+/// Writes y' at (t, y), of a field of any type: the crate's methods are compiled once for each number of
+/// unknowns, and not for each field.
 pub type Rates<'a> = dyn FnMut(Time, &[f64], &mut [f64]) + 'a;
 
 /// The field as the crate calls it: unknowns of the field, then the time since the window's start, all over

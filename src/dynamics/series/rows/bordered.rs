@@ -226,8 +226,8 @@ impl<T: SeriesNumber> RowSeries<T> {
         }
     }
 
-    /// How far the rows are off their laws and aims at elements `z`, an angle by its sine's series up to the fifth
-    /// power \[m, rad\].
+    /// How far the rows are off their laws and aims at elements `z`, an angle by its sine's series up to the
+    /// fifth power \[m, rad\].
     #[inline(always)]
     pub fn violations(&mut self, z: &[Complex<T>]) {
         for (i, kind) in self.kinds.iter().enumerate() {

@@ -31,8 +31,8 @@ impl RowMeasures {
     }
 }
 
-/// The longest lever of a row; one of an origin is the unit of length \[m\], and so is that of an aim at least,
-/// or 1 where it gives an angle.
+/// The longest lever of a row; one of an origin is the unit of length \[m\], and so is that of an aim at
+/// least, or 1 where it gives an angle.
 fn longest_lever(row: &ConstraintEquation, unit: f64) -> f64 {
     let Measure::Place(place) = &row.measure else { return 1.0 };
     let least = match (&row.aim, row.is_in_radians()) {

@@ -7,8 +7,8 @@ use crate::run::event::search::Passage;
 
 impl EventDetector {
     /// Takes back what passes zero later than the step of so many seconds is cut short; where that is at its
-    /// `begin`, functions are on the sides `before` and at zero as then, but those of events that happened: what the
-    /// step shows is not what follows.
+    /// `begin`, functions are on the sides `before` and at zero as then, but those of events that happened:
+    /// what the step shows is not what follows.
     pub(super) fn cut(
         &mut self,
         passages: &[Passage],

@@ -1,8 +1,10 @@
 //! The series of a motion with those of small differences beside it, on dual numbers.
 //!
 //! ```text
-//! (w_m, w_m') of (u, w) moved by (du, dw):      du(h) = du + Σ w_m' h^(m+1)/(m+1),   dw(h) = Σ w_m' h^m,      m = 0…P
-//! r = min over the last powers k and the columns of max((|w_0'|/|w_k'|)^(1/k), (|w_1'|/|w_k'|)^(1/(k-1))),     h = r tolerance^(1/(P+1))
+//! (w_m, w_m') of (u, w) moved by (du, dw):      du(h) = du + Σ w_m' h^(m+1)/(m+1),   dw(h) = Σ w_m' h^m,
+//!     m = 0…P
+//! r = min over the last powers k and the columns of max((|w_0'|/|w_k'|)^(1/k), (|w_1'|/|w_k'|)^(1/(k-1))),
+//!     h = r tolerance^(1/(P+1))
 //! ```
 //!
 //! Near singular positions the radius is that of the lower powers, and the sums end with the smallest one.

@@ -1,7 +1,8 @@
 //! A step's own matrix from the Jacobian, for a few coordinates under gravity alone.
 //!
 //! ```text
-//! K_i = B_i (dq + c_i h dw + h² Σ_j (a a)_ij K_j) + C_i (dw + h Σ_j a_ij K_j)              da = B dq + C dw at the Gauss points c_i
+//! K_i = B_i (dq + c_i h dw + h² Σ_j (a a)_ij K_j) + C_i (dw + h Σ_j a_ij K_j)
+//!     da = B dq + C dw at the Gauss points c_i
 //! Phi (dq, dw) = (dq + h dw + h² Σ_i b_i (1 - c_i) K_i,  dw + h Σ_i b_i K_i)
 //! ```
 //!

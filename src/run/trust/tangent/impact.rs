@@ -100,7 +100,8 @@ impl Tangent {
         let Some(set) = passed.set else { return Ok(()) };
         let drives = self.mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.drives());
         if drives && set.iter().flatten().any(|slope| *slope != 0.0) {
-            let what = "an event sets a parameter beside formulas of motors or walls, which neighbouring motions set otherwise";
+            let what = "an event sets a parameter beside formulas of motors or walls, which neighbouring \
+                motions set otherwise";
             return Err(what.into());
         }
         all.iter_mut().zip(set).for_each(|(column, set)| column[2 * n..].copy_from_slice(&set));

@@ -35,7 +35,8 @@ const STATIC: Field = optional(
 /// Dry friction of a hinge.
 pub(in crate::scene) static HINGE_FRICTION: Table = Table {
     title: "friction of a hinge",
-    about: "Coulomb friction: a torque of the coefficient times the radius times the force that the hinge carries.",
+    about: "Coulomb friction: a torque of the coefficient times the radius times the force that the hinge \
+        carries.",
     fields: &[
         required("radius", Shape::Number(positive("m")), "0.01", "Radius at which it acts."),
         KINETIC,
@@ -61,7 +62,8 @@ pub(in crate::scene) static WALL_FRICTION: Table = Table {
             "impact",
             Shape::Word(&["poisson", "newton"]),
             "\"newton\"",
-            "What restitution multiplies in an impact: \"poisson\", the impulse of compression; \"newton\", the normal velocity; \"poisson\" if absent.",
+            "What restitution multiplies in an impact: \"poisson\", the impulse of compression; \"newton\", \
+                the normal velocity; \"poisson\" if absent.",
         ),
     ],
 };
@@ -93,7 +95,8 @@ pub(in crate::scene) static SLIDER: Table = Table {
             "angle",
             Shape::Word(&["free", "locked"]),
             "\"locked\"",
-            "Whether the two bodies may turn on each other, or keep the angle between them that they have at the start; \"free\" if absent.",
+            "Whether the two bodies may turn on each other, or keep the angle between them that they have at \
+                the start; \"free\" if absent.",
         ),
         optional(
             "friction",
@@ -128,7 +131,8 @@ pub(in crate::scene) static RAIL: Table = Table {
 /// A weld.
 pub(in crate::scene) static WELD: Table = Table {
     title: "a weld",
-    about: "Two places that coincide, of bodies that keep the angle between them that they have at the start.",
+    about: "Two places that coincide, of bodies that keep the angle between them that they have at the \
+        start.",
     fields: &[
         required("name", Shape::Name, "\"W\"", "Name, unique among welds; it also names the constraints."),
         required("between", Shape::Between, PLACES, "The two places, on different bodies."),
@@ -166,7 +170,8 @@ pub(in crate::scene) static WALL: Table = Table {
             "law",
             Shape::Law(&WALL_LAW, signed("m")),
             "\"5 mm*sin(30*t)\"",
-            "How far the line has moved along its normal, as a function of time or a formula of angles and positions; it stays if absent.",
+            "How far the line has moved along its normal, as a function of time or a formula of angles and \
+                positions; it stays if absent.",
         ),
         optional(
             "friction",

@@ -21,7 +21,8 @@ pub(in crate::scene) static SPRING: Table = Table {
             "model",
             Shape::Word(&["elastic", "rigid"]),
             "\"rigid\"",
-            "\"rigid\" takes a very stiff spring for a rod of its free length, and its fast vibration for the force it exerts on average; \"elastic\" if absent.",
+            "\"rigid\" takes a very stiff spring for a rod of its free length, and its fast vibration for \
+                the force it exerts on average; \"elastic\" if absent.",
         ),
     ],
 };
@@ -69,7 +70,8 @@ const TURNS_BACK: &str = "Torque that turns the bar back, against growing angles
 /// A torsion spring by its energy.
 pub(in crate::scene) static TORSION_SPRING_BY_POTENTIAL: Table = Table {
     title: "a torsion spring with a law of its energy",
-    about: "A torsion spring whose energy is a formula of its `angle`; what a formula of `torque` adds does work.",
+    about: "A torsion spring whose energy is a formula of its `angle`; what a formula of `torque` adds does \
+        work.",
     fields: &[
         required("name", Shape::Name, "\"coil\"", "Name, unique among torsion springs."),
         required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
@@ -106,7 +108,8 @@ pub(in crate::scene) static POTENTIAL: Table = Table {
 /// A force.
 pub(in crate::scene) static FORCE: Table = Table {
     title: "a force",
-    about: "A force at a point of a bar, in the directions of the ground or of the bar, constant or times a law of time.",
+    about: "A force at a point of a bar, in the directions of the ground or of the bar, constant or times a \
+        law of time.",
     fields: &[
         required("name", Shape::Name, "\"push\"", "Name, unique among forces."),
         required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),
@@ -121,7 +124,8 @@ pub(in crate::scene) static FORCE: Table = Table {
             "frame",
             Shape::Word(&["ground", "body"]),
             "\"body\"",
-            "Whose x and y the force has: the \"ground\"'s, or those of the \"body\", with which it turns; \"ground\" if absent.",
+            "Whose x and y the force has: the \"ground\"'s, or those of the \"body\", with which it turns; \
+                \"ground\" if absent.",
         ),
         optional(
             "law",
@@ -135,7 +139,8 @@ pub(in crate::scene) static FORCE: Table = Table {
 /// A torque.
 pub(in crate::scene) static TORQUE: Table = Table {
     title: "a torque",
-    about: "A torque on a bar, and its opposite on another where it is between two; constant or times a law of time.",
+    about: "A torque on a bar, and its opposite on another where it is between two; constant or times a law \
+        of time.",
     fields: &[
         required("name", Shape::Name, "\"torque\"", "Name, unique among torques."),
         required("body", Shape::Body { ground: false }, "\"bar1\"", "The bar."),

@@ -1,8 +1,10 @@
 //! Whether a point can come to a wall in a step, lane by lane, by bounds alone.
 //!
 //! ```text
-//! g(t) >= g + g' t - B t²/2,    |g''| <= B = Σ |g_k| (a_k + w_k²) + Σ |h_jk| (a_j + (w_j + w_k)² + a_k) + |s''|
-//! w = Σ |w_m| h^m,  a = Σ m |w_m| h^(m-1)                                 bounds of rates and accelerations in a step h
+//! g(t) >= g + g' t - B t²/2,
+//!     |g''| <= B = Σ |g_k| (a_k + w_k²) + Σ |h_jk| (a_j + (w_j + w_k)² + a_k) + |s''|
+//! w = Σ |w_m| h^m,  a = Σ m |w_m| h^(m-1)
+//!     bounds of rates and accelerations in a step h
 //! ```
 //!
 //! Where a body floats its place x is an element as unit vectors are, of length |x| + w h, with |x'| <= w and
@@ -12,9 +14,9 @@
 //! |(h z_j·z_k)''| <= |h| (|z_j''| |z_k| + 2 |z_j'| |z_k'| + |z_j| |z_k''|)
 //! ```
 //!
-//! The right side is concave, so that its ends tell.  Where it says nothing halves of the step are asked, each
-//! from the motion at its beginning.  Up to a part that may hold an impact the step is clear; where that is
-//! next to nothing the trajectory is left to code that finds the moment of an impact and what it does.
+//! The right side is concave, so that its ends tell.  Where it says nothing halves of the step are asked,
+//! each from the motion at its beginning.  Up to a part that may hold an impact the step is clear; where that
+//! is next to nothing the trajectory is left to code that finds the moment of an impact and what it does.
 
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::LANES;

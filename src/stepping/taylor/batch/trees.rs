@@ -2,8 +2,8 @@
 //! sliders, gears and cams, all lanes of mechanisms with one structure: the series of
 //! [`dynamics`](crate::dynamics::series) on numbers with a lane for each trajectory.
 //!
-//! Constraint equations are kept by multipliers, and by a projection after every step.  A trajectory leaves the
-//! lanes where a step begins or ends near a singular position, does not end on its rows, or may come to a
+//! Constraint equations are kept by multipliers, and by a projection after every step.  A trajectory leaves
+//! the lanes where a step begins or ends near a singular position, does not end on its rows, or may come to a
 //! wall: from where that step began it has to go on alone.
 
 use super::super::terms::over;

@@ -1,7 +1,8 @@
 //! A spring's series, in which products of one order are of neighbours in memory.
 //!
 //! ```text
-//! q = |D|²,   s = q^(-1/2):  m q_0 s_m = Σ_{j=1..m} (j/2 - m) q_j s_{m-j},   F_m = k (L0 Σ s_j D_{m-j} - D_m)
+//! q = |D|²,   s = q^(-1/2):  m q_0 s_m = Σ_{j=1..m} (j/2 - m) q_j s_{m-j},
+//!     F_m = k (L0 Σ s_j D_{m-j} - D_m)
 //! ```
 
 use super::MOST;
