@@ -177,10 +177,10 @@ fn duration(seconds: f64) -> String {
 
 /// The rows as a table for spreadsheets, with units in its head; what was not measured is empty.
 pub fn csv(comparison: &Comparison) -> String {
-    const HEAD: &str = "method,setting,stabilize,status,error [rad],rate_error [rad/s],energy_drift \
-        [1],constraint_drift [rad or m],\
-                        constraint_rate_drift [rad/s or m/s],wall [s],wall_spread \
-                        [s],evaluations,steps,rejected,pareto\n";
+    const HEAD: &str = "method,setting,stabilize,status,error [rad],rate_error [rad/s],\
+                        energy_drift [1],constraint_drift [rad or m],\
+                        constraint_rate_drift [rad/s or m/s],wall [s],wall_spread [s],\
+                        evaluations,steps,rejected,pareto\n";
     let front = comparison.front();
     let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or(String::new(), |x| format!("{x:e}"));
     let mut text = HEAD.to_owned();

@@ -25,8 +25,8 @@ pub fn object(plan: &Stress, lines: &[Line]) -> Value {
 /// The cells as lines of comma-separated values.
 pub fn csv(lines: &[Line]) -> String {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
-    let mut text = "scene,method,verdict,tolerance [rad],setting,error [rad],estimate [rad],energy drift \
-            [1],evaluations,runs,cause\n"
+    let mut text = "scene,method,verdict,tolerance [rad],setting,error [rad],estimate [rad],\
+                    energy drift [1],evaluations,runs,cause\n"
         .to_owned();
     for line in lines {
         for cell in &line.cells {

@@ -10,8 +10,8 @@ use serde_json::{Value, json};
 /// where there is no figure.
 pub fn object(trust: Option<&Trust>) -> Value {
     let Some(trust) = trust else {
-        return json!({"error_estimate": null, "horizon_s": null, "how": How::None.word(), "why": "not asked \
-            for"});
+        return json!({"error_estimate": null, "horizon_s": null, "how": How::None.word(),
+            "why": "not asked for"});
     };
     let from = match trust.how {
         How::Extrapolated(from) => Some(from),

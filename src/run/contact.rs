@@ -305,8 +305,7 @@ impl ContactDriver {
         }
         let what = format!("more than {EVENTS_MOST} impacts and releases before the next output time");
         let hint = "shorten the output interval, lower the restitution, or look for a point that motors \
-            squeeze \
-                    between walls";
+                    squeeze between walls";
         Err(self.stopped(&outcome.plan, what, hint))
     }
 
