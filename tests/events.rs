@@ -4,6 +4,7 @@
 use crate::common;
 
 use common::{pendulum, quarter_period, run};
+use driftless::Simulation;
 use driftless::run::{MethodId, Outcome, Point, Request, Stabilization, Sweep, Vary, sweep};
 use driftless::scene::{Scene, Template, Wall, parse_scene};
 use driftless::stepping::Cause;
@@ -297,6 +298,51 @@ fn an_impact_is_found_right_after_another_body_has_left_its_wall() {
             );
             let (found, exact) = (outcome.last.velocity[1][1], 9.81 * (0.5 * fall - rest));
             assert!((found - exact).abs() < 1e-9, "{name}, ceiling at {at} rad: {found} instead of {exact}");
+        }
+    }
+}
+
+/// A torque that the clock switches off at the time of a row: the row shows the bar without it, by every method.
+/// Without friction that is `(-m g c cos phi)/I`.
+#[test]
+fn rows_at_the_time_of_an_event_show_what_comes_after_it() {
+    for friction in ["", r#", "friction": {"radius": 0.02, "kinetic": 0.3}"#] {
+        for row in [3_u32, 7, 14, 17, 22, 23, 26, 39, 46, 51] {
+            let t = f64::from(row * 5) / 100.0;
+            let text = format!(
+                r#"{{"name": "switched", "gravity": [0, -9.81], "until": 3, "every": 0.05,
+                "bars": [{{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+                "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]
+                    {friction}}}],
+                "torques": [{{"name": "T", "body": "b", "torque": 5}}],
+                "events": [{{"name": "e", "when": "t - {t}", "off": ["T"]}}],
+                "outputs": ["b.alpha"], "start": {{"b": {{"phi": 0.3, "omega": 0}}}}}}"#
+            );
+            let scene = parse_scene(&text, "switched", &[]).expect("a scene");
+            let seen = METHODS.map(|name| {
+                let (mut seen, mut number) = (None, 0);
+                Simulation::new(&scene)
+                    .expect("a simulation")
+                    .method(name.parse().expect("a method"))
+                    .tolerance(1e-10, 1e-10)
+                    .run_with(|sample| {
+                        if number == row {
+                            seen = Some((sample.phi[0], sample.outputs[0]));
+                        }
+                        number += 1;
+                        Ok(())
+                    })
+                    .expect("a run");
+                seen.expect("a row")
+            });
+            for (name, (phi, alpha)) in METHODS.iter().zip(seen) {
+                assert!((alpha - seen[0].1).abs() < 1e-6, "{name} at {t} s: {alpha} and {}", seen[0].1);
+                let free = -9.81 * 0.5 * phi.cos() / 0.35;
+                assert!(
+                    !friction.is_empty() || (alpha - free).abs() < 1e-9,
+                    "{name} at {t} s: {alpha}, not {free}"
+                );
+            }
         }
     }
 }

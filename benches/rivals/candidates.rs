@@ -30,7 +30,7 @@ pub fn all(problem: &Problem) -> Vec<Candidate<'_>> {
     }
     if problem.mechanism.bodies.len() == 2 {
         all.push(dop853(problem));
-        if problem.mechanism.constraints.is_empty() {
+        if problem.mechanism.constraints.is_empty() && problem.mechanism.springs.is_empty() {
             let hand = TwoBars::of(&problem.mechanism);
             let each = move |integrate: fn(&TwoBars, &Motion, f64, f64) -> Motion| -> Runner {
                 Box::new(move |tolerance| {

@@ -36,15 +36,17 @@ fn main() {
         return serve::serve();
     }
     let wanted: Vec<String> = std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
-    let cases: [(&str, &[f64]); 5] = [
+    let cases: [(&str, &[f64]); 7] = [
         ("free", &[1e-6, 1e-9]),
         ("gentle", &[1e-12]),
+        ("spring", &[1e-9]),
         ("motor", &[1e-9]),
+        ("motor_sine", &[1e-9]),
         ("chain3", &[1e-7]),
         ("chain6", &[1e-8]),
     ];
     println!(
-        "{:8} {:>6}  {:36} {:>8} {:>8} {:>9} {:>9}",
+        "{:10} {:>6}  {:36} {:>8} {:>8} {:>9} {:>9}",
         "scene", "target", "code", "setting", "error", "min us/s", "median"
     );
     for (name, targets) in cases {
@@ -71,11 +73,11 @@ fn main() {
                     Some((tolerance, error)) => {
                         let (least, middle) = (times[0], times[times.len() / 2]);
                         println!(
-                            "{name:8} {target:6.0e}  {:36} {tolerance:8.1e} {error:8.1e} {least:9.2} {middle:9.2}",
+                            "{name:10} {target:6.0e}  {:36} {tolerance:8.1e} {error:8.1e} {least:9.2} {middle:9.2}",
                             candidate.name
                         );
                     }
-                    None => println!("{name:8} {target:6.0e}  {:36} does not reach it", candidate.name),
+                    None => println!("{name:10} {target:6.0e}  {:36} does not reach it", candidate.name),
                 }
             }
         }

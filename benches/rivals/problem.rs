@@ -11,6 +11,7 @@ use std::sync::Arc;
 const STARTS: usize = 16;
 
 pub struct Problem {
+    pub scene: Scene,
     pub mechanism: Arc<Mechanism>,
     /// The end \[s\].
     pub until: f64,
@@ -22,10 +23,10 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// `free`, `gentle`, `motor`, or a chain: `chain3`, `chain6`.
+    /// `free`, `gentle`, `spring`, `motor`, `motor_sine`, or a chain: `chain3`, `chain6`.
     pub fn named(name: &str) -> Option<Self> {
         let (scene, until) = match name {
-            "free" | "gentle" | "motor" => (shipped(name), 10.0),
+            "free" | "gentle" | "spring" | "motor" | "motor_sine" => (shipped(name), 10.0),
             "chain3" => (chain(3), 10.0),
             // Six bars part neighbours a millionfold in three seconds.
             "chain6" => (chain(6), 3.0),
@@ -44,7 +45,7 @@ impl Problem {
             })
             .collect();
         let ends = starts.iter().map(|start| exact(&mechanism, start, until)).collect();
-        Some(Self { mechanism, until, starts, ends, with_rates: true })
+        Some(Self { scene, mechanism, until, starts, ends, with_rates: true })
     }
 
     /// Geometric mean over the starts of the largest difference in an angle or a rate.

@@ -36,20 +36,25 @@ fn describe(problem: &Problem) -> serde_json::Value {
     let numbers =
         |motion: &Motion| motion.phi.iter().chain(&motion.omega).map(|x| x.hi).collect::<Vec<f64>>();
     let tree = &problem.mechanism.tree;
-    let law = problem
-        .mechanism
-        .partition
-        .bodies
-        .iter()
-        .flat_map(|dependent_angle| &dependent_angle.laws)
-        .next()
-        .map(|(_, law)| law.at::<f64>(Default::default()).rate);
+    let laws = problem.scene.motors.iter().map(|motor| {
+        let sines = motor.law.sines.iter().map(|sine| [sine.amplitude, sine.frequency, sine.phase]);
+        json!({ "start": motor.law.start, "rate": motor.law.rate, "sines": sines.collect::<Vec<_>>() })
+    });
+    // Between the ground and the first bar, which hangs at the origin.
+    let springs = problem.scene.springs.iter().map(|spring| {
+        json!({
+            "points": spring.between.each_ref().map(|place| place.point),
+            "stiffness": spring.stiffness,
+            "free_length": spring.free_length,
+        })
+    });
     json!({
         "until": problem.until,
         "diagonal": tree.diagonal,
         "coupling": tree.coupling.iter().map(|h| h.re).collect::<Vec<_>>(),
         "weight": tree.weight.iter().map(|w| w.re).collect::<Vec<_>>(),
-        "motor": law,
+        "motors": laws.collect::<Vec<_>>(),
+        "springs": springs.collect::<Vec<_>>(),
         "starts": problem.starts.iter().map(numbers).collect::<Vec<_>>(),
         "ends": problem.ends.iter().map(numbers).collect::<Vec<_>>(),
     })

@@ -19,7 +19,7 @@ pub fn object(found: &Fit) -> Value {
         "scene": found.scene.name,
         "numbers": found.numbers.iter().map(|number| json!({
             "path": number.path, "unit": number.unit, "guess": number.guess, "value": number.value,
-            "error": number.error,
+            "error": number.error, "at_bound": number.is_at_bound,
         })).collect::<Vec<_>>(),
         "covariance": found.covariance.row_iter()
             .map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>(),
@@ -61,7 +61,8 @@ pub fn text(found: &Fit) -> String {
             } else {
                 format!("{} [{}]", number.path, number.unit)
             };
-            vec![name, figure(number.guess), format!("{:.9}", Significant(number.value)), rough(number.error)]
+            let error = if number.is_at_bound { "at its bound".into() } else { rough(number.error) };
+            vec![name, figure(number.guess), format!("{:.9}", Significant(number.value)), error]
         })
         .collect();
     page.entry("fitted", &found.ended);
@@ -94,7 +95,7 @@ pub fn text(found: &Fit) -> String {
         .map(|i| {
             let entry = |j: usize| {
                 let share = found.covariance[(i, j)] / (found.numbers[i].error * found.numbers[j].error);
-                format!("{share:.3}")
+                if share.is_nan() { "-".into() } else { format!("{share:.3}") }
             };
             std::iter::once(names[i].to_owned()).chain((0..names.len()).map(entry)).collect()
         })

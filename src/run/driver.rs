@@ -42,7 +42,7 @@ pub(super) struct Watch<'a> {
 /// A problem, its method and its state.
 pub(super) trait Driver: Send {
     /// To the output time `until`, on the way to `horizon`; what is read then is the motion there.  Pauses
-    /// after a step where `pause` is true.
+    /// after a step where `pause` is true.  What happens at the double of `until` comes before it.
     fn advance(
         &mut self,
         until: Time,
@@ -127,12 +127,15 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
     ) -> Result<Halt, StepError> {
         let Watch { flips, mut monitor, mut steps } = watch;
         let mut flips = flips.filter(|flips| flips.flip.is_none());
-        let is_dense = self.is_dense;
-        // Dense methods take steps as long as they like; output times are read off them.
-        let target = if is_dense { horizon } else { until };
+        let (is_dense, target) = (self.is_dense, if self.is_dense { horizon } else { until });
+        let is_there = |own: &Self| match is_dense {
+            true if own.is_cut || own.ahead.is_some() => own.state.time.hi > until.hi,
+            true => own.state.time >= until,
+            false => own.method.is_at(&own.state, until),
+        };
         self.is_inside = false;
         self.begin(target, flips.as_deref_mut())?;
-        while if is_dense { self.state.time < until } else { !self.method.is_at(&self.state, until) } {
+        while !is_there(self) {
             if self.is_cut {
                 return Ok(self.tell_cut());
             }
@@ -164,21 +167,20 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
                 self.show(*monitor);
             }
             if let Some(event) = event
-                && self.state.time <= until
+                && self.state.time.hi <= until.hi
             {
                 return Ok(Halt::Contact(event));
             }
             self.ahead = event;
-            if self.is_cut && self.state.time <= until {
+            if self.is_cut && self.state.time.hi <= until.hi {
                 return Ok(self.tell_cut());
             }
             if pause() && self.state.time < until {
                 return Ok(Halt::Pause);
             }
         }
-        if self.state.time > until && is_dense {
-            let Self { problem, method, from, inside, .. } = self;
-            method.interpolate(problem, from, until, inside);
+        if self.state.time.hi > until.hi && is_dense {
+            self.method.interpolate(&mut self.problem, &self.from, until, &mut self.inside);
             self.is_inside = true;
         }
         Ok(Halt::Until)
@@ -190,8 +192,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
 
     fn jump(&mut self, motion: &Motion) {
         let memory = std::mem::take(&mut self.state.memory);
-        self.state = self.problem.state(motion);
-        self.state.memory = memory;
+        self.state = State { memory, ..self.problem.state(motion) };
         self.method.reset(&mut self.state);
         self.goes_on = false;
     }
@@ -247,11 +248,10 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
         let steps_back =
             self.is_dense && place.goes_on && !place.from.y.is_empty() && place.from.time < place.state.time;
         let counts = [place.statistics.steps, place.statistics.evaluations, place.statistics.rejected];
-        let is_event = |event: usize| event < self.problem.mechanism().contacts.len();
         if counts.iter().any(|&count| count >= MOST_TURNS)
             || !alike(&place.state)
             || (steps_back && !alike(&place.from))
-            || !place.ahead.is_none_or(is_event)
+            || place.ahead.is_some_and(|event| event >= self.problem.mechanism().contacts.len())
         {
             return Ok(false);
         }

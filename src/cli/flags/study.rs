@@ -265,7 +265,8 @@ pub struct FitFlags {
     /// Columns that count, joined by commas [default: all that mean something in the scene]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     pub columns: Vec<String>,
-    /// Standard deviation of a column's noise, in its unit; repeatable [default: found from the residuals]
+    /// Standard deviation of a column's noise, in the unit of its header; repeatable [default: found from the
+    /// residuals]
     #[arg(long, value_name = "COLUMN=SIGMA", value_parser = named_size, allow_hyphen_values = true)]
     pub sigma: Vec<(String, f64)>,
     /// Parts of the data for multiple shooting, short against the growth of small differences of a chaotic

@@ -306,7 +306,13 @@ impl EventDetector {
                 break;
             }
         }
-        self.landed(inside, event, t)
+        let t = self.landed(inside, event, t);
+        // A function of the clock is zero as long as the time has one double: that very moment is the same by
+        // every method.
+        let moment = Time::from(t.hi);
+        let is_of_clock = (begin..=end).contains(&moment)
+            && [t, moment].iter().all(|&t| self.values(inside.at(t))[event] == 0.0);
+        if is_of_clock { moment } else { t }
     }
 
     /// The same of a method whose dense output is less accurate than its steps: by steps that end there, with

@@ -6,6 +6,7 @@
 //! several parts: unknown states s_k at their beginnings as well,  s_k+1 = x(t_k+1; s_k,
 //!     p)  by growing weights
 //! covariance of p = (JᵀJ)⁻¹ at the minimum
+//! σ² of a column, where nobody says:  Σ (y_i - Y)² / (n - Σ h_ii),   H = J (JᵀJ)⁻¹ Jᵀ,  until it stays
 //! ```
 //!
 //! Where small differences grow fast the sum of squares over the whole time has many minima; over parts that
@@ -15,8 +16,10 @@
 //! Mathematics 630 (1978); H. G. Bock, *Recent advances in parameter identification techniques for O.D.E.*,
 //! Progress in Scientific Computing 2 (1983).
 
+mod bounds;
 mod data;
 mod problem;
+mod search;
 mod segment;
 
 pub use data::Data;
@@ -34,8 +37,11 @@ use segment::Lost;
 const SPREAD: [f64; 2] = [1e-2, 1e-10];
 /// Least spread a column counts with, over what it changes by in one unit of a coordinate or rate.
 const KEPT: f64 = 1e-3;
-/// How often noise is estimated anew.
-const ROUNDS: usize = 3;
+/// How often noise is estimated anew at most, and what it changes by in the last of them.
+const ROUNDS: usize = 40;
+const STEADY: f64 = 1e-3;
+/// Rows of a column that are left beside the numbers it tells, at least.
+const LEFT: f64 = 1e-3;
 /// Weights of continuity, over the least noise, one after the other.
 const CONTINUITY: [f64; 3] = [0.1, 10.0, 1e3];
 
@@ -46,7 +52,7 @@ pub struct FitRequest {
     pub vary: Vec<String>,
     /// Columns of the data that count; none: all whose names mean something in the scene.
     pub columns: Vec<String>,
-    /// Standard deviations of columns, by name, where they are known.
+    /// Standard deviations of columns, by name, where they are known, in the unit that the data's header gives.
     pub sigmas: Vec<(String, f64)>,
     /// Parts of the data for multiple shooting.
     pub segments: usize,
@@ -115,8 +121,10 @@ pub struct FittedNumber {
     pub guess: f64,
     /// Its value.
     pub value: f64,
-    /// Its standard error.
+    /// Its standard error; NaN of a number at a bound of what the scene takes.
     pub error: f64,
+    /// True where it is at such a bound, and the others are the best there.
+    pub is_at_bound: bool,
 }
 
 /// A column of the data beside the fitted motion.
@@ -237,36 +245,39 @@ pub fn fit(
         pause,
     );
     problem.guess_states(&columns)?;
-    let rounds = if columns.iter().all(|column| column.is_given) { 1 } else { ROUNDS };
     let mut ended = String::new();
-    for _ in 0..rounds {
+    for round in 1..=ROUNDS {
         let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
         let weights = if request.segments > 1 { &CONTINUITY[..] } else { &CONTINUITY[..1] };
         for weight in weights {
             (problem, ended) = problem.minimize(&columns, weight / least)?;
         }
         problem.take_model(&mut columns)?;
-        let share = (count as f64 / (count - guess.len()) as f64).sqrt();
-        let found = columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given && rounds > 1);
-        for (column, size) in found {
-            column.sigma = (share * rms(column)).max(SPREAD[1] * size);
+        let told = problem.told(columns.len())?;
+        match weigh(&mut columns, &sizes, &told) {
+            None => break,
+            Some(name) if round == ROUNDS => {
+                ended += &format!("; the noise of {name} is not told: --sigma {name}=… gives it");
+            }
+            Some(_) => (),
         }
     }
     let covariance = problem.covariance(&columns)?;
-    let values = problem.values();
+    let (values, held) = (problem.values(), problem.held());
     let scene = template.filled(problem.variables(), &values)?;
     let numbers = first.inputs.iter().enumerate().map(|(k, input)| FittedNumber {
         path: input.path.clone(),
         unit: input.unit.clone(),
         guess: guess[k],
         value: values[k],
-        error: covariance[(k, k)].sqrt(),
+        error: if held[k] { f64::NAN } else { covariance[(k, k)].sqrt() },
+        is_at_bound: held[k],
     });
     let square = |column: &FittedColumn| (residuals(column).map(|r| (r / column.sigma).powi(2))).sum::<f64>();
     Ok(Fit {
         numbers: numbers.collect(),
         chi_square: columns.iter().map(square).sum(),
-        degrees_of_freedom: count - guess.len(),
+        degrees_of_freedom: count - held.iter().filter(|held| !**held).count(),
         covariance,
         times: data.times.clone(),
         ignored,
@@ -365,9 +376,11 @@ fn columns(data: &Data, outputs: &[Output], request: &FitRequest) -> Result<Vec<
         return Err(FitError::Asked(text));
     }
     let column = |output: &Output| {
-        let measured = data.columns.iter().find(|(name, _)| *name == output.name);
-        let measured = measured.map(|(_, values)| values.clone()).unwrap_or_default();
+        let place = data.columns.iter().position(|(name, _)| *name == output.name);
+        let measured = place.map(|place| data.columns[place].1.clone()).unwrap_or_default();
+        let unit = place.and_then(|place| UnitScale::read(data.units.get(place)?.as_deref()?).ok());
         let given = request.sigmas.iter().find(|(name, _)| *name == output.name).map(|(_, sigma)| *sigma);
+        let given = given.map(|sigma| unit.map_or(sigma, |unit| unit.of_number(sigma)));
         let sigma = given.unwrap_or_default();
         let (name, unit, model) = (output.name.clone(), String::new(), Vec::new());
         FittedColumn { name, unit, sigma, is_given: given.is_some(), model, measured }
@@ -380,9 +393,20 @@ fn residuals(column: &FittedColumn) -> impl Iterator<Item = f64> {
     column.measured.iter().zip(&column.model).filter_map(|(measured, model)| Some((*measured)? - model))
 }
 
-fn rms(column: &FittedColumn) -> f64 {
-    let count = residuals(column).count().max(1) as f64;
-    (residuals(column).map(|residual| residual * residual).sum::<f64>() / count).sqrt()
+/// Finds the noise of columns for which nobody says, from what the residuals leave beside so many numbers;
+/// returns one whose noise is not yet what the fit was weighted with.
+fn weigh(columns: &mut [FittedColumn], sizes: &[f64], told: &[f64]) -> Option<String> {
+    let mut moving = None;
+    for ((column, size), told) in columns.iter_mut().zip(sizes).zip(told).filter(|((c, _), _)| !c.is_given) {
+        let count = residuals(column).count() as f64;
+        let squares = residuals(column).map(|residual| residual * residual).sum::<f64>();
+        let sigma = (squares / (count - told).max(LEFT)).sqrt().max(SPREAD[1] * size);
+        if (sigma / column.sigma - 1.0).abs() > STEADY {
+            moving.get_or_insert_with(|| column.name.clone());
+        }
+        column.sigma = sigma;
+    }
+    moving
 }
 
 /// Root mean square about the mean.

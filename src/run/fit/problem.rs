@@ -12,19 +12,12 @@ use super::data::Data;
 use super::segment::{Lost, Passed, Place, pass};
 use crate::run::driver::Pause;
 use crate::scene::{Template, Variable};
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::ops::Range;
 
-/// Relative tolerance of the search, and evaluations for each unknown.
-const TOLERANCE: f64 = 1e-11;
-const PATIENCE: usize = 40;
-/// Residual in place of one that cannot be computed: the step is taken back.
-const FAR: f64 = 1e9;
-/// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
-const NOTHING: f64 = 1e-11;
+/// Turns of the search for the state of a part.
+const TURNS: usize = 40;
 /// Weight of a state as guessed, where a part does not tell it.
 const GUESSED: f64 = 1e-3;
 
@@ -38,19 +31,21 @@ struct Part {
     tangent: DMatrix<f64>,
 }
 
-/// Residuals and their Jacobian at some unknowns, with the outputs row by row and the largest step.
+/// Residuals and their Jacobian at some unknowns, with the column each residual is of (none where it is a step
+/// between parts), the outputs row by row and the largest step.
 #[derive(Clone)]
-struct Evaluated {
-    residuals: DVector<f64>,
-    jacobian: DMatrix<f64>,
-    model: Vec<Vec<f64>>,
-    gap: f64,
+pub(super) struct Evaluated {
+    pub residuals: DVector<f64>,
+    pub jacobian: DMatrix<f64>,
+    pub owners: Vec<Option<usize>>,
+    pub model: Vec<Vec<f64>>,
+    pub gap: f64,
 }
 
 pub(super) struct Problem<'a> {
     template: &'a Template,
-    variables: Vec<Variable>,
-    scale: Vec<f64>,
+    pub(super) variables: Vec<Variable>,
+    pub(super) scale: Vec<f64>,
     times: &'a [f64],
     request: SensitivityRequest,
     /// Which outputs the columns are.
@@ -61,9 +56,11 @@ pub(super) struct Problem<'a> {
     runs: u64,
     measured: Vec<Vec<Option<f64>>>,
     sigma: Vec<f64>,
-    weight: f64,
-    x: DVector<f64>,
-    found: Result<Evaluated, Lost>,
+    pub(super) weight: f64,
+    pub(super) x: DVector<f64>,
+    /// Numbers that are held at a bound, with the sign of the direction beyond it.
+    pub(super) held: Vec<Option<f64>>,
+    pub(super) found: Result<Evaluated, Lost>,
 }
 
 impl<'a> Problem<'a> {
@@ -88,6 +85,7 @@ impl<'a> Problem<'a> {
         let x = guess.iter().zip(&scale).map(|(value, scale)| value / scale);
         Self {
             x: DVector::from_iterator(guess.len(), x),
+            held: vec![None; guess.len()],
             parts: parts.collect(),
             measured: Vec::new(),
             sigma: Vec::new(),
@@ -114,6 +112,11 @@ impl<'a> Problem<'a> {
         self.scale.iter().zip(self.x.iter()).map(|(scale, x)| scale * x).collect()
     }
 
+    /// Which of them are at a bound.
+    pub fn held(&self) -> Vec<bool> {
+        self.held.iter().map(Option::is_some).collect()
+    }
+
     pub fn runs(&self) -> u64 {
         self.runs
     }
@@ -122,13 +125,14 @@ impl<'a> Problem<'a> {
         self.found.as_ref().map_or(f64::NAN, |found| found.gap)
     }
 
-    fn study(&self) -> Result<Study, Lost> {
+    /// The scene with the numbers as they stand.
+    pub(super) fn study(&self) -> Result<Study, Lost> {
         let template = self.template.with_values(&self.variables, &self.values());
         Study::new(&template, &self.request).map_err(|error| Lost::from(error.to_string()))
     }
 
     /// Takes what is measured and how exactly.
-    fn take(&mut self, columns: &[FittedColumn]) {
+    pub(super) fn take(&mut self, columns: &[FittedColumn]) {
         self.measured = columns.iter().map(|column| column.measured.clone()).collect();
         self.sigma = columns.iter().map(|column| column.sigma).collect();
     }
@@ -145,7 +149,7 @@ impl<'a> Problem<'a> {
         self.unit = local.unit.clone();
         let mut at = self.pass(&study, 0, None)?.end;
         for k in 1..self.parts.len() {
-            for _ in 0..PATIENCE {
+            for _ in 0..TURNS {
                 at = local
                     .projected_moving(&at)
                     .ok_or("the state between two parts does not fit the constraints")?;
@@ -238,13 +242,20 @@ impl<'a> Problem<'a> {
         (DVector::from_vec(residuals), DMatrix::from_row_slice(rows, width, &slopes))
     }
 
+    /// The columns that the residuals of a part are of.
+    fn owners(&self, k: usize) -> impl Iterator<Item = Option<usize>> {
+        let is_there = |row: usize| move |(_, column): &(usize, &Vec<Option<f64>>)| column[row].is_some();
+        let of = move |row| self.measured.iter().enumerate().filter(is_there(row)).map(|(k, _)| Some(k));
+        self.parts[k].rows.clone().flat_map(of)
+    }
+
     /// Everything at the present unknowns.
-    fn evaluate(&mut self) -> Result<Evaluated, Lost> {
+    pub(super) fn evaluate(&mut self) -> Result<Evaluated, Lost> {
         let study = self.study()?;
         let count = self.variables.len();
         let mut local = Local::new(&study.mechanism);
         let (mut residuals, mut lines): (Vec<f64>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
-        let (mut model, mut gap) = (Vec::new(), 0.0_f64);
+        let (mut model, mut gap, mut owners) = (Vec::new(), 0.0_f64, Vec::new());
         let mut before: Option<(Passed, usize)> = None;
         let mut first = count;
         for k in 0..self.parts.len() {
@@ -259,6 +270,7 @@ impl<'a> Problem<'a> {
             };
             if let (Some(state), Some((passed, at))) = (&state, &before) {
                 gap = self.tie(k, (passed, *at), (state, first), (&mut residuals, &mut lines)).max(gap);
+                owners.resize(residuals.len(), None);
             }
             let passed = self.pass(&study, k, state.as_ref())?;
             let (own, slopes) = self.rows(k, &passed);
@@ -266,6 +278,7 @@ impl<'a> Problem<'a> {
                 residuals.push(*residual);
                 lines.push(self.line(&slopes.row(i).iter().copied().collect::<Vec<f64>>(), first));
             }
+            owners.extend(self.owners(k));
             let outputs = &self.outputs;
             model.extend(passed.rows.iter().map(|row| outputs.iter().map(|&o| row.values[o]).collect()));
             before = Some((passed, first));
@@ -274,7 +287,7 @@ impl<'a> Problem<'a> {
         let jacobian = DMatrix::from_fn(lines.len(), self.x.len(), |i, j| lines[i][j]);
         let residuals = DVector::from_vec(residuals);
         match residuals.iter().chain(jacobian.iter()).all(|x| x.is_finite()) {
-            true => Ok(Evaluated { residuals, jacobian, model, gap }),
+            true => Ok(Evaluated { residuals, jacobian, owners, model, gap }),
             false => Err("residuals are not finite".into()),
         }
     }
@@ -321,30 +334,8 @@ impl<'a> Problem<'a> {
         gap
     }
 
-    /// Looks for the minimum with this weight of continuity, and tells how it ended.
-    pub fn minimize(mut self, columns: &[FittedColumn], weight: f64) -> Result<(Self, String), Lost> {
-        self.take(columns);
-        self.weight = weight;
-        self.found = self.evaluate();
-        match &self.found {
-            Err(Lost::Interrupted) => return Err(Lost::Interrupted),
-            Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}").into()),
-            Ok(found) => self.acting(columns, &found.jacobian)?,
-        }
-        let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
-        let (mut problem, report) = search.minimize(self);
-        let is_over = report.termination.was_successful();
-        let ended = match is_over {
-            true => format!("converged after {} evaluations", report.number_of_evaluations),
-            false => format!("not converged after {} evaluations", report.number_of_evaluations),
-        };
-        problem.found.as_ref().map_err(Clone::clone)?;
-        problem.rebase()?;
-        Ok((problem, ended))
-    }
-
     /// Takes the states as they are for new bases.
-    fn rebase(&mut self) -> Result<(), Lost> {
+    pub(super) fn rebase(&mut self) -> Result<(), Lost> {
         let study = self.study()?;
         let mut local = Local::new(&study.mechanism);
         let mut first = self.variables.len();
@@ -378,73 +369,5 @@ impl<'a> Problem<'a> {
             column.unit = heads.get(output).map(|(_, unit)| (*unit).to_owned()).unwrap_or_default();
         }
         Ok(())
-    }
-
-    /// Refuses a number that does nothing to the columns: no step of it is too large for the search.
-    fn acting(&self, columns: &[FittedColumn], jacobian: &DMatrix<f64>) -> Result<(), Lost> {
-        let most = |column: &FittedColumn| {
-            column.measured.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs())) / column.sigma
-        };
-        let size = columns.iter().map(most).fold(0.0, f64::max);
-        let mut idle = (0..self.variables.len()).filter(|&k| jacobian.column(k).amax() < NOTHING * size);
-        let error = |k: usize| Err(format!("the data do not depend on {}", self.variables[k].path).into());
-        idle.next().map_or(Ok(()), error)
-    }
-
-    /// The covariance of the numbers at the minimum.
-    pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, Lost> {
-        self.take(columns);
-        let jacobian = self.evaluate()?.jacobian;
-        let count = self.variables.len();
-        self.acting(columns, &jacobian)?;
-        let svd = jacobian.svd(false, true);
-        let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
-        let least = f64::EPSILON * values.amax() * values.len() as f64;
-        if let Some(k) = values.iter().position(|value| *value <= least) {
-            let row = right.row(k);
-            let most = (0..count).max_by(|&a, &b| row[a].abs().total_cmp(&row[b].abs())).unwrap_or_default();
-            return Err(format!(
-                "the data do not tell {} apart from the other numbers, or do not depend on it",
-                self.variables[most].path
-            )
-            .into());
-        }
-        Ok(DMatrix::from_fn(count, count, |i, j| {
-            let sum =
-                (0..values.len()).map(|k| right[(k, i)] * right[(k, j)] / values[k].powi(2)).sum::<f64>();
-            sum * self.scale[i] * self.scale[j]
-        }))
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-    type ParameterStorage = Owned<f64, Dyn>;
-
-    fn set_params(&mut self, x: &DVector<f64>) {
-        self.x.copy_from(x);
-        let size = self.found.as_ref().map_or(0, |found| found.residuals.len());
-        let found = self.evaluate();
-        // What cannot be computed is far away: the step is taken back.
-        self.found = found.or_else(|why| {
-            if matches!(why, Lost::Interrupted) {
-                return Err(why);
-            }
-            let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
-            Ok(Evaluated { residuals, jacobian: DMatrix::zeros(size, x.len()), model: Vec::new(), gap })
-        });
-    }
-
-    fn params(&self) -> DVector<f64> {
-        self.x.clone()
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        self.found.as_ref().ok().map(|found| found.residuals.clone())
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        self.found.as_ref().ok().map(|found| found.jacobian.clone())
     }
 }

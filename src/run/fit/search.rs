@@ -1,0 +1,155 @@
+//! The search for the minimum, and what it says of the numbers.
+
+use super::FittedColumn;
+use super::problem::{Evaluated, Problem};
+use super::segment::Lost;
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::storage::Owned;
+use nalgebra::{DMatrix, DVector, Dyn, SVD};
+
+/// Relative tolerance of the search, and evaluations for each unknown.
+const TOLERANCE: f64 = 1e-11;
+const PATIENCE: usize = 40;
+/// Residual in place of one that cannot be computed: the step is taken back.
+const FAR: f64 = 1e9;
+/// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
+const NOTHING: f64 = 1e-11;
+
+/// `Uᵀ r`, and the singular value decomposition of a Jacobian.
+type TakenApart = (DVector<f64>, SVD<f64, Dyn, Dyn>);
+
+impl Problem<'_> {
+    /// The unknowns that no bound holds.
+    pub(super) fn free(&self) -> Vec<usize> {
+        (0..self.x.len()).filter(|&k| self.held.get(k).copied().flatten().is_none()).collect()
+    }
+
+    /// Residuals and their Jacobian by the free unknowns, taken apart.
+    pub(super) fn taken_apart(&self) -> Result<TakenApart, Lost> {
+        let found = self.found.as_ref().map_err(Clone::clone)?;
+        let svd = found.jacobian.select_columns(&self.free()).svd(true, true);
+        let u = svd.u.as_ref().ok_or("the Jacobian has no singular values")?;
+        Ok((u.transpose() * &found.residuals, svd))
+    }
+
+    /// Looks for the minimum with this weight of continuity in the free unknowns, and tells how it ended.
+    pub(super) fn minimize_free(
+        mut self,
+        columns: &[FittedColumn],
+        weight: f64,
+    ) -> Result<(Self, String), Lost> {
+        self.take(columns);
+        self.weight = weight;
+        self.found = self.evaluate();
+        match &self.found {
+            Err(Lost::Interrupted) => return Err(Lost::Interrupted),
+            Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}").into()),
+            Ok(found) => self.acting(columns, &found.jacobian)?,
+        }
+        let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
+        let (mut problem, report) = search.minimize(self);
+        let is_over = report.termination.was_successful();
+        let ended = match is_over {
+            true => format!("converged after {} evaluations", report.number_of_evaluations),
+            false => format!("not converged after {} evaluations", report.number_of_evaluations),
+        };
+        problem.found.as_ref().map_err(Clone::clone)?;
+        problem.rebase()?;
+        Ok((problem, ended))
+    }
+
+    /// Refuses a number that does nothing to the columns: no step of it is too large for the search.
+    fn acting(&self, columns: &[FittedColumn], jacobian: &DMatrix<f64>) -> Result<(), Lost> {
+        let most = |column: &FittedColumn| {
+            column.measured.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs())) / column.sigma
+        };
+        let size = columns.iter().map(most).fold(0.0, f64::max);
+        let is_free = |k: &usize| self.held[*k].is_none();
+        let mut idle =
+            (0..self.variables.len()).filter(is_free).filter(|&k| jacobian.column(k).amax() < NOTHING * size);
+        let error = |k: usize| Err(format!("the data do not depend on {}", self.variables[k].path).into());
+        idle.next().map_or(Ok(()), error)
+    }
+
+    /// How many of the unknowns each column tells: the sum of the leverages of its rows.
+    pub fn told(&self, columns: usize) -> Result<Vec<f64>, Lost> {
+        let (_, svd) = self.taken_apart()?;
+        let (values, found) = (&svd.singular_values, self.found.as_ref().map_err(Clone::clone)?);
+        let least = f64::EPSILON * values.amax() * values.len() as f64;
+        let mut told = vec![0.0; columns];
+        for (row, owner) in svd.u.iter().flat_map(|u| u.row_iter()).zip(&found.owners) {
+            let Some(column) = *owner else { continue };
+            let known = row.iter().zip(values).filter(|(_, value)| **value > least);
+            told[column] += known.map(|(u, _)| u * u).sum::<f64>();
+        }
+        Ok(told)
+    }
+
+    /// The covariance of the numbers at the minimum; those at a bound have none.
+    pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, Lost> {
+        self.take(columns);
+        let jacobian = self.evaluate()?.jacobian;
+        let count = self.variables.len();
+        self.acting(columns, &jacobian)?;
+        let free = self.free();
+        let svd = jacobian.select_columns(&free).svd(false, true);
+        let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
+        let least = f64::EPSILON * values.amax() * values.len() as f64;
+        let places: Vec<Option<usize>> = (0..count).map(|k| free.iter().position(|f| *f == k)).collect();
+        if let Some(k) = values.iter().position(|value| *value <= least) {
+            let row = right.row(k);
+            let size = |number: usize| places[number].map_or(0.0, |place| row[place].abs());
+            let most = (0..count).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or_default();
+            return Err(format!(
+                "the data do not tell {} apart from the other numbers, or do not depend on it",
+                self.variables[most].path
+            )
+            .into());
+        }
+        Ok(DMatrix::from_fn(count, count, |i, j| {
+            let (Some(a), Some(b)) = (places[i], places[j]) else { return 0.0 };
+            let sum =
+                (0..values.len()).map(|k| right[(k, a)] * right[(k, b)] / values[k].powi(2)).sum::<f64>();
+            sum * self.scale[i] * self.scale[j]
+        }))
+    }
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+    type ParameterStorage = Owned<f64, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        for k in self.free() {
+            self.x[k] = x[k];
+        }
+        let size = self.found.as_ref().map_or(0, |found| found.residuals.len());
+        let found = self.evaluate();
+        // What cannot be computed is far away: the step is taken back.
+        self.found = found.or_else(|why| {
+            if matches!(why, Lost::Interrupted) {
+                return Err(why);
+            }
+            let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
+            let jacobian = DMatrix::zeros(size, x.len());
+            Ok(Evaluated { residuals, jacobian, owners: Vec::new(), model: Vec::new(), gap })
+        });
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.x.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        self.found.as_ref().ok().map(|found| found.residuals.clone())
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        let mut jacobian = self.found.as_ref().ok()?.jacobian.clone();
+        for (k, _) in self.held.iter().enumerate().filter(|(_, held)| held.is_some()) {
+            jacobian.column_mut(k).fill(0.0);
+        }
+        Some(jacobian)
+    }
+}
