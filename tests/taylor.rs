@@ -11,9 +11,10 @@ use driftless::dynamics::kernel::Kernel as Energies;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
-use driftless::scene::{Bar, Hinge, Place, Scene, Spring, Start};
+use driftless::scene::{Bar, Hinge, Place, Scene, Sine, Spring, Start};
 use driftless::stabilization::Projected;
 use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
 use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
@@ -102,6 +103,12 @@ fn fast_scenes() -> Vec<(&'static str, Scene)> {
     backwards.motors[0].law.rate = -4.0;
     backwards.start[0].omega = -4.0;
     backwards.gravity = [3.0, -9.0];
+    let mut swung = second.clone();
+    swung.gravity = [3.0, -9.0];
+    swung.motors[0].law.sines = vec![
+        Sine { amplitude: 0.4, frequency: 3.0, phase: 0.5 },
+        Sine { amplitude: -0.2, frequency: 7.0, phase: -1.0 },
+    ];
     let mut three = shipped("chain8", &[]);
     let (mut single, mut six) = (three.clone(), three.clone());
     for (scene, count) in [(&mut single, 1), (&mut three, 3), (&mut six, 6)] {
@@ -134,8 +141,9 @@ fn fast_scenes() -> Vec<(&'static str, Scene)> {
     hung.hinges.truncate(1);
     hung.start.truncate(1);
     hung.springs.retain(|spring| ["down", "meeting"].contains(&spring.name.as_str()));
-    let names = ["free", "gentle", "spinning", "motor", "chain8", "spring"];
+    let names = ["free", "gentle", "spinning", "motor", "motor_sine", "chain8", "spring"];
     let others = [
+        ("swung", swung),
         ("sideways", sideways),
         ("second", second),
         ("backwards", backwards),
@@ -187,6 +195,27 @@ fn portable_lanes_and_hardware_have_the_same_bits() {
             assert_eq!(fast, portable, "{name}, order {order}");
         }
     }
+}
+
+/// Motors with sines have one code in lanes and alone.
+#[test]
+fn a_swinging_motor_has_the_same_bits_alone_and_in_lanes() {
+    let mut count = 0;
+    for (name, scene) in fast_scenes().into_iter().filter(|(name, _)| ["motor_sine", "swung"].contains(name))
+    {
+        for order in [16, 20, 24] {
+            let mechanism = compile(&scene);
+            let mut problem = Elimination::<0>::new(mechanism.clone());
+            let mut member = [BatchMember::new(&mechanism, problem.state(&mechanism.start(&scene)))];
+            let batch = Batch::new(Tolerance { relative: 1e-12, absolute: 1e-12 }).with_order(order);
+            batch.integrate(&mut member, Time::from(20.0), &mut |_, _| Going::On);
+            let mut motion = Motion::default();
+            problem.read(&member[0].state, &mut motion);
+            assert_eq!(end(&scene, on(Kernel::Fastest, 1e-12, order), 20.0), motion, "{name}, order {order}");
+            count += 1;
+        }
+    }
+    assert_eq!(count, 6);
 }
 
 #[test]
@@ -281,7 +310,7 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
 
 #[test]
 fn energy_stays_at_rounding_for_a_thousand_seconds() {
-    for name in ["free", "gentle", "motor"] {
+    for name in ["free", "gentle", "motor", "motor_sine"] {
         let scene = shipped(name, &[]);
         let mechanism = compile(&scene);
         let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);

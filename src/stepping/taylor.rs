@@ -40,6 +40,7 @@ mod pair;
 mod singular;
 mod springs;
 mod step_size;
+mod swinging;
 mod terms;
 mod wide;
 

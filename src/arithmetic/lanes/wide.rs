@@ -138,6 +138,9 @@ macro_rules! lane_by_lane {
     }};
 }
 
+mod half;
+pub use half::FirstHalf;
+
 impl<L: Lanes> Slots for [L; 2] {
     const COUNT: usize = 8;
     const UNROLLED: bool = L::UNROLLED;

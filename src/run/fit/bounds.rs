@@ -1,8 +1,8 @@
 //! Numbers at the bounds of what a scene takes.
 //!
-//! A search whose steps are refused beyond a bound ends beside it, where it is no minimum of the others: along
-//! the bound it could still go.  The number is then put onto the bound and held there while the others are
-//! looked for, and let go again where the sum of squares falls into the range (active set; J. Nocedal,
+//! A search whose steps are refused beyond a bound ends beside it, where it is no minimum of the others:
+//! along the bound it could still go.  The number is then put onto the bound and held there while the others
+//! are looked for, and let go again where the sum of squares falls into the range (active set; J. Nocedal,
 //! S. J. Wright, *Numerical Optimization* (2006), section 16.5).
 
 use super::FittedColumn;
@@ -42,6 +42,9 @@ impl Problem<'_> {
 
     /// Holds the number that ended the search at its bound; false where there is none.
     fn hold(&mut self) -> Result<bool, Lost> {
+        if !self.was_refused {
+            return Ok(false);
+        }
         let (along, svd) = self.taken_apart()?;
         let residuals = self.found.as_ref().map_or(0.0, |found| found.residuals.norm_squared());
         let least = f64::EPSILON * svd.singular_values.amax() * svd.singular_values.len() as f64;

@@ -52,7 +52,7 @@ pub struct FitRequest {
     pub vary: Vec<String>,
     /// Columns of the data that count; none: all whose names mean something in the scene.
     pub columns: Vec<String>,
-    /// Standard deviations of columns, by name, where they are known, in the unit that the data's header gives.
+    /// Standard deviations of columns, by name, where they are known, in the unit of the data's header.
     pub sigmas: Vec<(String, f64)>,
     /// Parts of the data for multiple shooting.
     pub segments: usize,

@@ -31,8 +31,8 @@ struct Part {
     tangent: DMatrix<f64>,
 }
 
-/// Residuals and their Jacobian at some unknowns, with the column each residual is of (none where it is a step
-/// between parts), the outputs row by row and the largest step.
+/// Residuals and their Jacobian at some unknowns, with the column each residual is of (none of a step between
+/// parts), the outputs row by row and the largest step.
 #[derive(Clone)]
 pub(super) struct Evaluated {
     pub residuals: DVector<f64>,
@@ -58,6 +58,8 @@ pub(super) struct Problem<'a> {
     sigma: Vec<f64>,
     pub(super) weight: f64,
     pub(super) x: DVector<f64>,
+    /// True where the search was refused a step.
+    pub(super) was_refused: bool,
     /// Numbers that are held at a bound, with the sign of the direction beyond it.
     pub(super) held: Vec<Option<f64>>,
     pub(super) found: Result<Evaluated, Lost>,
@@ -85,6 +87,7 @@ impl<'a> Problem<'a> {
         let x = guess.iter().zip(&scale).map(|(value, scale)| value / scale);
         Self {
             x: DVector::from_iterator(guess.len(), x),
+            was_refused: false,
             held: vec![None; guess.len()],
             parts: parts.collect(),
             measured: Vec::new(),

@@ -39,7 +39,7 @@ impl Problem<'_> {
         weight: f64,
     ) -> Result<(Self, String), Lost> {
         self.take(columns);
-        self.weight = weight;
+        (self.weight, self.was_refused) = (weight, false);
         self.found = self.evaluate();
         match &self.found {
             Err(Lost::Interrupted) => return Err(Lost::Interrupted),
@@ -127,14 +127,15 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
         let size = self.found.as_ref().map_or(0, |found| found.residuals.len());
         let found = self.evaluate();
         // What cannot be computed is far away: the step is taken back.
-        self.found = found.or_else(|why| {
-            if matches!(why, Lost::Interrupted) {
-                return Err(why);
+        self.found = match found {
+            Ok(_) | Err(Lost::Interrupted) => found,
+            Err(_) => {
+                self.was_refused = true;
+                let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
+                let jacobian = DMatrix::zeros(size, x.len());
+                Ok(Evaluated { residuals, jacobian, owners: Vec::new(), model: Vec::new(), gap })
             }
-            let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
-            let jacobian = DMatrix::zeros(size, x.len());
-            Ok(Evaluated { residuals, jacobian, owners: Vec::new(), model: Vec::new(), gap })
-        });
+        };
     }
 
     fn params(&self) -> DVector<f64> {

@@ -22,7 +22,8 @@ mod swinging;
 mod trees;
 mod vectors;
 
-use self::clock::{LaneClock, LaneStep};
+pub(super) use self::clock::LaneClock;
+use self::clock::LaneStep;
 use self::driven::DrivenTeam;
 use self::free::FreeTeam;
 use self::looped::LoopTeam;
@@ -30,7 +31,7 @@ pub use self::passage::Passage;
 use self::passage::coordinates;
 pub(crate) use self::passage::read;
 use self::slots::LaneSlots;
-use self::swinging::SwingingTeam;
+pub(super) use self::swinging::{SwingingTeam, law_of as swinging_law};
 use self::trees::TreeTeam;
 use self::vectors::{added, flaw_of, load, moved, pair, store, unit};
 use super::{JUDGES, Kernel, Taylor, stop};
@@ -301,7 +302,7 @@ fn unsuited(member: &BatchMember) -> StepError {
 }
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
-trait Team {
+pub(super) trait Team {
     /// Empty lanes for trajectories that fit beside this one, for series up to an order.
     fn new(like: &BatchMember, order: usize, vectors: Vectors) -> Self;
 

@@ -6,6 +6,7 @@ use super::extended;
 use super::looped::{self, Looped};
 use super::pair::{self, Pair};
 use super::step_size::StepSize;
+use super::swinging::{self, Swinging};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::dynamics::natural::Reduced;
 use crate::dynamics::{Mechanism, MotionPowers, State};
@@ -40,6 +41,7 @@ enum Form {
     Pair(Pair, StepSize, Box<pair::Scratch>),
     Extended(Pair, StepSize, Box<extended::Scratch>),
     Driven(Box<Driven>, StepSize, Box<driven::Scratch>),
+    Swinging(Box<Swinging>),
     Few(Box<Bodies<1, 0>>),
     Several(Box<Bodies<2, 0>>),
     FewSprung(Box<Bodies<1, 1>>),
@@ -171,6 +173,7 @@ fn of_any() -> (Step, Go) {
 #[inline(always)]
 fn any_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
     match form {
+        Form::Swinging(swinging) => Some(swinging::step::<L>(swinging, state, left)),
         Form::Few(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
         Form::Several(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
         Form::FewSprung(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
@@ -185,6 +188,7 @@ fn any_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Option<(
 #[inline(always)]
 fn any_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
     match form {
+        Form::Swinging(swinging) => swinging::go::<L>(swinging, state, h),
         Form::Few(bodies) => bodies::go::<L, _, _>(bodies, state, h),
         Form::Several(bodies) => bodies::go::<L, _, _>(bodies, state, h),
         Form::FewSprung(bodies) => bodies::go::<L, _, _>(bodies, state, h),
@@ -219,7 +223,8 @@ impl Fast {
             let step_size = step_size(driven.longest(order));
             Form::Driven(Box::new(driven), step_size, Box::default())
         } else {
-            let form = Self::bodies(mechanism, tolerance, order)?;
+            let swinging = Swinging::new(mechanism, tolerance, order).map(Box::new).map(Form::Swinging);
+            let form = swinging.or_else(|| Self::bodies(mechanism, tolerance, order))?;
             return Some(Self::of_any(settings(), form));
         };
         let (step, go) = match order {

@@ -11,7 +11,7 @@ const LONGEST: f64 = 1000.0;
 
 /// When the steps of the lanes begin, and how long they are.
 #[derive(Clone, Debug)]
-pub(super) struct LaneClock {
+pub(in crate::stepping::taylor) struct LaneClock {
     /// Which lanes have a trajectory.
     pub is_going: [bool; LANES],
     /// Times \[s\] in two terms.
@@ -32,7 +32,7 @@ pub(super) struct LaneClock {
 
 /// The step a lane is about to take.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LaneStep {
+pub(in crate::stepping::taylor) struct LaneStep {
     pub lane: usize,
     pub time: Time,
     /// The mechanism's unit of time \[s\].

@@ -25,7 +25,7 @@ const ZERO: Octet = Octet([0.0; LANES]);
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
-pub(super) struct SwingingTeam {
+pub(in crate::stepping::taylor) struct SwingingTeam {
     laws: Laws,
     /// The body that is driven.
     driven: [usize; LANES],
@@ -68,6 +68,15 @@ struct Power {
 }
 
 impl SwingingTeam {
+    /// Puts a lane's unknowns where a state is.
+    #[inline(always)]
+    pub(in crate::stepping::taylor) fn stand(&mut self, lane: usize, state: &State) {
+        let unknowns = state.y.iter().zip(&state.low).zip(self.high.iter_mut().zip(&mut self.low));
+        for ((&y, &rest), (high, low)) in unknowns {
+            (high.0[lane], low.0[lane]) = (y, rest);
+        }
+    }
+
     /// The driven body up to what order `order` of the free one asks for.
     #[inline(always)]
     fn drive<W: EightLanes>(&mut self, order: usize) {
@@ -134,10 +143,15 @@ impl SwingingTeam {
     }
 }
 
+/// The law of a mechanism of this kind.
+pub(in crate::stepping::taylor) fn law_of(mechanism: &Mechanism) -> Option<&Law> {
+    let fits = |law: &&Law| law.profile.is_none() && !law.is_steady() && mechanism.contacts.is_empty();
+    Driven::pattern(mechanism).map(|(_, law)| law).filter(fits)
+}
+
 /// True for mechanisms of this kind.
 pub(super) fn fits(mechanism: &Mechanism) -> bool {
-    let fits = |(_, law): (usize, &Law)| law.profile.is_none() && !law.is_steady();
-    Driven::pattern(mechanism).is_some_and(fits) && mechanism.contacts.is_empty()
+    law_of(mechanism).is_some()
 }
 
 impl Team for SwingingTeam {
@@ -182,9 +196,7 @@ impl Team for SwingingTeam {
             let term = DoubleDouble::from(number) / DoubleDouble::from(d);
             (self.load[0][i].0[lane], self.load[1][i].0[lane]) = (term.hi, term.lo);
         }
-        for i in 0..3 {
-            (self.high[i].0[lane], self.low[i].0[lane]) = (state.y[i], state.low[i]);
-        }
+        self.stand(lane, state);
         let stiffness = pull.norm_squared().sqrt() + a.abs() * (fastest * fastest + bend);
         let frequency = law.sines.iter().fold(fastest, |most, sine| most.max(sine.frequency.abs()));
         order as f64 / 8.0 / (stiffness / d).sqrt().max(frequency)

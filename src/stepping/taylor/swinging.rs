@@ -1,0 +1,78 @@
+//! Two bodies, one of them driven from the ground by sines: a single trajectory in the code of the lanes,
+//! whose equations stand in `batch/swinging.rs`.
+//!
+//! Of the four lanes of a vector one counts, and its bits are those of a trajectory among others.  Wins over
+//! the series of any mechanism (whole runs by `taylor`): 2.6 times on `motor_sine` at 1e-9, 2.8 at 1e-13.
+
+use super::batch::{BatchMember, LaneClock, SwingingTeam, Team, swinging_law};
+use super::step_size::{self, StepSize};
+use crate::arithmetic::eight::{LANES, Octet};
+use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::lanes::wide::{FirstHalf, Vectors};
+use crate::dynamics::{Mechanism, State, Time};
+use crate::scene::Law;
+
+/// Angle, rate and work.
+const UNKNOWNS: usize = 3;
+
+/// The trajectory, and the series of its last step.
+#[derive(Clone, Debug)]
+pub struct Swinging {
+    team: SwingingTeam,
+    clock: LaneClock,
+    step_size: StepSize,
+    order: usize,
+}
+
+impl Swinging {
+    /// For an order of at most [`MOST`](super::driven::MOST), where this form fits.
+    pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
+        // An acceleration would make the motor faster than the steps are made for.
+        let is_bounded = |law: &Law| law.acceleration == 0.0;
+        let fits = swinging_law(mechanism).is_some_and(is_bounded) && order <= super::driven::MOST;
+        if !fits {
+            return None;
+        }
+        let zero = vec![0.0; UNKNOWNS];
+        let state = State { y: zero.clone(), low: zero, ..State::default() };
+        let member = BatchMember::new(mechanism, state);
+        let mut team = SwingingTeam::new(&member, order, Vectors::Portable);
+        let longest = team.take_in(0, &member, order);
+        let step_size = StepSize::new(tolerance, order, longest).over(mechanism.units.time);
+        Some(Self { team, clock: LaneClock::new(tolerance, order, Time::default()), step_size, order })
+    }
+}
+
+/// One step of at most `left` \[s\]; returns the step wanted, and leaves the state alone where it is useless.
+#[inline(always)]
+pub fn step<L: Lanes>(own: &mut Swinging, state: &mut State, left: f64) -> (f64, f64) {
+    let Swinging { team, clock, step_size, order } = own;
+    clock.set(0, state.time);
+    team.stand(0, state);
+    team.begin::<FirstHalf<L>>(clock);
+    team.expand::<FirstHalf<L>>(*order);
+    let sizes = team.sizes::<FirstHalf<L>>(*order);
+    if !team.power_of(0, 0, *order).is_finite() {
+        return (f64::NAN, 0.0);
+    }
+    let mut largest = [0.0; super::JUDGES];
+    for (largest, sizes) in largest.iter_mut().zip(&sizes) {
+        *largest = sizes.0[0];
+    }
+    let wanted = step_size.step_of(*order, &largest);
+    let h = step_size::taken(wanted, left);
+    if h > 0.0 {
+        go::<L>(own, state, h);
+    }
+    (wanted, h)
+}
+
+/// Takes a state that stands where the last step began on by `h` \[s\].
+#[inline(always)]
+pub fn go<L: Lanes>(own: &mut Swinging, state: &mut State, h: f64) {
+    own.team.stand(0, state);
+    let mut taken = [0.0; LANES];
+    taken[0] = h;
+    own.team.finish::<FirstHalf<L>>(own.order, &Octet(taken));
+    own.team.leave(0, state);
+}
