@@ -199,7 +199,7 @@ fn portable_lanes_and_hardware_have_the_same_bits() {
 
 /// Motors with sines have one code in lanes and alone.
 #[test]
-fn a_swinging_motor_has_the_same_bits_alone_and_in_lanes() {
+fn a_motor_with_sines_has_the_same_bits_alone_and_in_lanes() {
     let mut count = 0;
     for (name, scene) in fast_scenes().into_iter().filter(|(name, _)| ["motor_sine", "swung"].contains(name))
     {

@@ -3,6 +3,9 @@
 use super::{Arithmetic, Hardware, Lanes, Portable, Signed, hardware, is_disabled, sum};
 use std::marker::PhantomData;
 
+mod half;
+
+pub use self::half::FirstHalf;
 #[cfg(all(target_arch = "x86_64", not(driftless_portable)))]
 pub use super::hardware::WideHardware;
 
@@ -32,6 +35,18 @@ pub trait Task {
     fn perform(self) -> Self::Output;
 }
 
+/// What two arrays of eight come to, lane by lane, in code of the place it stands in.
+macro_rules! lane_by_lane {
+    ($a:expr, $b:expr, $f:expr) => {{
+        let (a, b, mut found, mut lane) = ($a.array(), $b.array(), [0.0; 8], 0);
+        while lane < 8 {
+            found[lane] = $f(a[lane], b[lane]);
+            lane += 1;
+        }
+        Self::of(&found)
+    }};
+}
+
 /// Eight doubles.
 pub trait EightLanes: Slots + Signed {
     /// Four of them.
@@ -43,14 +58,29 @@ pub trait EightLanes: Slots + Signed {
     /// Magnitudes, or `other` where that is larger or the magnitude not a number.
     fn larger(self, other: Self) -> Self;
     /// The smaller ones; `other` where one is not a number.
-    fn smaller(self, other: Self) -> Self;
+    #[inline(always)]
+    fn smaller(self, other: Self) -> Self {
+        lane_by_lane!(self, other, |a: f64, b: f64| if a < b { a } else { b })
+    }
+
     /// How far the bits of numbers from zero on are above those of others, in units of the last place: about
     /// 2⁵² times the logarithm to base 2 of their ratio.
-    fn bits_above(self, other: Self) -> Self;
+    #[inline(always)]
+    fn bits_above(self, other: Self) -> Self {
+        lane_by_lane!(self, other, |a: f64, b: f64| (a.to_bits() as i64 - b.to_bits() as i64) as f64)
+    }
+
     /// The whole numbers below.
-    fn floor(self) -> Self;
+    #[inline(always)]
+    fn floor(self) -> Self {
+        lane_by_lane!(self, self, |a: f64, _| a.floor())
+    }
+
     /// Numbers from 1 to 2, times 2 to the power of whole numbers from -1000 to 1000.
-    fn times_power(self, exponent: Self) -> Self;
+    #[inline(always)]
+    fn times_power(self, exponent: Self) -> Self {
+        lane_by_lane!(self, exponent, |a, b: f64| a * f64::from_bits(((1023 + b as i64) as u64) << 52))
+    }
 }
 
 impl<L: Lanes> Arithmetic for [L; 2] {
@@ -126,21 +156,6 @@ pub(super) fn each_of_eight<W: Slots, const N: usize>(lanes: [W; N], f: fn([f64;
     std::array::from_fn(|i| W::of(&found.map(|found| found[i])))
 }
 
-/// What two arrays of eight come to, lane by lane, in code of the place it stands in.
-macro_rules! lane_by_lane {
-    ($a:expr, $b:expr, $f:expr) => {{
-        let (a, b, mut found, mut lane) = ($a.array(), $b.array(), [0.0; 8], 0);
-        while lane < 8 {
-            found[lane] = $f(a[lane], b[lane]);
-            lane += 1;
-        }
-        Self::of(&found)
-    }};
-}
-
-mod half;
-pub use half::FirstHalf;
-
 impl<L: Lanes> Slots for [L; 2] {
     const COUNT: usize = 8;
     const UNROLLED: bool = L::UNROLLED;
@@ -170,26 +185,6 @@ impl<L: Lanes> EightLanes for [L; 2] {
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         [self[0].abs().max(other[0]), self[1].abs().max(other[1])]
-    }
-
-    #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        lane_by_lane!(self, other, |a: f64, b: f64| if a < b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn bits_above(self, other: Self) -> Self {
-        lane_by_lane!(self, other, |a: f64, b: f64| (a.to_bits() as i64 - b.to_bits() as i64) as f64)
-    }
-
-    #[inline(always)]
-    fn floor(self) -> Self {
-        lane_by_lane!(self, self, |a: f64, _| a.floor())
-    }
-
-    #[inline(always)]
-    fn times_power(self, exponent: Self) -> Self {
-        lane_by_lane!(self, exponent, |a, b: f64| a * f64::from_bits(((1023 + b as i64) as u64) << 52))
     }
 }
 

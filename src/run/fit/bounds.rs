@@ -7,6 +7,7 @@
 
 use super::FittedColumn;
 use super::problem::Problem;
+use super::search::rounding;
 use super::segment::Lost;
 
 /// What a step of Gauss and Newton may take off the sum of squares at a minimum: of a sum of squares over
@@ -16,7 +17,9 @@ const SETTLED: [f64; 2] = [1e-4, 1e-8];
 const NEAR: f64 = 1e-2;
 /// Bounds that are looked for first.
 const BOUNDS: [f64; 3] = [0.0, 1.0, -1.0];
-/// Halvings of the distance to another one.
+/// What is beyond one of these, over the step.
+const BEYOND: f64 = 1e-9;
+/// Halvings of the distance to another bound.
 const HALVINGS: usize = 60;
 
 impl Problem<'_> {
@@ -45,15 +48,14 @@ impl Problem<'_> {
         if !self.was_refused {
             return Ok(false);
         }
-        let (along, svd) = self.taken_apart()?;
-        let residuals = self.found.as_ref().map_or(0.0, |found| found.residuals.norm_squared());
-        let least = f64::EPSILON * svd.singular_values.amax() * svd.singular_values.len() as f64;
-        if along.norm_squared() <= SETTLED[0].max(SETTLED[1] * residuals) {
+        let svd = self.decomposed()?;
+        let residuals = &self.found.as_ref().map_err(Clone::clone)?.residuals;
+        let u = svd.u.as_ref().ok_or("the Jacobian has no singular values")?;
+        let settled = SETTLED[0].max(SETTLED[1] * residuals.norm_squared());
+        if u.tr_mul(residuals).norm_squared() <= settled {
             return Ok(false);
         }
-        let Ok(step) = svd.solve(&self.found.as_ref().map_err(Clone::clone)?.residuals, least) else {
-            return Ok(false);
-        };
+        let Ok(step) = svd.solve(residuals, rounding(&svd.singular_values)) else { return Ok(false) };
         let count = self.held.len();
         for (place, k) in self.free().into_iter().enumerate().filter(|(_, k)| *k < count) {
             let (from, to) = (self.x[k], self.x[k] - step[place]);
@@ -74,7 +76,7 @@ impl Problem<'_> {
         let (mut inside, mut outside) = (from, to);
         for bound in BOUNDS.map(|bound| bound / self.scale[k]) {
             let is_between = (bound - from) * (to - bound) >= 0.0;
-            if is_between && self.takes(k, bound) && !self.takes(k, bound + 1e-9 * (to - from)) {
+            if is_between && self.takes(k, bound) && !self.takes(k, bound + BEYOND * (to - from)) {
                 return bound;
             }
         }

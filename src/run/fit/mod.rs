@@ -254,7 +254,7 @@ pub fn fit(
         }
         problem.take_model(&mut columns)?;
         let told = problem.told(columns.len())?;
-        match weigh(&mut columns, &sizes, &told) {
+        match estimate_noise(&mut columns, &sizes, &told) {
             None => break,
             Some(name) if round == ROUNDS => {
                 ended += &format!("; the noise of {name} is not told: --sigma {name}=… gives it");
@@ -395,7 +395,7 @@ fn residuals(column: &FittedColumn) -> impl Iterator<Item = f64> {
 
 /// Finds the noise of columns for which nobody says, from what the residuals leave beside so many numbers;
 /// returns one whose noise is not yet what the fit was weighted with.
-fn weigh(columns: &mut [FittedColumn], sizes: &[f64], told: &[f64]) -> Option<String> {
+fn estimate_noise(columns: &mut [FittedColumn], sizes: &[f64], told: &[f64]) -> Option<String> {
     let mut moving = None;
     for ((column, size), told) in columns.iter_mut().zip(sizes).zip(told).filter(|((c, _), _)| !c.is_given) {
         let count = residuals(column).count() as f64;

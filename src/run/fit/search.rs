@@ -15,8 +15,10 @@ const FAR: f64 = 1e9;
 /// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
 const NOTHING: f64 = 1e-11;
 
-/// `Uᵀ r`, and the singular value decomposition of a Jacobian.
-type TakenApart = (DVector<f64>, SVD<f64, Dyn, Dyn>);
+/// Singular values up to this one are rounding.
+pub(super) fn rounding(values: &DVector<f64>) -> f64 {
+    f64::EPSILON * values.amax() * values.len() as f64
+}
 
 impl Problem<'_> {
     /// The unknowns that no bound holds.
@@ -24,12 +26,10 @@ impl Problem<'_> {
         (0..self.x.len()).filter(|&k| self.held.get(k).copied().flatten().is_none()).collect()
     }
 
-    /// Residuals and their Jacobian by the free unknowns, taken apart.
-    pub(super) fn taken_apart(&self) -> Result<TakenApart, Lost> {
+    /// The singular value decomposition of the Jacobian by the free unknowns.
+    pub(super) fn decomposed(&self) -> Result<SVD<f64, Dyn, Dyn>, Lost> {
         let found = self.found.as_ref().map_err(Clone::clone)?;
-        let svd = found.jacobian.select_columns(&self.free()).svd(true, true);
-        let u = svd.u.as_ref().ok_or("the Jacobian has no singular values")?;
-        Ok((u.transpose() * &found.residuals, svd))
+        Ok(found.jacobian.select_columns(&self.free()).svd(true, true))
     }
 
     /// Looks for the minimum with this weight of continuity in the free unknowns, and tells how it ended.
@@ -73,9 +73,8 @@ impl Problem<'_> {
 
     /// How many of the unknowns each column tells: the sum of the leverages of its rows.
     pub fn told(&self, columns: usize) -> Result<Vec<f64>, Lost> {
-        let (_, svd) = self.taken_apart()?;
-        let (values, found) = (&svd.singular_values, self.found.as_ref().map_err(Clone::clone)?);
-        let least = f64::EPSILON * values.amax() * values.len() as f64;
+        let (svd, found) = (self.decomposed()?, self.found.as_ref().map_err(Clone::clone)?);
+        let (values, least) = (&svd.singular_values, rounding(&svd.singular_values));
         let mut told = vec![0.0; columns];
         for (row, owner) in svd.u.iter().flat_map(|u| u.row_iter()).zip(&found.owners) {
             let Some(column) = *owner else { continue };
@@ -94,7 +93,7 @@ impl Problem<'_> {
         let free = self.free();
         let svd = jacobian.select_columns(&free).svd(false, true);
         let (values, right) = (svd.singular_values, svd.v_t.ok_or("the Jacobian has no singular values")?);
-        let least = f64::EPSILON * values.amax() * values.len() as f64;
+        let least = rounding(&values);
         let places: Vec<Option<usize>> = (0..count).map(|k| free.iter().position(|f| *f == k)).collect();
         if let Some(k) = values.iter().position(|value| *value <= least) {
             let row = right.row(k);

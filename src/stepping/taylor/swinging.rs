@@ -10,7 +10,6 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::wide::{FirstHalf, Vectors};
 use crate::dynamics::{Mechanism, State, Time};
-use crate::scene::Law;
 
 /// Angle, rate and work.
 const UNKNOWNS: usize = 3;
@@ -28,11 +27,7 @@ impl Swinging {
     /// For an order of at most [`MOST`](super::driven::MOST), where this form fits.
     pub fn new(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Self> {
         // An acceleration would make the motor faster than the steps are made for.
-        let is_bounded = |law: &Law| law.acceleration == 0.0;
-        let fits = swinging_law(mechanism).is_some_and(is_bounded) && order <= super::driven::MOST;
-        if !fits {
-            return None;
-        }
+        swinging_law(mechanism).filter(|law| law.acceleration == 0.0 && order <= super::driven::MOST)?;
         let zero = vec![0.0; UNKNOWNS];
         let state = State { y: zero.clone(), low: zero, ..State::default() };
         let member = BatchMember::new(mechanism, state);

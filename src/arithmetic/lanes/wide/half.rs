@@ -103,24 +103,4 @@ impl<L: Lanes> EightLanes for FirstHalf<L> {
     fn larger(self, other: Self) -> Self {
         Self(self.0.abs().max(other.0))
     }
-
-    #[inline(always)]
-    fn smaller(self, other: Self) -> Self {
-        lane_by_lane!(self, other, |a: f64, b: f64| if a < b { a } else { b })
-    }
-
-    #[inline(always)]
-    fn bits_above(self, other: Self) -> Self {
-        lane_by_lane!(self, other, |a: f64, b: f64| (a.to_bits() as i64 - b.to_bits() as i64) as f64)
-    }
-
-    #[inline(always)]
-    fn floor(self) -> Self {
-        lane_by_lane!(self, self, |a: f64, _| a.floor())
-    }
-
-    #[inline(always)]
-    fn times_power(self, exponent: Self) -> Self {
-        lane_by_lane!(self, exponent, |a, b: f64| a * f64::from_bits(((1023 + b as i64) as u64) << 52))
-    }
 }
