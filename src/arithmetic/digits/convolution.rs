@@ -4,7 +4,7 @@
 //! negative ones; carries are left for the end, and no branch depends on a sign.  The code is made for every
 //! number of limbs up to eight.
 
-use super::{Digits, Kind, MOST, Scalar};
+use super::{Digits, FARTHEST, Kind, MOST, Scalar};
 
 /// The upper columns of the product of two numbers of `N` limbs each into `found` (N + 2), the first of which
 /// is what is carried out of the first column.
@@ -91,14 +91,22 @@ pub fn times_whole<const W: usize>(a: &Digits<W>, factor: u64) -> Digits<W> {
         return *a;
     }
     let (limbs, mut carry) = (a.limbs(), 0);
-    let mut found = [0; MOST + 1];
-    for i in (0..limbs).rev() {
-        let sum = u128::from(a.limb[i]) * u128::from(factor) + u128::from(carry);
-        found[i + 1] = sum as u64;
+    let mut limb = [0; W];
+    for (limb, &digit) in limb[..limbs].iter_mut().zip(&a.limb[..limbs]).rev() {
+        let sum = u128::from(digit) * u128::from(factor) + u128::from(carry);
+        *limb = sum as u64;
         carry = (sum >> 64) as u64;
     }
-    found[0] = carry;
-    Digits::normalized(a.is_negative(), a.exponent + 1, limbs, &found[..=limbs])
+    let mut exponent = a.exponent;
+    if carry > 0 {
+        exponent += 1;
+        if exponent >= FARTHEST {
+            return Digits::NAN;
+        }
+        limb.copy_within(..limbs - 1, 1);
+        limb[0] = carry;
+    }
+    Digits { exponent, limb, ..*a }
 }
 
 /// Σ a b of terms, rounded once, with as many limbs as the shortest of them.

@@ -12,7 +12,7 @@
 //! Source: R. Brent, P. Zimmermann, *Modern Computer Arithmetic* (2010), sections 4.2 to 4.4.
 
 use super::quotient::turns;
-use super::{Digits, Kind, MOST, Real, Scalar};
+use super::{Digits, FARTHEST, Kind, Real, Scalar};
 use std::sync::RwLock;
 
 /// A constant, to as many limbs behind the point as have been asked for.
@@ -76,14 +76,17 @@ impl Constant {
     }
 }
 
-/// Divides limbs, the most significant first, by a small number.
-fn divide(limbs: &mut [u64], by: u64) {
-    let mut rest = 0;
-    for limb in limbs {
-        let wide = u128::from(rest) << 64 | u128::from(*limb);
-        *limb = (wide / u128::from(by)) as u64;
-        rest = (wide % u128::from(by)) as u64;
-    }
+/// Divides limbs, the most significant first, by a number, and tells what is left.
+fn divide(limbs: &mut [u64], by: u64) -> u64 {
+    limbs.iter_mut().fold(0, |rest, limb| divide_on(limb, rest, by))
+}
+
+/// Goes on with a division in the next limb.
+#[inline(always)]
+fn divide_on(limb: &mut u64, rest: u64, by: u64) -> u64 {
+    let wide = u128::from(rest) << 64 | u128::from(*limb);
+    *limb = (wide / u128::from(by)) as u64;
+    (wide % u128::from(by)) as u64
 }
 
 /// π.
@@ -97,11 +100,19 @@ pub fn over<const W: usize>(a: Digits<W>, by: u64) -> Digits<W> {
         return a;
     }
     let limbs = a.limbs();
-    let mut found = [0; MOST + 1];
-    let count = limbs + 1;
-    found[..limbs].copy_from_slice(&a.limb[..limbs]);
-    divide(&mut found[..count], by);
-    Digits::normalized(a.is_negative(), a.exponent, limbs, &found[..count])
+    let mut limb = a.limb;
+    let rest = divide(&mut limb[..limbs], by);
+    let mut exponent = a.exponent;
+    if limb[0] == 0 {
+        exponent -= 1;
+        if exponent <= -FARTHEST {
+            return Digits::ZERO;
+        }
+        limb.copy_within(1..limbs, 0);
+        limb[limbs - 1] = 0;
+        divide_on(&mut limb[limbs - 1], rest, by);
+    }
+    Digits { exponent, limb, ..a }
 }
 
 /// Numbers are worked on with a limb more than asked for, where there is room.
@@ -131,6 +142,9 @@ fn signed<const W: usize>(value: i64) -> Digits<W> {
     if value < 0 { -whole } else { whole }
 }
 
+/// Quarters of a turn that a double counts.
+const FEW_QUARTERS: f64 = 1e9;
+
 /// How often an argument is halved: as often as makes series and doublings cost the same.
 fn halvings(limbs: usize) -> i32 {
     libm::sqrt(32.0 * limbs as f64) as i32
@@ -151,7 +165,10 @@ pub fn sin_cos<const W: usize>(x: Digits<W>) -> (Digits<W>, Digits<W>) {
     let limbs = x.limbs();
     let x = more(x);
     let quarter = pi::<W>().ldexp(-1);
-    let Some(k) = x.is_finite().then(|| nearest(x / quarter)).flatten() else {
+    // Beside the middle of two quarters either will do.
+    let quarters = x.value() * std::f64::consts::FRAC_2_PI;
+    let near = (quarters.abs() < FEW_QUARTERS).then(|| libm::rint(quarters) as i64);
+    let Some(k) = near.or_else(|| x.is_finite().then(|| nearest(x / quarter)).flatten()) else {
         return (Digits::NAN, Digits::NAN);
     };
     let j = halvings(x.limbs());

@@ -6,11 +6,12 @@
 //! Σ_j a_j b_{M-j} = 2^(e_a + e_b) U^-M (Σ V V' - (Σ V + Σ V')/2 + n/4)
 //! ```
 //!
-//! So no term of a sum has a sign or a place of its own: a column is a loop over limbs one after another in
-//! memory, added up in two sums of 128 bits, and the sums of V are differences of sums from the first power
-//! on.  A sum of total power M contributes (step/U)^M to a step, and is formed from so many limbs of its
-//! factors as that leaves; columns below those are left out.  A power larger than there is room for makes the
-//! room larger.
+//! So no term of a sum has a sign or a place of its own, and the sums of V are differences of sums from the
+//! first power on.  Of up to four limbs, all columns of a product are added to sums of 128 bits that stay in
+//! registers, power by power; of more limbs, a column is a loop over limbs one after another in memory.  A
+//! sum of total power M contributes (step/U)^M to a step, and is formed from so many limbs of its factors as
+//! that leaves; columns below those are left out.  A power larger than there is room for makes the room
+//! larger.
 
 use super::{Digits, Kind, Scalar, sum_of_products};
 use std::ops::RangeInclusive;
@@ -28,6 +29,8 @@ const MOST: usize = super::MOST + 2;
 const ROOM: usize = MOST + 3;
 /// Limbs that there is smaller room for: it is cleared every time.
 const SMALL: usize = 9;
+/// Limbs of powers that are kept one after another.
+const FEW: usize = 4;
 
 /// The unit of time of a step's series, and the limbs that sums are formed from.
 #[derive(Clone, Debug, Default)]
@@ -68,8 +71,11 @@ impl Scale {
 #[derive(Clone, Debug)]
 pub struct Factor<const W: usize> {
     powers: Vec<Digits<W>>,
-    /// Limb i of V_m at `i room + m`.
+    /// Limb i of V_m at `i limb_stride + m power_stride`.
     limbs: Vec<u64>,
+    limb_stride: usize,
+    power_stride: usize,
+    /// Powers there is room for.
     room: usize,
     /// Σ_{j<m} V_j, a limb above the point first, `stride` limbs each.
     sums: Vec<u64>,
@@ -88,6 +94,8 @@ impl<const W: usize> Factor<W> {
         Self {
             powers,
             limbs: Vec::new(),
+            limb_stride: 1,
+            power_stride: FEW,
             room: order + 1,
             sums: Vec::new(),
             stride: 0,
@@ -106,7 +114,8 @@ impl<const W: usize> Factor<W> {
         }
         let limbs = scale.limbs(0);
         self.stride = limbs + 1;
-        self.limbs.resize(limbs * self.room, 0);
+        (self.limb_stride, self.power_stride) = if limbs <= FEW { (1, FEW) } else { (self.room, 1) };
+        self.limbs.resize(limbs.max(FEW) * self.room, 0);
         // Every sum is written before it is read, but for the first.
         self.sums.resize(self.stride * (self.room + 1), 0);
         self.sums[..self.stride].fill(0);
@@ -168,7 +177,7 @@ impl<const W: usize> Factor<W> {
         }
         found[0] ^= 1 << 63;
         for (i, &limb) in found.iter().enumerate() {
-            self.limbs[i * self.room + m] = limb;
+            self.limbs[i * self.limb_stride + m * self.power_stride] = limb;
         }
         let (before, sum) = self.sums.split_at_mut((m + 1) * self.stride);
         let sum = &mut sum[..self.stride];
@@ -184,10 +193,10 @@ impl<const W: usize> Factor<W> {
         if first > last {
             return Digits::ZERO;
         }
-        let (from, to) = (total - last, total - first);
+        let (of, from) = ([first, last + 1], [total - last, total - first + 1]);
         if scale.limbs.is_empty() {
-            let powers = other.powers[from..=to].iter().rev();
-            return sum_of_products(self.powers[first..=last].iter().zip(powers));
+            let powers = other.powers[from[0]..from[1]].iter().rev();
+            return sum_of_products(self.powers[of[0]..of[1]].iter().zip(powers));
         }
         if !(self.is_finite && other.is_finite) {
             return Digits::NAN;
@@ -197,30 +206,62 @@ impl<const W: usize> Factor<W> {
         };
         let limbs = scale.limbs(total);
         let bits = exponent + other_exponent - scale.unit * total as i32;
-        let (of, from) = ([first, last], [from, to]);
-        // Loops of a length that the compiler knows where there are few limbs.
         match limbs {
-            1 => self.scaled::<4>(other, of, from, 1, bits),
-            2 => self.scaled::<5>(other, of, from, 2, bits),
-            3 => self.scaled::<6>(other, of, from, 3, bits),
-            4 => self.scaled::<7>(other, of, from, 4, bits),
+            1 => self.scaled_few::<1, 4>(other, of, from, bits),
+            2 => self.scaled_few::<2, 5>(other, of, from, bits),
+            3 => self.scaled_few::<3, 6>(other, of, from, bits),
+            4 => self.scaled_few::<4, 7>(other, of, from, bits),
             ..=SMALL => self.scaled::<{ SMALL + 3 }>(other, of, from, limbs, bits),
             _ => self.scaled::<ROOM>(other, of, from, limbs, bits),
         }
     }
 
-    /// The same in fixed point, in room for three limbs more than are asked for.
+    /// The same in fixed point from `N` limbs, in room for three limbs more.
+    #[inline(always)]
+    fn scaled_few<const N: usize, const ROOM: usize>(
+        &self,
+        other: &Self,
+        of: [usize; 2],
+        from: [usize; 2],
+        bits: i32,
+    ) -> Digits<W> {
+        if self.power_stride != FEW {
+            return self.scaled::<ROOM>(other, of, from, N, bits);
+        }
+        let (a, b) = (self.limbs.as_chunks::<FEW>().0, other.limbs.as_chunks::<FEW>().0);
+        let (a, b) = (&a[of[0]..of[1]], &b[from[0]..from[1]]);
+        // The limbs of the product, the first one above its first column.
+        let mut columns = [0_u128; FEW + 1];
+        let (a_pairs, a_rest) = a.as_chunks::<2>();
+        let (b_rest, b_pairs) = b.as_rchunks::<2>();
+        for (a, b) in a_pairs.iter().zip(b_pairs.iter().rev()) {
+            add_columns::<N>(&a[0], &b[1], &mut columns);
+            add_columns::<N>(&a[1], &b[0], &mut columns);
+        }
+        if let ([a], [b]) = (a_rest, b_rest) {
+            add_columns::<N>(a, b, &mut columns);
+        }
+        let (mut sum, mut carry) = ([0; ROOM], 0);
+        for (sum, column) in sum[1..N + 2].iter_mut().zip(&columns).rev() {
+            let wide = column + carry;
+            (*sum, carry) = (wide as u64, wide >> 64);
+        }
+        sum[0] = carry as u64;
+        self.rounded::<ROOM>(other, of, from, bits, &mut sum[..N + 2])
+    }
+
+    /// The same from any number of limbs.
     #[inline(always)]
     fn scaled<const ROOM: usize>(
         &self,
         other: &Self,
-        [first, last]: [usize; 2],
-        [from, to]: [usize; 2],
+        of: [usize; 2],
+        from: [usize; 2],
         limbs: usize,
         bits: i32,
     ) -> Digits<W> {
-        let a = |i: usize| &self.limbs[i * self.room + first..=i * self.room + last];
-        let b = |i: usize| &other.limbs[i * other.room + from..=i * other.room + to];
+        let a = |i: usize| &self.limbs[i * self.limb_stride..][of[0]..of[1]];
+        let b = |i: usize| &other.limbs[i * other.limb_stride..][from[0]..from[1]];
         // A limb above the point, which has the sign, and one more below it than there are columns.
         let mut sum = [0; ROOM];
         let sum = &mut sum[..limbs + 2];
@@ -234,39 +275,71 @@ impl<const W: usize> Factor<W> {
             carry = high + (low >> 64);
         }
         (sum[1], sum[0]) = (carry as u64, (carry >> 64) as u64);
-        self.without_halves(sum, first, last);
-        other.without_halves(sum, from, to);
+        self.rounded::<ROOM>(other, of, from, bits, sum)
+    }
+
+    /// From Σ V V', the rest of the product: a limb above the point first.
+    #[inline(always)]
+    fn rounded<const ROOM: usize>(
+        &self,
+        other: &Self,
+        of: [usize; 2],
+        from: [usize; 2],
+        bits: i32,
+        sum: &mut [u64],
+    ) -> Digits<W> {
+        // Σ V + Σ V', of which half is taken off, a bit below its last limb.
+        let count = sum.len() - 1;
+        let mut twice = [0; ROOM];
+        let twice = &mut twice[..=count];
+        let ([a_from, a_to], [b_from, b_to]) = (self.sums_before(of, count), other.sums_before(from, count));
+        let mut carry = 0;
+        for i in (0..count).rev() {
+            let (a, b) =
+                (i128::from(a_to[i]) - i128::from(a_from[i]), i128::from(b_to[i]) - i128::from(b_from[i]));
+            let wide = a + b + carry;
+            (twice[i], carry) = (wide as u64, wide >> 64);
+        }
+        let mut borrow = false;
+        for i in (0..=count).rev() {
+            let above = if i == 0 { 0 } else { twice[i - 1] << 63 };
+            let (rest, first) = sum[i].overflowing_sub(twice[i] >> 1 | above);
+            let (rest, second) = rest.overflowing_sub(u64::from(borrow));
+            (sum[i], borrow) = (rest, first | second);
+        }
         // n/4.
-        let count = (last - first + 1) as u64;
-        super::plus(&mut sum[..2], &[count >> 2, count << 62]);
+        let terms = (of[1] - of[0]) as u64;
+        super::plus(&mut sum[..2], &[terms >> 2, terms << 62]);
         let is_negative = sum[0] >> 63 == 1;
         if is_negative {
             negate(sum);
         }
-        raised::<ROOM, W>(is_negative, sum, bits, limbs + 1)
+        raised::<ROOM, W>(is_negative, sum, bits, count)
     }
 
-    /// Takes half of Σ V off.
+    /// The sums of V before these powers, to so many limbs.
     #[inline(always)]
-    fn without_halves(&self, sum: &mut [u64], first: usize, last: usize) {
-        let count = (sum.len() - 1).min(self.stride);
-        let at = |m: usize| &self.sums[m * self.stride..][..count];
-        let (from, to) = (at(first), at(last + 1));
-        let mut borrow = 0;
-        // 2⁶³ times the limbs of the difference, from the last on.
-        for i in (0..count).rev() {
-            let above = if i == 0 { [0; 2] } else { [to[i - 1], from[i - 1]] };
-            let [to, from] =
-                [(to[i], above[0]), (from[i], above[1])].map(|(limb, above)| limb >> 1 | above << 63);
-            let wide = i128::from(sum[i]) - i128::from(to) + i128::from(from) + borrow;
-            (sum[i], borrow) = (wide as u64, wide >> 64);
+    fn sums_before(&self, powers: [usize; 2], count: usize) -> [&[u64]; 2] {
+        let before = |m: usize| &self.sums[m * self.stride..m * self.stride + count];
+        [before(powers[0]), before(powers[1])]
+    }
+}
+
+/// Adds the product of two numbers of `N` limbs to columns, the first of which is above its own first one.
+#[inline(always)]
+fn add_columns<const N: usize>(a: &[u64; FEW], b: &[u64; FEW], columns: &mut [u128; FEW + 1]) {
+    for i in 0..N {
+        for k in 0..N - i {
+            let product = u128::from(a[i]) * u128::from(b[k]);
+            columns[i + k + 1] += u128::from(product as u64);
+            columns[i + k] += product >> 64;
         }
     }
 }
 
 /// Adds the lower and the upper limbs of Σ a_j b_{n-1-j} to sums of their own: a carry of each product into
-/// a third limb is gathered by slow vector code.
-#[inline(always)]
+/// a third limb is gathered by slow vector code, and so are copies of this loop in functions of many.
+#[inline(never)]
 fn add_products(a: &[u64], b: &[u64], low: &mut u128, high: &mut u128) {
     let (mut lower, mut upper) = (*low, *high);
     let mut add = |a: u64, b: u64| {
@@ -315,7 +388,7 @@ fn raised<const ROOM: usize, const W: usize>(
     let mut below = 0;
     for i in (0..found.len()).rev() {
         let here = if i == 0 { 0 } else { sum[i - 1] };
-        found[i] = ((u128::from(here) << 64 | u128::from(below)) << bits >> 64) as u64;
+        found[i] = here << bits | (below >> 1) >> (63 - bits);
         below = here;
     }
     Digits::normalized(is_negative, whole + 2, limbs.min(W), found)

@@ -2,7 +2,7 @@
 
 use super::motion::Motion;
 use crate::arithmetic::Scalar;
-use crate::arithmetic::digits::Digits;
+use crate::arithmetic::digits::{Digits, sum_of_products};
 
 /// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
 const WORK: f64 = 10.0;
@@ -56,32 +56,49 @@ impl<const W: usize> Motion<W> {
     /// after that.
     pub(super) fn evaluate(&self, h: Digits<W>) -> (Vec<Digits<W>>, Vec<Digits<W>>, [Digits<W>; 2]) {
         let f = self.state.u.len();
-        let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, h, false)).collect();
-        let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, h, true) * h;
+        let [powers, integrals] = self.powers_of(h);
+        let rates: Vec<_> = (0..f).map(|c| self.sum(&self.series.rate[c..], f, &powers)).collect();
+        let moved = |(c, &u): (usize, &Digits<W>)| u + self.sum(&self.series.rate[c..], f, &integrals);
         let u = self.state.u.iter().enumerate().map(moved).collect();
         let work = if self.mechanism.structure.has_work_integral() {
-            self.sum(&self.series.power, 1, h, true) * h
+            self.sum(&self.series.power, 1, &integrals)
         } else {
             Digits::ZERO
         };
-        let lost = match self.series.lost() {
-            [] => Digits::ZERO,
-            lost => self.sum(lost, 1, h, true) * h,
-        };
-        (u, rates, [work, lost])
+        (u, rates, [work, self.sum(self.series.lost(), 1, &integrals)])
     }
 
-    /// Σ a_m h^m, or Σ a_m h^m/(m+1), of every `stride`-th number: with as many limbs as each power is kept
-    /// to, and all of them at the end.
-    fn sum(&self, series: &[Digits<W>], stride: usize, h: Digits<W>, is_integral: bool) -> Digits<W> {
-        let mut sum = Digits::ZERO;
-        let count = series.len().div_ceil(stride);
-        for (m, a) in series.iter().step_by(stride).enumerate().rev() {
-            let limbs = self.kept[m].min(self.precision.limbs);
-            let a = a.shortened(limbs);
-            let a = if is_integral { a.over_whole(m as u64 + 1) } else { a };
-            sum = if m + 1 == count { a } else { sum.shortened(limbs) * h + a };
+    /// h^m and h^(m+1)/(m+1), with as many limbs as power m is kept to.
+    fn powers_of(&self, h: Digits<W>) -> [Vec<Digits<W>>; 2] {
+        let (mut powers, mut integrals) = (Vec::new(), Vec::new());
+        let mut power = Digits::ONE;
+        for (m, &kept) in self.kept.iter().enumerate() {
+            power = power.shortened(kept.min(self.precision.limbs));
+            let next = power * h;
+            powers.push(power);
+            integrals.push(next.over_whole(m as u64 + 1));
+            power = next;
         }
-        sum.shortened(self.precision.limbs)
+        [powers, integrals]
+    }
+
+    /// Σ a_m b_m of every `stride`-th number of a series: powers that are kept to as many limbs are summed
+    /// up together.
+    fn sum(&self, series: &[Digits<W>], stride: usize, factors: &[Digits<W>]) -> Digits<W> {
+        let (mut sum, mut last) = (Digits::ZERO, series.len().div_ceil(stride));
+        for alike in factors[..last].chunk_by(|a, b| a.limbs() == b.limbs()).rev() {
+            let first = last - alike.len();
+            // A sum has the limbs of its shortest term.
+            let limbs = alike[0].limbs();
+            let powers: Vec<_> = series[first * stride..]
+                .iter()
+                .step_by(stride)
+                .zip(alike)
+                .map(|(a, _)| a.shortened(limbs))
+                .collect();
+            let part = sum_of_products(powers.iter().zip(alike)).shortened(self.precision.limbs);
+            (sum, last) = (part + sum.shortened(self.precision.limbs), first);
+        }
+        sum
     }
 }
