@@ -514,7 +514,7 @@ fn a_fit_leaves_a_record_and_charts_and_tells_what_is_wrong_with_its_data() {
     };
     let measured: String = rows.lines().filter_map(line).collect();
     program.write("measured.csv", &format!("t [ms],bar1.phi [deg]\n{measured}"));
-    let fit = "fit free.json --vary gravity[0] --set gravity[0]=9 --out fits --data";
+    let fit = "fit free.json --vary gravity[0] --set gravity[0]=9 --out fits --force --data";
     let found = program.run(&format!("{fit} measured.csv --json")).exits(0).object();
     let value = found["numbers"][0]["value"].as_f64().expect("a number");
     assert!((value - 9.81).abs() < 1e-6, "{found}");
@@ -549,6 +549,36 @@ fn modes_leave_a_record_and_charts() {
     for name in ["modes.json", "motion.png", "motion.gif", "multipliers.png"] {
         assert!(program.files().contains(&format!("output/motor/modes/{name}")), "{name}");
     }
-    program.run("modes motor.json --period 0.7").exits(3).says(&["no period", "motor", "hint: "]);
+    program.run("modes motor.json --period 0.7 --force").exits(3).says(&["no period", "motor", "hint: "]);
     program.run("modes motor.json --period -1").exits(2).says(&["above 0"]);
+}
+
+/// Every study keeps the results of an earlier one, unless it is told to overwrite them.
+#[test]
+fn no_study_overwrites_results_unasked() {
+    let program = Program::with_scenes(&["free", "crank_rocker"]);
+    program.write("d.csv", "t [s],bar1.phi [rad]\n0.1,1.5\n0.2,1.3\n0.3,0.9\n0.4,0.4\n");
+    for (command, record) in [
+        ("modes free.json --starts 0", "free/modes/modes.json"),
+        ("kinematics crank_rocker.json --positions 4", "crank_rocker/kinematics-motor/kinematics.json"),
+        ("sensitivity free.json --of bar2.phi --to gravity[0] --at 0.5", "free/sensitivity/sensitivity.json"),
+        ("sensitivity free.json --lyapunov --at 0.5", "free/lyapunov/lyapunov.json"),
+        ("fit free.json --data d.csv --vary bars.bar1.length", "free/fit/fit.json"),
+        ("stress free.json --methods dp8", "stress/stress.json"),
+        (
+            "sweep free.json --vary bar1.phi=1..2:2 --until 0.1",
+            "free/sweep-start.bar1.phi-taylor-1e-9/sweep.json",
+        ),
+    ] {
+        program.run(&format!("{command} --no-charts -q")).exits(0);
+        let before = program.read(&format!("output/{record}"));
+        let changed = command.replace("--at 0.5", "--at 0.6").replace("--until 0.1", "--until 0.2");
+        program
+            .run(&format!("{changed} --no-charts -q"))
+            .exits(6)
+            .says(&["holds results already", "--force"]);
+        assert_eq!(program.read(&format!("output/{record}")), before, "{command}");
+        program.run(&format!("{changed} --no-charts -q --force")).exits(0);
+    }
+    program.run("kinematics crank_rocker.json --rate 0").exits(2).says(&["--rate", "other than 0"]);
 }

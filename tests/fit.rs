@@ -316,6 +316,42 @@ fn a_number_whose_best_value_is_no_scene_is_held_at_its_bound() {
     assert_eq!(found.covariance.column(1).amax(), 0.0);
 }
 
+/// A brake holds the bar from 0.5 s to 1 s: the rows at these very times are those of the braked bar.
+#[test]
+fn a_row_at_the_time_of_an_event_is_fitted_by_what_comes_after_it() {
+    let braked = OSCILLATOR.replacen(
+        '{',
+        r#"{"locks": [{"name": "brake", "body": "b"}], "inactive": ["brake"],
+            "events": [{"name": "stop", "when": "t - 0.5", "on": ["brake"]},
+                {"name": "go", "when": "t - 1", "off": ["brake"]}],"#,
+        1,
+    );
+    let truth = [2.1, 0.12, 0.5, 0.3];
+    let held = oscillation(truth, 0.5)[0];
+    let mut text = String::from("t [s],b.phi [rad],b.omega [rad/s]\n");
+    for row in 1..=40 {
+        let t = f64::from(row) / 20.0;
+        let [phi, omega] = match t {
+            t if t < 0.5 => oscillation(truth, t),
+            t if t < 1.0 => [held, 0.0],
+            t => oscillation([truth[0], truth[1], held, 0.0], t - 1.0),
+        };
+        writeln!(text, "{t},{phi},{omega}").expect("a string");
+    }
+    let template = Template::new(braked, "braked.json".into(), &[]);
+    let request = FitRequest {
+        vary: ["k", "c"].map(str::to_owned).to_vec(),
+        sigmas: ["b.phi", "b.omega"].map(|name| (name.to_owned(), 0.01)).to_vec(),
+        ..FitRequest::default()
+    };
+    let data = Data::parse(&text, "data.csv").expect("a table");
+    let found = fit(&template, &data, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"));
+    for (number, truth) in found.numbers.iter().zip(truth) {
+        assert!((number.value - truth).abs() < 1e-7, "{number:?}");
+    }
+    assert!(found.chi_square < 1e-10, "{}", found.chi_square);
+}
+
 /// A short column of exact angles beside a long one of inexact rates: the weights are those of the minimum, and
 /// the errors those of the numbers, which the short column tells.
 #[test]

@@ -603,3 +603,37 @@ fn outputs_are_read_written_and_refused_by_name() {
         assert!(error.contains(part) && error.contains("outputs"), "{outputs}: {error}");
     }
 }
+
+/// Torsion springs by formulas have the quantities of those by numbers, in closed form of angle and rate.
+#[test]
+fn torsion_springs_by_formulas_have_angle_rate_and_torque() {
+    for (law, torque) in [
+        (r#""torque": "0.5*angle + 0.2*rate""#, (|x, v| -0.5 * x - 0.2 * v) as fn(f64, f64) -> f64),
+        (r#""potential": "1*angle^4", "torque": "0.1*rate""#, |x, v| -4.0 * x * x * x - 0.1 * v),
+    ] {
+        let scene = with(
+            scene(&format!(
+                r#"{{"name": "coil", "gravity": [0, -9.81],
+                "bars": [{{"name": "a", "mass": 1, "centre": [0.25, 0], "inertia": 0.02, "length": 0.5}},
+                    {{"name": "b", "mass": 1, "centre": [0.25, 0], "inertia": 0.02, "length": 0.5}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                    {{"name": "B", "between": [{{"body": "a", "point": [0.5, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+                "torsion_springs": [{{"name": "coil", "body": "b", "relative_to": "a", {law}}}],
+                "start": {{"a": {{"phi": 0.3, "omega": 0}}, "b": {{"phi": 0.9, "omega": 1}}}}, "until": 2, "every": 0.1}}"#
+            )),
+            &["coil.angle", "coil.rate", "coil.torque"],
+        );
+        let mut rows = 0;
+        let request = adaptive(MethodId::Taylor, 1e-12);
+        simulate(&scene, &request, &mut |sample| {
+            let [angle, rate] = [&sample.phi, &sample.omega].map(|values| values[1] - values[0]);
+            let expected = [angle, rate, torque(angle, rate)];
+            let off = sample.outputs.iter().zip(expected).map(|(found, expected)| (found - expected).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-13, "{law} {:?} {expected:?}", sample.outputs);
+            rows += 1;
+            Ok(())
+        })
+        .expect("a run");
+        assert_eq!(rows, 21);
+    }
+}

@@ -383,7 +383,7 @@ fn a_run_is_not_overwritten_unasked() {
     program
         .run("run free.json --until 2 --no-charts --out o")
         .exits(6)
-        .says(&["holds a run already", "--force"]);
+        .says(&["holds results already", "--force"]);
     assert_eq!(program.read(trajectory), before);
     program.write("o/free/taylor-1e-9/notes.txt", "mine");
     program.write("o/free/taylor-1e-9/torque_power.png", "of an older run");

@@ -182,6 +182,71 @@ fn a_parameter_moves_every_formula_it_is_in() {
     }
 }
 
+/// 0.5 kg·m² on a spring: a number that an event sets, and rows at the very time of the event.
+#[test]
+fn a_number_that_an_event_sets_is_derived_and_rows_there_show_what_comes_after() {
+    let scene = template(
+        r#"{"name": "set", "gravity": [0, 0], "parameters": {"k": 2},
+            "bars": [{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": 0.5, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "torques": [{"name": "t", "body": "bar", "torque": "-k*bar.phi"}],
+            "locks": [{"name": "brake", "body": "bar"}], "inactive": ["brake"],
+            "events": [{"name": "e", "when": "t - 1", "set": {"k": 3}}, {"name": "on", "when": "t - 2", "on": ["brake"]}],
+            "start": {"bar": {"phi": 0.7, "omega": 0.2}}, "until": 3, "every": 0.5}"#,
+    );
+    let moved = |k: f64, [x, v]: [f64; 2], t: f64| {
+        let w = (k / 0.5_f64).sqrt();
+        let (sin, cos) = (w * t).sin_cos();
+        [x * cos + v / w * sin, v * cos - x * w * sin]
+    };
+    let motion = |set: f64, t: f64| moved(set, moved(2.0, [0.7, 0.2], 1.0), t - 1.0);
+    let by_set = |t: f64| [0, 1].map(|k| (motion(3.0 + 1e-5, t)[k] - motion(3.0 - 1e-5, t)[k]) / 2e-5);
+    let found = derived(&scene, &["bar.phi", "bar.omega"], &["events.e.set.k"], 1.7);
+    for k in [0, 1] {
+        assert_near(found.measures[k].value, motion(3.0, 1.7)[k], 1e-12, "value");
+        assert_near(found.measures[k].slopes[0], by_set(1.7)[k], 1e-8, "slope");
+    }
+    // At the event the torque is the new one, and from the brake on there is no rate.
+    let there = derived(&scene, &["bar.alpha"], &["events.e.set.k"], 1.0);
+    let angle = moved(2.0, [0.7, 0.2], 1.0)[0];
+    assert_near(there.measures[0].value, -3.0 * angle / 0.5, 1e-12, "acceleration");
+    assert_near(there.measures[0].slopes[0], -angle / 0.5, 1e-9, "its slope");
+    for at in [2.0, 2.4] {
+        let braked = derived(&scene, &["bar.phi", "bar.omega"], &["events.e.set.k"], at);
+        assert_near(braked.measures[0].slopes[0], by_set(2.0)[0], 1e-8, "angle");
+        assert_eq!(
+            [braked.measures[1].value, braked.measures[1].slopes[0]].map(|x| x.abs() < 1e-12),
+            [true; 2]
+        );
+    }
+}
+
+/// 0.5 kg·m² on a spring of 2 N·m, pulled by a signal, an integral over time and a table, each by a number.
+#[test]
+fn numbers_of_signals_integrals_and_tables_are_derived() {
+    let scene = template(
+        r#"{"name": "numbers", "gravity": [0, 0],
+            "bars": [{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": 0.5, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "signals": {"sig": 0.35}, "integrals": {"sum": 0.25},
+            "tables": {"gust": [[0, 0.1], [1, 0.5], [2, 0.2], [4, 0.3]]},
+            "torques": [{"name": "t", "body": "bar", "torque": "-2*bar.phi + sig + 0.1*sum + gust(t)"}],
+            "start": {"bar": {"phi": 0.7, "omega": 0.2}}, "until": 3, "every": 0.5}"#,
+    );
+    let t = 2.3;
+    let to = ["signals.sig", "integrals.sum", "tables.gust[1][1]", "tables.gust[2][0]"];
+    let found = derived(&scene, &["bar.phi"], &to, t);
+    let w = 2.0_f64;
+    let closed = [(1.0 - (w * t).cos()) / 2.0, 0.1 * (t - (w * t).sin() / w) / 2.0];
+    for (slope, expected) in found.measures[0].slopes.iter().zip(closed) {
+        assert_near(*slope, expected, 1e-9, "closed form");
+    }
+    for (j, value) in [(2, 0.5), (3, 2.0)] {
+        let expected = differences(&scene, to[j], value, t, 1e-4).expect("a difference")[0];
+        assert_near(found.measures[0].slopes[j], expected, 1e-6, to[j]);
+    }
+}
+
 /// 0.64 kg·m² on a spring of 0.8 N·m: x = x0 cos(w t), w² = k/I.
 /// There are no coordinates left to integrate.
 #[test]

@@ -99,6 +99,56 @@ fn cells_do_not_depend_on_the_number_of_threads() {
     assert_eq!(stress(&plan(1), &mut |_| true), stress(&plan(3), &mut |_| true));
 }
 
+/// Two bodies that never turn: their ends are those of Kepler's equation, in positions and velocities.
+#[test]
+fn ends_of_bodies_that_only_translate_are_judged() {
+    let text = std::fs::read_to_string("examples/scenes/kepler.json").expect("a shipped scene");
+    let origin = "kepler.json".to_owned();
+    let case = Case { name: "kepler".into(), origin, text, tolerance: 1e-4, expected: Expected::Unknown };
+    let scene = parse_scene(&case.text, &case.origin, &[]).expect("a scene");
+    let methods: Vec<MethodId> = ["rattle2", "rattle4", "dp5", "taylor"].map(method).into();
+    let plan = Stress { cases: vec![case], methods: methods.clone(), max_evaluations: 100_000, threads: 1 };
+    let lines = stress(&plan, &mut |_| true);
+    // Relative motion from the far apsis; the centre of mass rests at a third.
+    let (mu, far, speed) = (1.5_f64, 1.0_f64, 0.9_f64);
+    let a = 1.0 / (2.0 / far - speed * speed / mu);
+    let e = far / a - 1.0;
+    let (b, n) = (a * (1.0 - e * e).sqrt(), (mu / a.powi(3)).sqrt());
+    let mean = std::f64::consts::PI + n * scene.until;
+    let anomaly = (0..50).fold(mean, |x, _| x - (x - e * x.sin() - mean) / (1.0 - e * x.cos()));
+    let turning = n / (1.0 - e * anomaly.cos());
+    let apart = [-a * (anomaly.cos() - e), -b * anomaly.sin()];
+    let parting = [a * anomaly.sin() * turning, -b * anomaly.cos() * turning];
+    let size = 0.1;
+    for (cell, method) in lines[0].cells.iter().zip(methods) {
+        assert!(matches!(cell.verdict, Verdict::Right | Verdict::Stopped), "{cell:?}");
+        let setting = cell.setting.as_ref().expect("a setting");
+        let number: f64 = setting.split(' ').nth(1).expect("a number").parse().expect("a number");
+        let request = Request {
+            method: Some(method),
+            every: Some(scene.until / 100.0),
+            step: setting.starts_with("--step").then_some(number),
+            rtol: setting.starts_with("--rtol").then_some(number),
+            ..Request::default()
+        };
+        let end = simulate(&scene, &request, &mut |_| Ok(())).expect("a run").last;
+        let mut off = 0.0_f64;
+        for (body, share) in [(0, -1.0 / 3.0), (1, 2.0 / 3.0)] {
+            for axis in [0, 1] {
+                let place = [1.0 / 3.0, 0.0][axis] + share * apart[axis];
+                let velocity = share * parting[axis];
+                let fast = (velocity / size).abs().max(1.0);
+                off = off.max((end.centre[body][axis] - place).abs() / size);
+                off = off.max((end.velocity[body][axis] - velocity).abs() / size / fast);
+            }
+        }
+        let error = cell.error.expect("an error");
+        println!("{method} {setting}: {:?}, {error:e}, by Kepler's equation {off:e}", cell.verdict);
+        assert!((error - off).abs() < 1e-9 + 1e-3 * off, "{cell:?} {off:e}");
+        assert_eq!(cell.verdict == Verdict::Right, off <= 1e-4 && cell.stop.is_none(), "{cell:?} {off:e}");
+    }
+}
+
 #[test]
 fn an_unconfirmed_end_is_a_stop() {
     // A chaotic scene beyond what doubles can tell.

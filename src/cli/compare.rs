@@ -35,7 +35,7 @@ pub fn run(flags: &CompareFlags) -> Result<(), Failure> {
         blocks: BLOCKS,
     };
     asked.horizon(&scene, &mechanism)?;
-    let mut folder = Folder::open(&flags.out.join(&scene.name).join("compare"), flags.force)?;
+    let mut folder = Folder::open(&flags.folder.out.join(&scene.name).join("compare"), flags.folder.force)?;
     let mut progress = Stages::new(&scene.name, flags.scene.tell.quiet);
     let begin = Instant::now();
     let comparison = compare(
@@ -75,15 +75,15 @@ fn keep(
     folder: &mut Folder,
     flags: &CompareFlags,
 ) -> Result<(), Failure> {
-    if flags.force {
+    if flags.folder.force {
         folder.clear(FILES)?;
     }
     folder.write(COMPARISON, report::compare::csv(comparison).as_bytes())?;
     #[cfg(feature = "charts")]
-    if !flags.charts.no_charts {
+    if !flags.folder.charts.no_charts {
         for chart in report::compare::CompareChart::ALL {
             let picture = report::compare::draw(chart, scene, mechanism, comparison)?;
-            flags.charts.keep(folder, chart.name(), &picture, &flags.scene.tell)?;
+            flags.folder.charts.keep(folder, chart.name(), &picture, &flags.scene.tell)?;
         }
     }
     #[cfg(feature = "charts")]

@@ -2,17 +2,14 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::FitFlags;
-use super::output::{name_files, print, print_object};
+use super::study::{Study, StudyFolder};
 use super::{interrupt, load_template};
 use crate::report::fit as report;
-use crate::report::result::files;
-use crate::run::Folder;
+use crate::run::files::{FIT, FIT_RECORD};
 use crate::run::fit::{Data, FitError, FitRequest, fit};
 
-const RECORD: &str = "fit.json";
-const TABLE: &str = "fit.csv";
 /// Every file it may leave.
-const FILES: &[&str] = &[RECORD, TABLE, "fit.png", "residuals.png"];
+const FILES: &[&str] = &[FIT_RECORD, FIT, "fit.png", "residuals.png"];
 
 impl From<FitError> for Failure {
     fn from(error: FitError) -> Self {
@@ -43,26 +40,17 @@ pub fn run(flags: &FitFlags) -> Result<(), Failure> {
         segments: flags.segments as usize,
         tolerance: flags.rtol,
     };
+    let scene = template.scene()?.name;
+    let folder = StudyFolder::new(&flags.folder, &flags.scene.tell, &scene, "fit")?;
     let found = fit(&template, &data, &request, &mut interrupt::is_asked)?;
-    let mut folder = Folder::open(&flags.out.join(&found.scene.name).join("fit"), flags.force)?;
-    if flags.force {
-        folder.clear(FILES)?;
-    }
-    let mut object = report::object(&found);
-    folder.write(RECORD, format!("{object:#}\n").as_bytes())?;
-    folder.write(TABLE, report::table(&found).as_bytes())?;
-    #[cfg(feature = "charts")]
-    if !flags.charts.no_charts {
-        for (name, picture) in report::charts(&found)? {
-            flags.charts.keep(&mut folder, name, &picture, &flags.scene.tell)?;
-        }
-    }
-    name_files(&mut object, &folder);
-    if flags.scene.tell.json {
-        return print_object(&object);
-    }
-    if flags.scene.tell.quiet {
-        return Ok(());
-    }
-    print(&(report::text(&found) + &files(folder.path(), folder.names())))
+    let study = Study {
+        files: vec![(FIT, report::table(&found).into_bytes())],
+        record: FIT_RECORD,
+        object: report::object(&found),
+        text: report::text(&found),
+        #[cfg(feature = "charts")]
+        pictures: if flags.folder.charts.no_charts { Vec::new() } else { report::charts(&found)? },
+        ..Study::default()
+    };
+    folder.publish(study, FILES)
 }

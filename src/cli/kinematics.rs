@@ -3,10 +3,8 @@
 use super::failure::{Exit, Failure};
 use super::flags::KinematicsFlags;
 use super::load;
-use super::output::{name_files, print, print_object};
+use super::study::{Study, StudyFolder};
 use crate::report::kinematics as report;
-use crate::report::result::files;
-use crate::run::Folder;
 use crate::run::files::{KINEMATICS, KINEMATICS_RECORD};
 use crate::run::kinematics::{Drive, KinematicsError, kinematics};
 
@@ -33,27 +31,16 @@ pub fn run(flags: &KinematicsFlags) -> Result<(), Failure> {
     let (scene, _) = load(&flags.scene)?;
     let drive = Drive { rate: flags.rate, ..flags.drive.clone().unwrap_or_default() };
     let found = kinematics(&scene, &drive, flags.positions as usize)?;
-    let path = flags.out.join(&scene.name).join(format!("kinematics-{}", found.drive));
-    let mut folder = Folder::open(&path, flags.force)?;
-    if flags.force {
-        folder.clear(FILES)?;
-    }
-    folder.write(KINEMATICS, &report::table(&found))?;
-    #[cfg(feature = "charts")]
-    if !flags.charts.no_charts {
-        for (name, picture) in report::charts(&found)? {
-            flags.charts.keep(&mut folder, name, &picture, &flags.scene.tell)?;
-        }
-    }
-    let mut object = report::object(&found);
-    folder.write(KINEMATICS_RECORD, format!("{object:#}\n").as_bytes())?;
-    name_files(&mut object, &folder);
-    if flags.scene.tell.json {
-        return print_object(&object);
-    }
-    if flags.scene.tell.quiet {
-        Ok(())
-    } else {
-        print(&(report::text(&found) + &files(folder.path(), folder.names())))
-    }
+    let name = format!("kinematics-{}", found.drive);
+    let folder = StudyFolder::new(&flags.folder, &flags.scene.tell, &scene.name, &name)?;
+    let study = Study {
+        files: vec![(KINEMATICS, report::table(&found))],
+        record: KINEMATICS_RECORD,
+        object: report::object(&found),
+        text: report::text(&found),
+        #[cfg(feature = "charts")]
+        pictures: if flags.folder.charts.no_charts { Vec::new() } else { report::charts(&found)? },
+        ..Study::default()
+    };
+    folder.publish(study, FILES)
 }

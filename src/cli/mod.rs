@@ -24,6 +24,7 @@ mod resume;
 mod sensitivity;
 mod simulate;
 mod stress;
+mod study;
 mod sweep;
 #[cfg(feature = "charts")]
 mod view;

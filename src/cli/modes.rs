@@ -3,10 +3,8 @@
 use super::failure::{Exit, Failure};
 use super::flags::ModesFlags;
 use super::load;
-use super::output::{name_files, print, print_object};
-use crate::report::result::files;
+use super::study::{Study, StudyFolder};
 use crate::report::{modes as at_rest, periodic as in_motion};
-use crate::run::Folder;
 use crate::run::files::MODES_RECORD;
 use crate::run::modes::{Modes, ModesError, PeriodicMotions, modes, periodic};
 
@@ -44,6 +42,9 @@ impl From<ModesError> for Failure {
 /// The scene, or files.
 pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
     let (scene, mechanism) = load(&flags.scene)?;
+    let folder = StudyFolder::new(&flags.folder, &flags.scene.tell, &scene.name, "modes")?;
+    #[cfg(feature = "charts")]
+    let folder = folder.with_motions(&flags.motion);
     let starts = flags.starts as usize;
     let resting = if flags.period.is_none() { Some(modes(&scene, &mechanism, starts)) } else { None };
     let found = match resting {
@@ -53,34 +54,25 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
         }
         _ => Found::Motion(periodic(&scene, &mechanism, starts, flags.period)?),
     };
-    let mut folder = Folder::open(&flags.out.join(&scene.name).join("modes"), flags.force)?;
-    if flags.force {
-        folder.clear(FILES)?;
-    }
-    #[cfg(feature = "charts")]
-    if !flags.charts.no_charts {
-        let (pictures, motions) = match &found {
-            Found::Rest(found) => at_rest::charts(found)?,
-            Found::Motion(found) => in_motion::charts(found)?,
-        };
-        for (name, picture) in pictures {
-            flags.charts.keep(&mut folder, name, &picture, &flags.scene.tell)?;
-        }
-        for (name, motion) in motions {
-            flags.motion.keep(&mut folder, name, &motion, &flags.scene.tell)?;
-        }
-    }
-    let (mut object, text) = match &found {
+    let (object, text) = match &found {
         Found::Rest(found) => (at_rest::object(found), at_rest::text(found)),
         Found::Motion(found) => (in_motion::object(found), in_motion::text(found)),
     };
-    folder.write(MODES_RECORD, format!("{object:#}\n").as_bytes())?;
-    name_files(&mut object, &folder);
-    if flags.scene.tell.json {
-        return print_object(&object);
-    }
-    if flags.scene.tell.quiet {
-        return Ok(());
-    }
-    print(&(text + &files(folder.path(), folder.names())))
+    #[cfg(feature = "charts")]
+    let (pictures, motions) = match &found {
+        _ if flags.folder.charts.no_charts => Default::default(),
+        Found::Rest(found) => at_rest::charts(found)?,
+        Found::Motion(found) => in_motion::charts(found)?,
+    };
+    let study = Study {
+        record: MODES_RECORD,
+        object,
+        text,
+        #[cfg(feature = "charts")]
+        pictures,
+        #[cfg(feature = "charts")]
+        motions,
+        ..Study::default()
+    };
+    folder.publish(study, FILES)
 }

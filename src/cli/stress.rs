@@ -7,13 +7,13 @@ use super::output::{name_files, print, print_object};
 use super::progress::Points;
 use crate::report;
 use crate::run::Folder;
+use crate::run::files::{STRESS, STRESS_RECORD};
 use crate::run::stress::{Case, Expected, Line, Stress, Verdict, stress};
 use crate::scene::{read_text, source_name};
 
 /// The files it may leave; those of an earlier one in the same folder go with it.
-const FILES: &[&str] = &[TABLE, RECORD, "matrix.png", "stability_gauss16.png", "stability_rattle4.png"];
-const TABLE: &str = "stress.csv";
-const RECORD: &str = "stress.json";
+const FILES: &[&str] =
+    &[STRESS, STRESS_RECORD, "matrix.png", "stability_gauss16.png", "stability_rattle4.png"];
 #[cfg(feature = "charts")]
 const MATRIX: &str = "matrix";
 /// The methods whose stability is drawn, and the files.
@@ -86,11 +86,11 @@ fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFla
     if flags.force {
         folder.clear(FILES)?;
     }
-    folder.write(TABLE, report::stress::csv(lines).as_bytes())?;
+    folder.write(STRESS, report::stress::csv(lines).as_bytes())?;
     #[cfg(feature = "charts")]
     draw(plan, lines, folder, flags)?;
     let mut object = report::stress::object(plan, lines);
-    folder.write(RECORD, format!("{object:#}\n").as_bytes())?;
+    folder.write(STRESS_RECORD, format!("{object:#}\n").as_bytes())?;
     if flags.tell.json {
         name_files(&mut object, folder);
         return print_object(&object);

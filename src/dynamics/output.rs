@@ -113,7 +113,7 @@ impl Outputs {
                 | Travel(..)
                 | Gap(..)
                 | MovingGap(_)
-                | Torsion(_) => true,
+                | Torsion(..) => true,
                 _ => false,
             }
         };
@@ -249,9 +249,15 @@ impl Quantity<Site> {
                 })
             }
             Self::Tension(name, ends) => tension(at, seen, name, ends, row),
-            Self::Torsion(name) => {
-                let torsion = mechanism.torsions.iter().find(|torsion| torsion.name == *name);
-                torsion.map_or(0.0, |torsion| torsion.torque(at.winding, omega))
+            Self::Torsion(name, bar) => {
+                if let Some(torsion) = mechanism.torsions.iter().find(|torsion| torsion.name == *name) {
+                    return torsion.torque(at.winding, omega);
+                }
+                let mut load = vec![0.0; omega.len()];
+                if let Some(law) = mechanism.forces.iter().find(|force| force.name == *name) {
+                    law.pull(time.hi, Posture { phi: at.winding, z, omega }, &mut load);
+                }
+                load[*bar]
             }
             Self::Travel([point, origin], body, direction, is_rate) => {
                 let direction = Complex::new(direction[0], direction[1]);

@@ -110,7 +110,7 @@ fn digits(x: f64, digits: i32) -> String {
         return "0".into();
     }
     if !x.is_finite() {
-        return "not a number".into();
+        return not_finite(x).into();
     }
     if !(1e-4..1e6).contains(&size) {
         return format!("{x:.0$e}", digits as usize - 1);
@@ -130,7 +130,15 @@ pub fn magnitude(x: f64) -> String {
     match x {
         0.0 => "0".into(),
         x if x.is_finite() => format!("{x:.1e}"),
-        _ => "not a number".into(),
+        _ => not_finite(x).into(),
+    }
+}
+
+fn not_finite(x: f64) -> &'static str {
+    match x {
+        f64::INFINITY => "infinite",
+        f64::NEG_INFINITY => "-infinite",
+        _ => "not a number",
     }
 }
 
@@ -149,6 +157,7 @@ mod tests {
             (123_456.7, "123457"),
             (1e6, "1.00000e6"),
             (f64::NAN, "not a number"),
+            (f64::INFINITY, "infinite"),
         ] {
             assert_eq!(figure(x), shown);
         }

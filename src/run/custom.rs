@@ -161,6 +161,16 @@ impl Integrator<dyn Problem> for Outside {
         self.inner.reset(state);
     }
 
+    fn land(
+        &mut self,
+        problem: &mut (dyn Problem + 'static),
+        from: &State,
+        time: Time,
+        inside: &mut State,
+    ) -> bool {
+        self.inner.land(problem, from, time, inside)
+    }
+
     fn internal_state(&self) -> Vec<f64> {
         self.inner.internal_state()
     }

@@ -7,8 +7,10 @@
 //! A folder is locked as long as somebody writes into it.  Its table, `.unfinished-trajectory.csv`, outlives
 //! its writer where a checkpoint says how much of it counts ([`checkpoint`]).
 
+mod names;
 mod stream;
 
+pub use names::*;
 pub use stream::{Cursor, Stream};
 
 use self::stream::hashed;
@@ -21,48 +23,14 @@ use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
-/// The trajectory.
-pub const TRAJECTORY: &str = "trajectory.csv";
-/// Settings and results.
-pub const RECORD: &str = "run.json";
-/// The events of a run.
-pub const EVENTS: &str = "events.csv";
-/// The points of a sweep.
-pub const SWEEP: &str = "sweep.csv";
-/// Settings and totals of a sweep.
-pub const SWEEP_RECORD: &str = "sweep.json";
-/// What joins a part of a sweep to the others.
-pub const PART: &str = "part";
-/// The settings of a comparison, a row each.
-pub const COMPARISON: &str = "compare.csv";
-/// Settings, figures and advice of a comparison.
-pub const COMPARISON_RECORD: &str = "compare.json";
-/// The positions of a mechanism moved through the range of its drive.
-pub const KINEMATICS: &str = "kinematics.csv";
-/// Limits, extremes and all else of it.
-pub const KINEMATICS_RECORD: &str = "kinematics.json";
-/// The equilibria of a scene and their modes.
-pub const MODES_RECORD: &str = "modes.json";
-/// The files by which a folder that holds results is known.
-const RESULTS: [&str; 9] = [
-    TRAJECTORY,
-    RECORD,
-    SWEEP,
-    SWEEP_RECORD,
-    COMPARISON,
-    COMPARISON_RECORD,
-    KINEMATICS,
-    KINEMATICS_RECORD,
-    MODES_RECORD,
-];
 /// How names of unfinished files begin.
 pub(super) const UNFINISHED: &str = ".unfinished-";
 
 /// Why a file of a run is not there.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
-    /// The folder holds a run already.
-    #[error("{} holds a run already\nhint: --force overwrites it, --out names another folder",
+    /// The folder holds results already.
+    #[error("{} holds results already\nhint: --force overwrites it, --out names another folder",
         folder.display())]
     Occupied {
         /// The folder.
@@ -126,22 +94,33 @@ impl Folder {
     /// longer go on left unfinished is swept out.
     ///
     /// # Errors
-    /// A run is in it, finished or interrupted, and `overwrite` is false; somebody is writing into it; or it
-    /// cannot be made.
+    /// A run is in it, finished or interrupted, and `overwrite` is false; another process is writing into it;
+    /// or it cannot be made.
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, FileError> {
         let folder = || path.to_owned();
         fs::create_dir_all(path).map_err(|source| FileError::Folder { folder: folder(), source })?;
         let lock = lock(path)?;
-        if !overwrite && checkpoint::is_in(path) {
-            return Err(FileError::Interrupted { folder: folder() });
-        }
-        if !overwrite && RESULTS.iter().any(|name| path.join(name).exists()) {
-            return Err(FileError::Occupied { folder: folder() });
+        if !overwrite {
+            Self::is_empty(path)?;
         }
         // Without their table the checkpoints are of no use.
         checkpoint::Checkpoints::none(path).remove()?;
         sweep_out(path, &[])?;
         Ok(Self { path: folder(), written: Vec::new(), _lock: lock })
+    }
+
+    /// Whether a folder, which need not exist, holds neither results nor an interrupted run.
+    ///
+    /// # Errors
+    /// It does.
+    pub fn is_empty(path: &Path) -> Result<(), FileError> {
+        if checkpoint::is_in(path) {
+            return Err(FileError::Interrupted { folder: path.to_owned() });
+        }
+        if RESULTS.iter().any(|name| path.join(name).exists()) {
+            return Err(FileError::Occupied { folder: path.to_owned() });
+        }
+        Ok(())
     }
 
     /// Opens the folder of an interrupted run, and locks it; its tables stay, whatever else it was writing is

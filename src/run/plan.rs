@@ -110,6 +110,8 @@ const MAX_EVALUATIONS: (f64, f64) = (1e8, 1e7);
 /// The most of them, whatever the horizon, and the most expansions of a series, each of which takes about as
 /// long as ten: some minutes to an hour of computing.
 const MOST_EVALUATIONS: [f64; 2] = [1e10, 1e9];
+/// The longest time a run may take \[s\].
+pub(super) const LONGEST: f64 = 1e12;
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
 /// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
@@ -356,10 +358,10 @@ fn rows(until: f64, every: f64) -> f64 {
 /// Every number asked for must be positive and finite; steps and tolerances must suit one another.
 fn check_numbers(request: &Request) -> Result<(), Refusal> {
     let positive = [
-        ("--step", request.step, 1e12),
-        ("--until", request.until, 1e12),
-        ("--every", request.every, 1e12),
-        ("--time-constant", request.time_constant, 1e12),
+        ("--step", request.step, LONGEST),
+        ("--until", request.until, LONGEST),
+        ("--every", request.every, LONGEST),
+        ("--time-constant", request.time_constant, LONGEST),
     ];
     for (option, value, most) in positive {
         if let Some(value) = value.filter(|&value| !(value > 0.0 && value <= most)) {

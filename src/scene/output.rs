@@ -86,8 +86,8 @@ pub enum Quantity<P = Place> {
     Push(String, Component),
     /// Tension of a spring \[N\]; its two ends.
     Tension(String, [P; 2]),
-    /// Torque of a torsion spring on its body \[N·m\].
-    Torsion(String),
+    /// Torque of a torsion spring on its body \[N·m\]; the body.
+    Torsion(String, usize),
     /// Travel of a slider \[m\], or its rate \[m/s\]: the point, a point of the rail, and its direction in
     /// the frame of the body.
     Travel([P; 2], Option<usize>, [f64; 2], bool),
@@ -112,7 +112,7 @@ impl Quantity {
             Self::Power(name) => Quantity::Power(name),
             Self::Push(name, component) => Quantity::Push(name, component),
             Self::Tension(name, ends) => Quantity::Tension(name, ends.map(point)),
-            Self::Torsion(name) => Quantity::Torsion(name),
+            Self::Torsion(name, bar) => Quantity::Torsion(name, bar),
             Self::Travel(points, body, direction, is_rate) => {
                 Quantity::Travel(points.map(point), body, direction, is_rate)
             }
@@ -275,11 +275,16 @@ impl OutputNames {
         for (name, between) in springs.chain(laws) {
             self.add(name, "force", "N", Quantity::Tension(name.clone(), between));
         }
-        for spring in &scene.torsion_springs {
-            let (bar, base) = (spring.bar, spring.relative_to);
-            self.add_state(&spring.name, "angle", Meaning::RelativeAngle(bar, base));
-            self.add_state(&spring.name, "rate", Meaning::RelativeRate(bar, base));
-            self.add(&spring.name, "torque", "N·m", Quantity::Torsion(spring.name.clone()));
+        let springs =
+            scene.torsion_springs.iter().map(|spring| (&spring.name, spring.bar, spring.relative_to));
+        let laws = scene.laws.iter().filter_map(|law| match law.load {
+            Load::TorsionSpring { bar, relative_to, .. } => Some((&law.name, bar, relative_to)),
+            _ => None,
+        });
+        for (name, bar, base) in springs.chain(laws) {
+            self.add_state(name, "angle", Meaning::RelativeAngle(bar, base));
+            self.add_state(name, "rate", Meaning::RelativeRate(bar, base));
+            self.add(name, "torque", "N·m", Quantity::Torsion(name.clone(), bar));
         }
         for wall in &scene.walls {
             let point = Place { bar: Some(wall.bar), point: wall.point };

@@ -1,6 +1,6 @@
 //! The flags of commands that study a scene by more than a run.
 
-use super::values::{limit, methods, number, positive, stabilizations, wait};
+use super::values::{limit, methods, number, positive, rate, stabilizations, wait};
 use super::*;
 use crate::run::Measure;
 
@@ -120,22 +120,15 @@ pub struct KinematicsFlags {
         allow_hyphen_values = true)]
     pub drive: Option<Drive>,
     /// Rate of the drive in rad/s or m/s [default: that of the motor at the start, 1 elsewhere]
-    #[arg(long, value_name = "RATE", value_parser = number, allow_hyphen_values = true)]
+    #[arg(long, value_name = "RATE", value_parser = rate, allow_hyphen_values = true)]
     pub rate: Option<f64>,
     /// Positions at equal distances over the range; one more stands at its end
     #[arg(long, value_name = "N", default_value_t = 360,
         value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pub positions: u32,
-    /// Folder under which `SCENE/kinematics-DRIVE` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite what is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
     #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
     #[command(flatten)]
-    pub charts: ChartFlags,
+    pub folder: FolderFlags,
 }
 
 /// `driftless modes`.
@@ -151,16 +144,9 @@ pub struct ModesFlags {
     /// Look for motions of this period in seconds; by default that of motors at a constant rate and of sines
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub period: Option<f64>,
-    /// Folder under which `SCENE/modes` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite what is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
     #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
     #[command(flatten)]
-    pub charts: ChartFlags,
+    pub folder: FolderFlags,
     #[allow(missing_docs)]
     #[cfg(feature = "charts")]
     #[command(flatten)]
@@ -191,16 +177,9 @@ pub struct CompareFlags {
     #[arg(long, value_name = "S", value_parser = wait, default_value = "90", allow_hyphen_values = true,
         help_heading = "Comparison")]
     pub budget: f64,
-    /// Folder under which `SCENE/compare` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite the comparison that is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
     #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
     #[command(flatten)]
-    pub charts: ChartFlags,
+    pub folder: FolderFlags,
     /// Write a page, `compare.html`: points of the charts tell their settings
     #[cfg(feature = "charts")]
     #[arg(long, help_heading = "Files")]
@@ -238,16 +217,9 @@ pub struct SensitivityFlags {
     /// Tolerance of the motion [default: 1e-14]
     #[arg(long, value_name = "TOL", value_parser = positive, allow_hyphen_values = true)]
     pub rtol: Option<f64>,
-    /// Folder under which `SCENE/sensitivity` or `SCENE/lyapunov` is made
-    #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
-    pub out: PathBuf,
-    /// Overwrite what is in the folder
-    #[arg(long, help_heading = "Files")]
-    pub force: bool,
     #[allow(missing_docs)]
-    #[cfg(feature = "charts")]
     #[command(flatten)]
-    pub charts: ChartFlags,
+    pub folder: FolderFlags,
 }
 
 /// `driftless fit`.
@@ -277,10 +249,18 @@ pub struct FitFlags {
     /// Tolerance of the motion [default: 1e-14]
     #[arg(long, value_name = "TOL", value_parser = positive, allow_hyphen_values = true)]
     pub rtol: Option<f64>,
-    /// Folder under which `SCENE/fit` is made
+    #[allow(missing_docs)]
+    #[command(flatten)]
+    pub folder: FolderFlags,
+}
+
+/// Where a study of a scene leaves its results.
+#[derive(Clone, Debug, Args)]
+pub struct FolderFlags {
+    /// Folder under which that of the results is made, `SCENE/COMMAND`
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
     pub out: PathBuf,
-    /// Overwrite what is in the folder
+    /// Overwrite the results that are in the folder
     #[arg(long, help_heading = "Files")]
     pub force: bool,
     #[allow(missing_docs)]

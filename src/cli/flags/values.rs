@@ -57,6 +57,12 @@ pub(super) fn limit(text: &str) -> Result<f64, String> {
     if value >= 0.0 { Ok(value) } else { Err("a limit is a number from 0 up".to_owned()) }
 }
 
+/// A rate: any number but zero.
+pub(super) fn rate(text: &str) -> Result<f64, String> {
+    let value = number(text)?;
+    if value != 0.0 && value.is_finite() { Ok(value) } else { Err("a rate other than 0".to_owned()) }
+}
+
 /// A number above zero.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let value = number(text)?;

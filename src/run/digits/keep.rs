@@ -279,8 +279,8 @@ impl<const W: usize> Keeper<W> {
     }
 }
 
-/// log2 of the largest of numbers.
-fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
+/// log2 of the largest of numbers; NaN where one of them is.
+pub(super) fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
     let sizes = numbers.iter().map(Digits::log2);
     sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
 }

@@ -10,6 +10,7 @@
 //! quarters is zero.  Walls whose point does not approach have no restitution.
 
 use super::evidence::gradient;
+use super::keep::largest;
 use super::motion::Motion;
 use super::resting::Unheld;
 use super::wall::{GapRate, Jump, distance, gap_rate, work_of_rows};
@@ -144,11 +145,6 @@ impl<const W: usize> Meeting<W> {
         let work = work + work_of_rows(&mechanism, t, &posture, &sum(&pulls));
         Ok(Jump { change: sum(&responses), work, walls: pressing as u64 })
     }
-}
-
-/// log2 of the largest of numbers.
-pub(super) fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
-    numbers.iter().fold(f64::NEG_INFINITY, |most, number| most.max(number.log2()))
 }
 
 /// The forces of points that rest on smooth walls with these gradients of their gaps, whose responses to a

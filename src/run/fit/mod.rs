@@ -214,7 +214,7 @@ pub fn fit(
     }
     let mut columns = columns(data, &outputs, request)?;
     let rows = data.times.len();
-    if request.segments == 0 || request.segments * 2 > rows.max(2) {
+    if request.segments == 0 || request.segments > rows.max(2) / 2 {
         let text = format!("{} segments of {rows} rows\nhint: at least two rows a segment", request.segments);
         return Err(FitError::Asked(text));
     }
@@ -229,7 +229,11 @@ pub fn fit(
     let guess: Vec<f64> = first.inputs.iter().map(|input| input.value).collect();
     let count = columns.iter().flat_map(|column| &column.measured).flatten().count();
     if count <= guess.len() {
-        let text = format!("{count} measurements do not tell {} numbers and their errors", guess.len());
+        let (measurements, numbers) = (
+            if count == 1 { "1 measurement" } else { &format!("{count} measurements") },
+            if guess.len() == 1 { "a number and its error" } else { "as many numbers and their errors" },
+        );
+        let text = format!("{measurements} cannot determine {numbers}");
         return Err(FitError::Data(format!("{}: {text}\nhint: more rows or columns", data.source)));
     }
     let indices = indices(&first, &columns);

@@ -127,6 +127,15 @@ impl Look for Sampler<'_> {
         self.rows.push(outputs(variation, motion));
     }
 
+    fn crossed(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        // At the time of an event a row has what comes after it, as those of a run.
+        let seen = self.next.checked_sub(1).and_then(|last| self.times.get(last));
+        if let Some(row) = self.rows.last_mut().filter(|_| seen == Some(&time)) {
+            *row = outputs(variation, motion);
+        }
+        self.stepped(variation, motion, time);
+    }
+
     fn stepped(&mut self, _variation: &mut Variation, motion: &Motion, time: f64) {
         if time >= self.until {
             self.end = Some(motion.clone());

@@ -145,8 +145,9 @@ impl Driven {
     pub fn new(scene: &Scene, drive: &Drive) -> Result<Self, KinematicsError> {
         let mut scene = scene.clone();
         let (slot, start, own_rate) = find(&mut scene, drive)?;
+        // A motor that stands at the start has no rate of its own.
+        let own_rate = if own_rate != 0.0 && own_rate.is_finite() { own_rate } else { 1.0 };
         let rate = drive.rate.unwrap_or(own_rate);
-        let rate = if rate != 0.0 && rate.is_finite() { rate } else { 1.0 };
         let law = Law { start, rate, ..Law::default() };
         let (name, unit) = match slot {
             Slot::Turning(k) => {

@@ -42,7 +42,7 @@ use super::contact::{ContactDriver, JumpLog};
 use super::driver::Pause;
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
-use super::plan::Plan;
+use super::plan::{LONGEST, Plan};
 use super::running::Outcome;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::scene::{Output, OutputNames, Scene, Template};
@@ -143,11 +143,9 @@ impl Study {
             return Err(SensitivityError::Unsuited(what.into()));
         }
         let until = request.at.unwrap_or(scene.until);
-        if !(until > 0.0 && until.is_finite()) {
-            return Err(refused(
-                format!("the time {until} s is not above zero"),
-                "a time in seconds, as --at 2",
-            ));
+        if !(until > 0.0 && until <= LONGEST) {
+            let hint = format!("a time in seconds above 0 and up to {LONGEST:e}, as --at 2");
+            return Err(refused(format!("the time is {until:e} s"), &hint));
         }
         let tolerance = request.tolerance.unwrap_or(TOLERANCE);
         let plan = Plan::of_series(&mechanism, Tolerance { relative: tolerance, absolute: tolerance }, until);
@@ -354,8 +352,8 @@ impl Study {
         let wanted = |seen: &&Seen| self.times.contains(&seen.t);
         let rows = seen.iter().filter(wanted).map(|seen| SensitivityRow {
             t: seen.t,
-            values: seen.derived.values.clone(),
-            slopes: seen.derived.slopes.clone(),
+            values: seen.shown().values.clone(),
+            slopes: seen.shown().slopes.clone(),
         });
         let rows = rows.collect();
         let by_series = variation.expanded.is_some();
@@ -393,10 +391,10 @@ fn taken(
     };
     let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
     let off = |side: &Derived| (side.values[output] - asked.value).abs();
-    let (Derived { values, slopes, rates }, late) = match &at.behind {
+    let (Derived { values, slopes, rates }, late) = match (&at.after, &at.moves) {
         // A jump or a corner moves in time: on the side that has the extreme.
-        Some((behind, late)) if is_extreme => {
-            (if off(behind) < off(&at.derived) { behind } else { &at.derived }, Some(late))
+        (Some(after), Some(late)) if is_extreme => {
+            (if off(after) < off(&at.derived) { after } else { &at.derived }, Some(late))
         }
         _ if asked.ended_by.is_some() => {
             // So does the end, with the event.
@@ -404,7 +402,8 @@ fn taken(
             let late = late.ok_or("the function of the event that ends the run only touches zero")?;
             (&at.derived, Some(&late.1))
         }
-        _ => (&at.derived, None),
+        _ if is_extreme => (&at.derived, None),
+        _ => (at.shown(), None),
     };
     let (value, rate, mut slopes) = (values[output], rates[output], slopes[output].clone());
     let size = value.abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
@@ -432,7 +431,7 @@ fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, SensitivityError> {
     let rows = (until / every).ceil();
     if !(every > 0.0 && rows <= MOST_ROWS) {
         let hint = format!("an interval above zero that makes at most {MOST_ROWS:e} rows");
-        return Err(refused(format!("the interval {every} s makes {rows} rows"), &hint));
+        return Err(refused(format!("the interval {every:e} s makes {rows:e} rows"), &hint));
     }
     Ok((0..=rows as u64).map(|k| (k as f64 * every).min(until)).collect())
 }

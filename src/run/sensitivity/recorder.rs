@@ -2,14 +2,17 @@
 
 use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
 use super::{Asked, Look, Variation};
-use crate::dynamics::{Motion, Time};
+use crate::dynamics::Motion;
 
 /// What was seen at one time.
 pub(super) struct Seen {
     pub t: f64,
+    /// Before what happens at that time.
     pub derived: Derived,
-    /// The same behind what happens at that time, and how that time moves.
-    pub behind: Option<(Derived, Vec<f64>)>,
+    /// The same after it, where anything happens.
+    pub after: Option<Derived>,
+    /// How that time moves, where the columns were taken through it.
+    pub moves: Option<Vec<f64>>,
     /// Derivatives of times, by the number of their measure.
     pub times: Vec<(usize, Vec<f64>)>,
 }
@@ -45,14 +48,26 @@ impl Look for Recorder<'_> {
                 _ => {}
             }
         }
-        self.seen.push(Seen { t: time, derived: outputs(variation, motion), behind: None, times });
+        self.seen.push(Seen {
+            t: time,
+            derived: outputs(variation, motion),
+            after: None,
+            moves: None,
+            times,
+        });
     }
 
     fn crossed(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
-        let is_moved = |(at, late): (Time, Vec<f64>)| (at.hi == time).then_some(late);
         let Some(seen) = self.seen.last_mut().filter(|seen| seen.t == time) else { return };
-        if let Some(late) = variation.moment.clone().and_then(is_moved) {
-            seen.behind = Some((outputs(variation, motion), late));
-        }
+        let moment = variation.moment.as_ref().filter(|(at, _)| at.hi == time);
+        seen.moves = moment.map(|(_, late)| late.clone());
+        seen.after = Some(outputs(variation, motion));
+    }
+}
+
+impl Seen {
+    /// What a row at that time shows: what comes after an event, as rows of a run do.
+    pub fn shown(&self) -> &Derived {
+        self.after.as_ref().unwrap_or(&self.derived)
     }
 }

@@ -229,6 +229,11 @@ impl Variation {
         let mut beside = Beside { variation: self, look, until };
         let mut adapter = ObserverAdapter { observer: &mut beside, has_enough: false };
         let is_through = driver.go_watched(Time::from(until), outcome, None, Some(&mut adapter), pause)?;
+        // What happens at the end itself has no step behind it.
+        if self.catch_up() && self.lost.is_none() {
+            let motion = driver.motion();
+            look.crossed(self, &motion, motion.time.hi);
+        }
         Ok(is_through)
     }
 

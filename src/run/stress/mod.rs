@@ -24,8 +24,8 @@ pub use steps::{Stability, StabilityMap, stability};
 use super::methods::{METHODS, MethodId};
 use super::plan::{Plan, Request};
 use super::running::{Run, integrate};
+use super::trust::DistanceMetric;
 use super::{Limits, reference};
-use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::Mechanism;
 use crate::scene::{Scene, parse_scene};
 use crate::stepping::StepError;
@@ -44,7 +44,8 @@ pub struct Case {
     pub origin: String,
     /// The text.
     pub text: String,
-    /// What its end may be off \[rad; rates likewise, over 1 rad/s or themselves where they are larger\].
+    /// What its end may be off \[rad; positions over the mechanism's size; rates likewise, over 1 rad/s or
+    /// themselves where they are larger\].
     pub tolerance: f64,
     /// What is known of it.
     pub expected: Expected,
@@ -59,6 +60,14 @@ pub enum Expected {
         /// Angles \[rad\].
         angles: Vec<f64>,
         /// Rates \[rad/s\].
+        rates: Vec<f64>,
+    },
+    /// All coordinates and rates at the horizon.
+    Motion {
+        /// Angles of all bodies \[rad\], then positions of those that translate, over the mechanism's size
+        /// ([`DistanceMetric`]).
+        coordinates: Vec<f64>,
+        /// Their rates \[rad/s\], velocities over the size \[1/s\].
         rates: Vec<f64>,
     },
     /// That the balance of energy is kept to the tolerance.
@@ -221,11 +230,11 @@ fn known(case: &Case) -> Case {
         // What it is off must be nothing beside the tolerance.
         let is_known = found.accuracy.iter().all(|&accuracy| accuracy <= 1e-3 * case.tolerance);
         let motion = found.motions.last().filter(|_| is_known)?;
-        let bodies = mechanism.bodies.len();
-        let angles = (0..bodies)
-            .map(|k| (motion.phi[k] + DoubleDouble::TAU.scale(motion.turns[k] as f64)).hi)
-            .collect();
-        Some(Expected::End { angles, rates: motion.omega[..bodies].iter().map(|omega| omega.hi).collect() })
+        let metric = DistanceMetric::new(&mechanism);
+        let coordinates = (0..motion.phi.len()).map(|k| motion.unwrapped(k));
+        let rates = motion.omega.iter().map(|omega| omega.hi);
+        let [coordinates, rates] = [metric.measured(coordinates).collect(), metric.measured(rates).collect()];
+        Some(Expected::Motion { coordinates, rates })
     };
     let expected = if case.expected == Expected::Unknown {
         end().unwrap_or(Expected::Unknown)

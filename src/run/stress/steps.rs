@@ -6,6 +6,7 @@ use crate::dynamics::Mechanism;
 use crate::run::methods::MethodId;
 use crate::run::plan::{Plan, Request};
 use crate::run::running::{Run, integrate};
+use crate::run::trust::DistanceMetric;
 use crate::run::{Limits, Outcome};
 use crate::scene::{Scene, parse_scene};
 use std::sync::Arc;
@@ -67,7 +68,8 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
         scene.springs[0].stiffness = soft * libm::exp10(f64::from(decade));
         let mechanism = Arc::new(Mechanism::new(&scene).ok()?);
         let exact = Request { method: Some(MethodId::Taylor), rtol: Some(EXACT), ..Request::default() };
-        let exact = End::of(&run(&scene, &mechanism, &exact)?.last, 2);
+        let metric = DistanceMetric::new(&mechanism);
+        let exact = End::of(&run(&scene, &mechanism, &exact)?.last, &metric);
         for halvings in HALVINGS.rev() {
             let step = UNTIL / libm::exp2(f64::from(halvings));
             let request = Request {
@@ -77,7 +79,7 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
                 ..Request::default()
             };
             let outcome = run(&scene, &mechanism, &request)?;
-            let end = End { rates: Vec::new(), ..End::of(&outcome.last, 2) };
+            let end = End { rates: Vec::new(), ..End::of(&outcome.last, &metric) };
             let error = outcome.stop.is_none().then(|| end.apart(&exact));
             let verdict = match error {
                 None => Verdict::Stopped,

@@ -6,7 +6,7 @@ use crate::run::drift::larger;
 use crate::run::methods::MethodId;
 use crate::run::plan::{Plan, Request};
 use crate::run::running::{Outcome, Run, integrate};
-use crate::run::trust::{How, Level};
+use crate::run::trust::{DistanceMetric, How, Level};
 use crate::run::{Limits, Sample};
 use crate::scene::Scene;
 use crate::stepping::{Cause, StepError, Tolerance};
@@ -35,25 +35,31 @@ pub(super) struct Trial<'a> {
     pub(super) max_evaluations: u64,
 }
 
-/// Angles and rates at the end of a run.
+/// Coordinates and rates at the end of a run, as [`DistanceMetric`] measures them.
 #[derive(Clone, Debug)]
 pub(super) struct End {
-    pub(super) angles: Vec<f64>,
+    pub(super) coordinates: Vec<f64>,
     pub(super) rates: Vec<f64>,
 }
 
 impl End {
-    pub(super) fn of(sample: &Sample, bodies: usize) -> Self {
-        let last = |values: &[f64], count: usize| values[count.saturating_sub(bodies)..count].to_vec();
-        let count = sample.centre.len();
-        Self { angles: last(&sample.phi, count), rates: last(&sample.omega, count) }
+    pub(super) fn of(sample: &Sample, metric: &DistanceMetric) -> Self {
+        let measured = |values: &[f64]| metric.measured(values.iter().copied()).collect();
+        Self { coordinates: measured(&sample.phi), rates: measured(&sample.omega) }
+    }
+
+    /// What is known of it, of the last bodies' angles alone where no more is expected.
+    fn known(self, bodies: usize, expected: &Expected) -> Self {
+        let Expected::End { angles, rates } = expected else { return self };
+        let last = |values: &[f64], count: usize| values[bodies - count..bodies].to_vec();
+        Self { coordinates: last(&self.coordinates, angles.len()), rates: last(&self.rates, rates.len()) }
     }
 
     /// The largest difference; rates count over 1 rad/s or themselves, and not at all where `other` has none.
     pub(super) fn apart(&self, other: &Self) -> f64 {
-        let angles = self.angles.iter().zip(&other.angles).map(|(a, b)| (a - b).abs());
+        let coordinates = self.coordinates.iter().zip(&other.coordinates).map(|(a, b)| (a - b).abs());
         let rates = self.rates.iter().zip(&other.rates).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
-        angles.chain(rates).fold(0.0, larger)
+        coordinates.chain(rates).fold(0.0, larger)
     }
 }
 
@@ -93,13 +99,17 @@ impl Trial<'_> {
             }
             let end = self.end(&outcome);
             self.score(&outcome, &end, cell);
-            // What a run knows is the error of its angles, and it knows the more the smoother its motion:
-            // where that is not far below what is asked for, and for the rates, a finer run has its say.
+            // What a run knows it knows the better the smoother its motion is: where that is not far below
+            // what is asked for, a finer run decides too.
             let known = outcome
                 .trust
                 .as_ref()
                 .filter(|trust| trust.how == How::ReferenceSolution && trust.at >= self.scene.until);
-            let known = known.and_then(|trust| trust.error_estimate);
+            let fastest = end.rates.iter().fold(1.0, |most, rate| larger(most, rate.abs()));
+            let known = known.and_then(|trust| {
+                let rates = if end.rates.is_empty() { 0.0 } else { trust.rate_error? / fastest };
+                Some(larger(trust.error_estimate?, rates))
+            });
             let finer = before.as_ref().map(|before| MARGIN * end.apart(before));
             cell.estimate = match (known, finer) {
                 (Some(known), None) if known > SURE * self.case.tolerance => None,
@@ -146,24 +156,15 @@ impl Trial<'_> {
     }
 
     fn end(&self, outcome: &Outcome) -> End {
-        let bodies = match &self.case.expected {
-            Expected::End { angles, .. } => angles.len(),
-            _ => self.mechanism.bodies.len(),
-        };
-        let mut end = End::of(&outcome.last, bodies);
-        if let Expected::End { rates, .. } = &self.case.expected
-            && rates.is_empty()
-        {
-            end.rates.clear();
-        }
-        end
+        let end = End::of(&outcome.last, &DistanceMetric::new(self.mechanism));
+        end.known(outcome.last.centre.len(), &self.case.expected)
     }
 
     /// What the end is off, where that is known.
     fn score(&self, outcome: &Outcome, end: &End, cell: &mut Cell) {
         cell.error = match &self.case.expected {
-            Expected::End { angles, rates } => {
-                Some(end.apart(&End { angles: angles.clone(), rates: rates.clone() }))
+            Expected::End { angles: coordinates, rates } | Expected::Motion { coordinates, rates } => {
+                Some(end.apart(&End { coordinates: coordinates.clone(), rates: rates.clone() }))
             }
             Expected::Energy | Expected::Stop(_) => Some(outcome.drift.energy.max),
             Expected::Refusal | Expected::Unknown => None,

@@ -55,11 +55,15 @@ impl DistanceMetric {
         self.largest(one.omega.iter().zip(&other.omega).map(|(&a, &b)| (a - b).hi))
     }
 
+    /// Of values of all coordinates those that count: angles as they are, positions over the size.
+    pub fn measured(&self, values: impl Iterator<Item = f64>) -> impl Iterator<Item = f64> {
+        let Self { angles, shown, .. } = *self;
+        let counts = values.enumerate().filter(move |(k, _)| *k < shown || *k >= angles);
+        counts.map(|(k, value)| value * self.weight(k))
+    }
+
     fn largest(&self, differences: impl Iterator<Item = f64>) -> f64 {
-        differences
-            .enumerate()
-            .filter(|(k, _)| *k < self.shown || *k >= self.angles)
-            .fold(0.0, |most, (k, difference)| larger(most, difference.abs() * self.weight(k)))
+        self.measured(differences).fold(0.0, |most, difference| larger(most, difference.abs()))
     }
 }
 

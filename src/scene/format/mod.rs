@@ -176,7 +176,7 @@ impl Shape {
             Self::Formula(quantity) if quantity.unit.is_empty() => "must be a formula in quotes".to_owned(),
             Self::Formula(quantity) => format!("must be a formula in quotes that comes to {}", quantity.unit),
             Self::Parameters => "must be {name: number, or formula of other parameters in quotes}".to_owned(),
-            Self::Signals => "must be {name: formula in quotes}".to_owned(),
+            Self::Signals => "must be {name: formula in quotes, or number}".to_owned(),
             Self::Tables => {
                 let [least, most] = super::formula::POINTS;
                 format!("must be {{name: list of {least} to {most} points [x, y], x ascending, or CSV file}}")

@@ -42,10 +42,15 @@ impl Walk<'_> {
                 (Shape::Number(quantity) | Shape::LawNumber(quantity) | Shape::Inertia(quantity), None) => {
                     return Ok(quantity.unit);
                 }
-                (Shape::Parameters, Some(Step::Key(name))) => {
+                (Shape::Parameters | Shape::Signals, Some(Step::Key(name))) => {
                     element_by_key(node, name, &mut walked)?;
                     steps.next();
                     return if steps.next().is_none() { Ok("") } else { Err(no_number(&walked, table)) };
+                }
+                (Shape::Tables, Some(Step::Key(name))) => {
+                    let points = element_by_key(node, name, &mut walked)?;
+                    steps.next();
+                    return coordinate(points, &mut steps, &mut walked);
                 }
                 (Shape::Pair(quantity) | Shape::LawPair(quantity), Some(Step::Index(0 | 1))) => {
                     steps.next();
@@ -76,6 +81,22 @@ impl Walk<'_> {
             }
         }
     }
+}
+
+/// A coordinate of a point of a table that is written out.
+fn coordinate<'a>(
+    points: Option<&Node>,
+    steps: &mut impl Iterator<Item = Step<'a>>,
+    walked: &mut String,
+) -> Result<&'static str, (String, String)> {
+    let path: Vec<Step> = steps.collect();
+    let is_list = |node: &Node| matches!(node.value, Value::List(_));
+    if let ([point @ Step::Index(_), Step::Index(0 | 1)], true) = (&path[..], points.is_some_and(is_list)) {
+        element(points, point, walked)?;
+        return Ok("");
+    }
+    let hint = format!("a coordinate of a point written in the scene, as {walked}[0][1]");
+    Err((format!("{walked} is a table, not a number"), hint))
 }
 
 fn no_number(walked: &str, table: &Table) -> (String, String) {
