@@ -179,6 +179,49 @@ fn points_of_floating_bodies_are_in_lanes() {
 }
 
 /// A rotor, and what its formulas make of it in closed form.
+/// A thrown bar that spins: its centre flies a parabola, in lanes and alone, and the table has where it ends.
+#[test]
+fn where_a_free_bar_ends_is_in_the_table() {
+    let text = r#"{"name": "thrown", "gravity": [0, -9.81],
+        "bars": [{"name": "bar", "mass": 1, "centre": [0.1, 0.05], "inertia": 0.02, "length": 0.5}],
+        "start": {"bar": {"phi": 0.3, "omega": 3, "origin": [0.2, 0], "velocity": [1, 2]}}, "until": 1, "every": 1}"#;
+    let template = Template::new(text.into(), "thrown.json".into(), &[]);
+    let t = 1.0;
+    for method in ["taylor", "dp8"] {
+        let vary = vec!["start.bar.velocity[0]=-1..1:9".parse().expect("a range")];
+        let plan = Sweep::new(&template, vary, &request(method, t)).expect("a sweep");
+        let names = columns(&plan);
+        assert_eq!(
+            names[2..8].join(" "),
+            "bar.phi [rad] bar.omega [rad/s] bar.x [m] bar.y [m] bar.vx [m/s] \
+            bar.vy [m/s]"
+        );
+        for point in points(&plan, 1) {
+            let numbers = numbers(&point, Layout::of(&plan));
+            assert_eq!(numbers.len(), names.len() - 3, "all but words");
+            let (sin, cos) = 0.3_f64.sin_cos();
+            let arm = [0.1 * cos - 0.05 * sin, 0.1 * sin + 0.05 * cos];
+            let velocity = [point.values[0] - 3.0 * arm[1], 2.0 + 3.0 * arm[0]];
+            let expected = [
+                0.3 + 3.0 * t,
+                3.0,
+                0.2 + arm[0] + velocity[0] * t,
+                arm[1] + velocity[1] * t - 0.5 * 9.81 * t * t,
+                velocity[0],
+                velocity[1] - 9.81 * t,
+            ];
+            for (name, (found, expected)) in names[2..].iter().zip(numbers[2..].iter().zip(expected)) {
+                assert!((found - expected).abs() < 1e-8, "{method} {name}: {found} {expected}");
+            }
+        }
+    }
+    // A point that never begins has as many numbers, none of which is one.
+    let vary = vec!["bars.bar.mass=-1..1:2".parse().expect("a range")];
+    let plan = Sweep::new(&template, vary, &request("dp8", t)).expect("a sweep");
+    let refused = numbers(&points(&plan, 1)[0], Layout::of(&plan));
+    assert!(refused.len() == columns(&plan).len() - 3 && refused[1..].iter().all(|x| x.is_nan()));
+}
+
 fn rotor(more: &str) -> Template {
     let text = format!(
         r#"{{"name": "rotor", "gravity": [0, 0], {more},

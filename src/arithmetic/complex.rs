@@ -3,7 +3,7 @@
 //! Own, because it has to work over every [`Scalar`]; the few operations the equations use.
 
 use super::{Over, Scalar};
-use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Mul, Neg, Sub};
 
 /// `re + i im`; as a vector of the plane `(x, y)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -118,16 +118,4 @@ impl<T: Scalar> Neg for Complex<T> {
     }
 }
 
-impl<T: Scalar> AddAssign for Complex<T> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<T: Scalar> SubAssign for Complex<T> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([T: Scalar] Complex<T>);

@@ -8,7 +8,7 @@
 use super::sum::{fast_two_sum, nearest, two_product, two_sum};
 use super::{Real, Scalar, elementary};
 use std::cmp::Ordering;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::sync::LazyLock;
 
 /// `hi + lo` with `|lo|` at most half a unit in the last place of `hi`.
@@ -206,19 +206,7 @@ impl Neg for DoubleDouble {
     }
 }
 
-impl AddAssign for DoubleDouble {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for DoubleDouble {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([] DoubleDouble);
 
 impl PartialOrd for DoubleDouble {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {

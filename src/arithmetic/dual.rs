@@ -15,7 +15,7 @@ use super::{DoubleDouble, Over, Real, Scalar};
 use std::cmp::Ordering;
 use std::fmt::Debug;
 use std::marker::PhantomData;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// What the constants beside a dual number are.
 pub trait Kind: Clone + Copy + Debug + 'static {
@@ -254,19 +254,7 @@ impl<const D: usize, K: Kind> Neg for DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> AddAssign for DualNumber<D, K> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<const D: usize, K: Kind> SubAssign for DualNumber<D, K> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([const D: usize, K: Kind] DualNumber<D, K>);
 
 #[cfg(test)]
 mod tests {

@@ -5,7 +5,7 @@
 
 use super::lanes::Lanes;
 use super::{Scalar, sincos};
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Lanes of an [`Octet`].
 pub const LANES: usize = 8;
@@ -176,16 +176,4 @@ impl<L: Lanes> Neg for Eight<L> {
     }
 }
 
-impl<L: Lanes> AddAssign for Eight<L> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<L: Lanes> SubAssign for Eight<L> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([L: Lanes] Eight<L>);

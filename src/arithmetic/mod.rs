@@ -43,6 +43,26 @@ pub use dual::{Dual, Varied};
 use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
+/// Assignments of a number by its operators.
+macro_rules! assign_by_operators {
+    ([$($generics:tt)*] $number:ty) => {
+        impl<$($generics)*> std::ops::AddAssign for $number {
+            #[inline(always)]
+            fn add_assign(&mut self, other: Self) {
+                *self = *self + other;
+            }
+        }
+
+        impl<$($generics)*> std::ops::SubAssign for $number {
+            #[inline(always)]
+            fn sub_assign(&mut self, other: Self) {
+                *self = *self - other;
+            }
+        }
+    };
+}
+pub(crate) use assign_by_operators;
+
 /// A number the equations of motion can be evaluated on.
 ///
 /// No comparison is asked for, so that vectors of lanes can be scalars; what needs an order asks for

@@ -11,7 +11,7 @@
 use super::eight::{Eight, Lanewise, Octet};
 use super::lanes::Lanes;
 use super::{DoubleDouble, Scalar, sincos};
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// `high + low` in eight lanes.
 #[derive(Clone, Copy, Debug)]
@@ -158,16 +158,4 @@ impl<L: Lanes> Neg for Pairs<L> {
     }
 }
 
-impl<L: Lanes> AddAssign for Pairs<L> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<L: Lanes> SubAssign for Pairs<L> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([L: Lanes] Pairs<L>);

@@ -409,6 +409,19 @@ impl Mechanism {
         (z, translations)
     }
 
+    /// Centres of mass of all bodies \[m\] and their velocities \[m/s\] at these coordinates and rates.
+    pub(crate) fn centres(&self, phi: &[f64], omega: &[f64]) -> Vec<[[f64; 2]; 2]> {
+        let (z, translations) = self.pose(phi);
+        let mut velocities = vec![Complex::ZERO; self.bodies.len()];
+        self.forest.origin_velocities(&z, omega, &mut velocities);
+        let centre = |(k, body): (usize, &Body)| {
+            let arm = z[k].turn(body.centre);
+            let moving = velocities[k] + arm.left().times(omega[k]);
+            [translations[k] + arm, moving].map(|vector| [vector.re, vector.im])
+        };
+        self.bodies.iter().enumerate().map(centre).collect()
+    }
+
     /// Where a place of the scene is, from these \[m\].
     pub(crate) fn place(
         &self,

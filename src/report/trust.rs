@@ -50,11 +50,8 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     let Some(trust) = &outcome.trust else {
         return page.entry("trust", "not asked for: --trust auto estimates the error");
     };
-    let what = if mechanism.coordinates() > mechanism.bodies.len() {
-        "rad, and positions to as much of the longest bar"
-    } else {
-        "rad"
-    };
+    let what =
+        if mechanism.has_translations() { "rad, and positions to as much of the longest bar" } else { "rad" };
     let source = match (trust.how, &trust.error_estimator) {
         (How::Extrapolated(from), _) => format!("carried on from t = {} s", rough(from)),
         (_, Some(name)) => format!("estimated beside {name}"),

@@ -68,7 +68,7 @@ impl<M> Projected<M> {
         if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
             let row = mechanism.constraints[projector.kernel.weakest.row].name();
             let what = format!(
-                "energy changed by {lost:.1e} of its scale where constraint {row} loses its hold: the motion \
+                "energy changed by {lost:.1e} of its scale where constraint {row} becomes dependent: the motion \
                     left its branch"
             );
             return Err(stop(Cause::BranchLost, state, what, past_singular(name)));

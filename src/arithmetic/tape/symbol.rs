@@ -4,7 +4,7 @@ use super::{Operation, Slot, Tape};
 use crate::arithmetic::Scalar;
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A value on the tape that is being recorded, or a constant.
 ///
@@ -295,14 +295,4 @@ impl Neg for Symbol {
     }
 }
 
-impl AddAssign for Symbol {
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for Symbol {
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([] Symbol);

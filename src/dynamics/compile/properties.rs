@@ -25,6 +25,11 @@ impl Mechanism {
         }
     }
 
+    /// True where origins of bodies move freely, so that angles alone do not tell where bodies are.
+    pub fn has_translations(&self) -> bool {
+        self.coordinates() > self.bodies.len()
+    }
+
     /// Centre of mass of a body as a point.
     pub fn centre(&self, body: usize) -> Point {
         self.forest.walk(body, self.bodies[body].centre)

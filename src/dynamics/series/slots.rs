@@ -4,7 +4,7 @@ use super::varied::Number;
 use crate::arithmetic::lanes::wide::Slots;
 use crate::arithmetic::{DoubleDouble, Over, Real, Scalar};
 use std::cmp::Ordering;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number whose derivatives are in slots.
 #[derive(Clone, Copy, Debug)]
@@ -192,16 +192,4 @@ impl<S: Slots> Neg for InSlots<S> {
     }
 }
 
-impl<S: Slots> AddAssign for InSlots<S> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl<S: Slots> SubAssign for InSlots<S> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
-    }
-}
+crate::arithmetic::assign_by_operators!([S: Slots] InSlots<S>);

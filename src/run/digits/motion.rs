@@ -300,8 +300,8 @@ impl<const W: usize> Motion<W> {
             return Ok(end);
         }
         let what = match self.has_friction() {
-            true => "points at walls are held and let go, or places stick and slide, without end",
-            false => "points at walls are held and let go without end",
+            true => "contacts are made and released, or places stick and slide, without end",
+            false => "contacts are made and released without end",
         };
         Err(self.stop(Cause::RestingContact, 0.0, what, "move one of the walls, or end the run before"))
     }

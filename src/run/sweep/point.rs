@@ -49,6 +49,8 @@ pub struct Point {
     pub phi: Vec<f64>,
     /// Rates then \[rad/s\].
     pub omega: Vec<f64>,
+    /// Centres of mass then \[m\] and their velocities \[m/s\], where bodies are free or slide.
+    pub centres: Vec<[[f64; 2]; 2]>,
     /// Largest drift of energy, or energy minus work, over the energy scale.
     pub energy: f64,
     /// Largest violation of any constraint, at position \[rad or m\] and velocity level \[rad/s or m/s\],
@@ -81,6 +83,15 @@ impl Ready {
         let mut member = BatchMember::new(&self.mechanism, state);
         member.statistics.max_evaluations = self.plan.max_evaluations.saturating_mul(times);
         member
+    }
+}
+
+impl Point {
+    /// Takes from where the bodies of its mechanism end what their angles do not tell.
+    fn place(&mut self, mechanism: &Mechanism) {
+        if mechanism.has_translations() {
+            self.centres = mechanism.centres(&self.phi, &self.omega);
+        }
     }
 }
 
@@ -165,6 +176,7 @@ impl Sweep {
             t: 0.0,
             phi: Vec::new(),
             omega: Vec::new(),
+            centres: Vec::new(),
             energy: 0.0,
             constraint: None,
             steps: 0,
@@ -241,7 +253,7 @@ impl Sweep {
         } else {
             Arc::new(Mechanism { energy_scale: scale, ..(*mechanism).clone() })
         };
-        let mut running = match Run::new(mechanism, plan, self.limits, &start) {
+        let mut running = match Run::new(Arc::clone(&mechanism), plan, self.limits, &start) {
             Ok(run) => Running::new(run.of_ensemble(self.ends_at_flips).trusted(self.trust, &start)),
             Err(stop) => {
                 point.status = Status::Stopped(stop);
@@ -259,6 +271,7 @@ impl Sweep {
                 point.t = outcome.last.t;
                 point.phi = outcome.last.phi;
                 point.omega = outcome.last.omega;
+                point.place(&mechanism);
                 point.energy = outcome.drift.energy.max;
                 point.constraint = levels.reduce(|a, b| [larger(a[0], b[0]), larger(a[1], b[1])]);
                 point.steps = outcome.statistics.steps;
@@ -322,6 +335,7 @@ impl Sweep {
                 let mut point = lanes.swap_remove(number).point;
                 point.trust = judge.as_mut().map(|judge| judge.remove(number));
                 point.extremes = ensemble.extremes(number);
+                point.place(members[number].mechanism);
                 found.push(point);
                 members.swap_remove(number);
                 ensemble.swap_remove(number);

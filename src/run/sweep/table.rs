@@ -20,6 +20,8 @@ pub struct Layout {
     integrals: usize,
     outputs: usize,
     is_judged: bool,
+    /// True where places of the bodies are told beside their angles.
+    has_places: bool,
 }
 
 impl Layout {
@@ -31,6 +33,7 @@ impl Layout {
             integrals: mechanism.integrals().count(),
             outputs: outputs(sweep).count(),
             is_judged: sweep.trust() != Level::Off,
+            has_places: mechanism.has_translations(),
         }
     }
 }
@@ -43,7 +46,11 @@ pub fn columns(sweep: &Sweep) -> Vec<String> {
         sweep.variables().iter().map(|variable| with_unit(&variable.path, variable.unit)).collect();
     columns.push("t [s]".to_owned());
     for body in sweep.mechanism().own_bodies() {
-        columns.extend([format!("{}.phi [rad]", body.name), format!("{}.omega [rad/s]", body.name)]);
+        let quantities: &[&str] = match sweep.mechanism().has_translations() {
+            true => &["phi [rad]", "omega [rad/s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]"],
+            false => &["phi [rad]", "omega [rad/s]"],
+        };
+        columns.extend(quantities.iter().map(|quantity| format!("{}.{quantity}", body.name)));
     }
     columns.extend(sweep.mechanism().integrals().map(|(name, _)| name.to_owned()));
     let unit = sweep.mechanism().unit_of_rows().unwrap_or("rad");
@@ -73,18 +80,22 @@ pub fn outputs(sweep: &Sweep) -> impl Iterator<Item = (&str, &str)> {
 /// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is
 /// none.
 pub fn numbers(point: &Point, layout: Layout) -> Vec<f64> {
-    let Layout { bars, integrals, outputs, is_judged } = layout;
+    let Layout { bars, integrals, outputs, is_judged, has_places } = layout;
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
         // Time, three drifts, steps and flip time; of a judged point two more.
         let others = if is_judged { 8 } else { 6 };
-        numbers.resize(numbers.len() + 2 * bars + integrals + 4 * outputs + others, f64::NAN);
+        let of_bar = if has_places { 6 } else { 2 };
+        numbers.resize(numbers.len() + of_bar * bars + integrals + 4 * outputs + others, f64::NAN);
         return numbers;
     }
     numbers.push(point.t);
     // Behind the angles of the bodies are the integrals, and the coordinates of bodies that float.
-    for (&phi, &omega) in point.phi.iter().zip(&point.omega).take(bars) {
-        numbers.extend([phi, omega]);
+    for bar in 0..bars {
+        numbers.extend([point.phi[bar], point.omega[bar]]);
+        if has_places {
+            numbers.extend(point.centres.get(bar).copied().unwrap_or([[f64::NAN; 2]; 2]).as_flattened());
+        }
     }
     numbers.extend(&point.omega[bars..bars + integrals]);
     numbers.push(point.energy);

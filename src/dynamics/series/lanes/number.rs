@@ -11,7 +11,7 @@ use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Phase, Sine};
 use crate::scene::Profile;
 use std::cmp::Ordering;
-use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
+use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// A number of each motion.
 #[derive(Clone, Copy, Debug)]
@@ -187,19 +187,7 @@ impl<W: EightLanes> Neg for InLanes<W> {
     }
 }
 
-impl<W: EightLanes> AddAssign for InLanes<W> {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        self.0 = self.0.add(other.0);
-    }
-}
-
-impl<W: EightLanes> SubAssign for InLanes<W> {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        self.0 = self.0.sub(other.0);
-    }
-}
+crate::arithmetic::assign_by_operators!([W: EightLanes] InLanes<W>);
 
 impl<W: EightLanes> Constants for InLanes<W> {
     type Constant = Self;
