@@ -77,10 +77,37 @@ fn operators_bind_as_in_mathematics() {
         ("60 rpm/(2*pi)", 1.0),
         ("abs(-3) + sign(-2) + min(1, 2) + max(1, 2)", 5.0),
         ("if(1 < 2, 10, 20) + if(1 > 2, 1, 2)", 12.0),
+        ("if(1 >= 1, 3, 4) + if(1 <= 1, 10, 20)", 13.0),
+        ("if(1 >= 2, 3, 4) + if(1 <= 2, 10, 20)", 14.0),
+        ("if(2 >= 1, 3, 4) + if(2 <= 1, 10, 20)", 23.0),
+        ("if(1 > 1, 3, 4) + if(1 < 1, 10, 20)", 24.0),
+        ("10 rad*s^-1", 10.0),
+        ("3 mm^-2", 3e6),
+        ("2 m/s^-1", 2.0),
+        ("2 km*s^-1 + 1", 2001.0),
+        ("10 kg*m^2*s^-2", 10.0),
+        ("5 mm ^2 + 5 mm^ 2", 1e-5),
     ] {
-        assert!((value(text) - expected).abs() < 1e-14, "{text} = {}", value(text));
+        assert!((value(text) - expected).abs() < 1e-14 * expected.abs().max(1.0), "{text} = {}", value(text));
     }
     assert_eq!(Formula::parse("a*b.c - a").expect("a formula").value(&[3.0, 5.0]), 12.0);
+}
+
+/// A parameter that an event sets to 1 exactly: from 1 s on the torque gives the rotor 1 rad/s each second.
+#[test]
+fn a_flag_that_an_event_sets_is_equal_to_what_it_is_set_to() {
+    let flagged = scene(
+        r#"{"name": "flag", "gravity": [0, 0], "parameters": {"mode": 0},
+            "bars": [{"name": "bar", "mass": 1, "centre": [0, 0], "inertia": 0.2, "length": 0.5}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "torques": [{"name": "T", "body": "bar", "torque": "if(mode >= 1, 0.2, 0)"}],
+            "events": [{"name": "e", "when": "t - 1", "set": {"mode": 1}}],
+            "start": {"bar": {"phi": 0, "omega": 0}}, "until": 2, "every": 1}"#,
+    );
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        let rate = run(&flagged, &adaptive(method, 1e-10)).last.omega[0];
+        assert!((rate - 1.0).abs() < 1e-9, "{method}: {rate}");
+    }
 }
 
 #[test]
@@ -96,6 +123,10 @@ fn refusals_of_formulas_point_at_the_place() {
         ("(1 + 2", "column 1: this parenthesis is never closed"),
         ("1)", "column 2: this parenthesis closes nothing"),
         ("30 dge", "column 4: dge is no unit"),
+        ("2 m^2^2", "column 4: the power of a unit"),
+        ("2 m^(2)", "column 4: the power of a unit"),
+        ("2 m^0.5", "column 4: the power of a unit"),
+        ("2 m*s^12", "column 6: the power of a unit"),
         ("x y", "column 3: an operator is missing here"),
         ("a < b", "column 3: a comparison outside of `if`"),
         ("atan2(1)", "column 1: atan2 takes 2 arguments, not 1"),

@@ -221,6 +221,64 @@ fn a_number_that_an_event_sets_is_derived_and_rows_there_show_what_comes_after()
     }
 }
 
+/// A weak torsion spring over hundreds of turns: the place of a point by the start rate, in closed form.
+#[test]
+fn outputs_are_derived_after_many_turns() {
+    let scene = template(
+        r#"{"name": "spun", "gravity": [0, 0],
+            "bars": [{"name": "bar", "mass": 0.5, "centre": [0.3, 0], "inertia": 0.015, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+            "points": [{"name": "tip", "body": "bar", "point": [0.6, 0]}],
+            "torsion_springs": [{"name": "k", "body": "bar", "stiffness": 1e-6, "free_angle": 0}],
+            "start": {"bar": {"phi": 0, "omega": 100}}, "until": 10, "every": 1}"#,
+    );
+    let w = (1e-6_f64 / (0.015 + 0.5 * 0.3 * 0.3)).sqrt();
+    for rate in [30.0, 100.0, 1000.0] {
+        let found = derived(
+            &scene.with_values(&[scene.variable("bar.omega").expect("a number")], &[rate]),
+            &["tip.x"],
+            &["bar.omega"],
+            10.0,
+        );
+        let angle = rate * (w * 10.0).sin() / w;
+        assert_near(found.measures[0].slopes[0], -0.6 * angle.sin() * (w * 10.0).sin() / w, 1e-8, "place");
+    }
+}
+
+/// A ball that falls onto a table that vibrates fast: its end by the height it fell from, in closed form.
+#[test]
+fn impacts_at_a_fast_wall_are_derived() {
+    for (frequency, amplitude) in [(400.0_f64, 1e-3_f64), (2e3, 1e-3), (2e4, 1e-4)] {
+        let scene = template(&format!(
+            r#"{{"name": "table", "gravity": [0, -9.81],
+            "bars": [{{"name": "b", "mass": 0.5, "centre": [0, 0], "inertia": 0.015, "length": 0.6}}],
+            "sliders": [{{"name": "S", "point": {{"body": "b", "point": [0, 0]}},
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [0, 1]}}, "angle": "locked"}}],
+            "points": [{{"name": "p", "body": "b", "point": [0, 0]}}],
+            "walls": [{{"name": "W", "body": "b", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}},
+                "restitution": 0.8, "law": {{"start": 0, "sines": [{{"amplitude": {amplitude}, "frequency": {frequency}}}]}}}}],
+            "start": {{"b": {{"phi": 0, "origin": [0, 1], "velocity": [0, 0]}}}}, "until": 0.5, "every": 0.1}}"#
+        ));
+        let (g, e, end) = (9.81, 0.8, 0.5);
+        let closing = |t: f64| g * t + amplitude * frequency * (frequency * t).cos();
+        let met = (0..60)
+            .fold(0.45, |t, _| t + (1.0 - 0.5 * g * t * t - amplitude * (frequency * t).sin()) / closing(t));
+        let wall = amplitude * frequency * (frequency * met).cos();
+        let (after, left) = (e * g * met + (1.0 + e) * wall, end - met);
+        let by_time = e * g - (1.0 + e) * amplitude * frequency * frequency * (frequency * met).sin();
+        let expected = [by_time + g, wall + by_time * left - after + g * left].map(|x| x / closing(met));
+        let found = derived(&scene, &["p.vy", "p.y"], &["b.origin[1]"], end);
+        for (measured, expected) in found.measures.iter().zip(expected) {
+            assert_near(
+                measured.slopes[0],
+                expected,
+                1e-7,
+                &format!("{} at {frequency} rad/s", measured.name),
+            );
+        }
+    }
+}
+
 /// 0.5 kg·m² on a spring of 2 N·m, pulled by a signal, an integral over time and a table, each by a number.
 #[test]
 fn numbers_of_signals_integrals_and_tables_are_derived() {

@@ -69,7 +69,7 @@ pub fn events(shown: &Shown) -> String {
     text += if within.is_some() { ",agreement [digits]\n" } else { "\n" };
     for (event, agreement) in *events {
         let digits = layout.digits(*agreement);
-        let numbers = event.phi.iter().zip(&event.omega).flat_map(|(phi, omega)| [phi, omega]);
+        let numbers = super::events::numbers(&source.mechanism, &event.phi, &event.omega);
         let mut cells = vec![event.name.clone(), decimal(&event.t, digits)];
         cells.extend(numbers.map(|number| decimal(number, digits)));
         cells.extend(agreement.map(|agreement| format!("{agreement:.1}")));

@@ -14,12 +14,16 @@ pub fn has_any(mechanism: &Mechanism) -> bool {
     !mechanism.event_names().is_empty()
 }
 
-/// What stands above the table: name, time, angles and rates of all bodies, translational coordinates.
+/// What stands above the table: name, time, angles and rates of all bars, integrals, translational
+/// coordinates.
 pub(super) fn header(mechanism: &Mechanism) -> String {
     let n = mechanism.bodies.len();
     let mut text = "event,t [s]".to_owned();
-    for body in &mechanism.bodies {
+    for body in mechanism.own_bodies() {
         let _ = write!(text, ",{0}.phi [rad],{0}.omega [rad/s]", body.name);
+    }
+    for (name, _) in mechanism.integrals() {
+        let _ = write!(text, ",{name}");
     }
     for k in n..mechanism.coordinates() {
         let _ = write!(text, ",{} [m],{} [m/s]", mechanism.coordinate_name(k), mechanism.rate_name(k));
@@ -27,13 +31,25 @@ pub(super) fn header(mechanism: &Mechanism) -> String {
     text
 }
 
+/// The numbers of a row in this order, of those of all coordinates: an integral is the rate of its rotor.
+pub(super) fn numbers<'a, T>(
+    mechanism: &Mechanism,
+    phi: &'a [T],
+    omega: &'a [T],
+) -> impl Iterator<Item = &'a T> {
+    let rotors = mechanism.own_bodies().len()..mechanism.bodies.len();
+    let both = phi.iter().zip(omega).enumerate();
+    both.flat_map(move |(k, (phi, omega))| [Some(phi).filter(|_| !rotors.contains(&k)), Some(omega)])
+        .flatten()
+}
+
 /// All events as a table.
 pub fn table(mechanism: &Mechanism, outcome: &Outcome) -> String {
     let mut text = header(mechanism) + "\n";
     for event in &outcome.events {
         let _ = write!(text, "{},{:?}", event.name, event.t);
-        for (phi, omega) in event.phi.iter().zip(&event.omega) {
-            let _ = write!(text, ",{phi:?},{omega:?}");
+        for number in numbers(mechanism, &event.phi, &event.omega) {
+            let _ = write!(text, ",{number:?}");
         }
         text.push('\n');
     }

@@ -367,8 +367,8 @@ impl Running {
         let Statistics { steps, newton_steps, .. } = self.outcome.statistics;
         if newton_steps > 0 {
             let note = format!(
-                "{newton_steps} of {steps} steps found their stages by Newton's method: fixed-point iteration \
-                    converges slowly there"
+                "{newton_steps} of {steps} steps found their stages by Newton's method: fixed-point \
+                    iteration converges slowly there"
             );
             self.outcome.plan.notes.push(note);
         }

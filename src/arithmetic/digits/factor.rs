@@ -182,7 +182,7 @@ impl<const W: usize> Factor<W> {
         let (before, sum) = self.sums.split_at_mut((m + 1) * self.stride);
         let sum = &mut sum[..self.stride];
         sum.copy_from_slice(&before[m * self.stride..]);
-        if super::plus(&mut sum[1..=limbs], found) {
+        if super::plus(&mut sum[1..limbs + 1], found) {
             sum[0] += 1;
         }
     }
@@ -291,7 +291,7 @@ impl<const W: usize> Factor<W> {
         // Σ V + Σ V', of which half is taken off, a bit below its last limb.
         let count = sum.len() - 1;
         let mut twice = [0; ROOM];
-        let twice = &mut twice[..=count];
+        let twice = &mut twice[..count + 1];
         let ([a_from, a_to], [b_from, b_to]) = (self.sums_before(of, count), other.sums_before(from, count));
         let mut carry = 0;
         for i in (0..count).rev() {
@@ -384,7 +384,7 @@ fn raised<const ROOM: usize, const W: usize>(
 ) -> Digits<W> {
     let (whole, bits) = (bits.div_euclid(64), bits.rem_euclid(64));
     let mut found = [0; ROOM];
-    let found = &mut found[..=sum.len()];
+    let found = &mut found[..sum.len() + 1];
     let mut below = 0;
     for i in (0..found.len()).rev() {
         let here = if i == 0 { 0 } else { sum[i - 1] };

@@ -6,7 +6,7 @@ use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
 
-/// Half of the longest difference, over the size of what it changes.
+/// Half of the longest difference: of a coordinate \[rad, m\], of a rate over its size, or of time \[s\].
 const DIFFERENCE: f64 = 1e-3;
 /// Offsets and weights of a derivative of the fourth order.
 const STENCIL: [[f64; 2]; 4] = [[-2.0, 1.0 / 12.0], [-1.0, -2.0 / 3.0], [1.0, 2.0 / 3.0], [2.0, -1.0 / 12.0]];
@@ -24,10 +24,13 @@ pub(in crate::run) fn plain(motion: &Motion) -> [Vec<f64>; 2] {
     [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect())
 }
 
-/// The largest entry over the size of what it changes.
-fn size(of: &[f64], from: &[f64]) -> f64 {
-    of.iter().zip(from).fold(0.0, |most: f64, (x, y)| most.max(x.abs() / (1.0 + y.abs())))
-}
+/// Finer differences are each by this factor shorter than the one before, as many at most.
+const FINER: f64 = 1.0 / 8.0;
+const LEVELS: usize = 6;
+/// Two differences agree where they are apart by less than this share of themselves, or by so many units in
+/// the last place of the values they are of.
+const AGREE: f64 = 1e-10;
+const UNITS: f64 = 64.0;
 
 impl Side {
     pub fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
@@ -51,6 +54,9 @@ impl Side {
 
     /// The derivative of a function of the motion along a column, and so much time \[s\] with it, by
     /// differences of at most `share`; `None` where there is no such function.
+    ///
+    /// Where the function changes fast the differences become finer, until two of them agree; where no two
+    /// do, the finer of the two that are nearest to each other is taken, value by value.
     pub fn slope(
         &self,
         column: &[f64],
@@ -58,10 +64,51 @@ impl Side {
         share: f64,
         value: &mut dyn FnMut(&Motion) -> Option<Vec<f64>>,
     ) -> Option<Vec<f64>> {
+        let (along, rates) = column.split_at(self.phi.len());
+        let largest = |most: f64, x: f64| most.max(x.abs());
+        let rates = rates.iter().zip(&self.omega).map(|(x, rate)| x / (1.0 + rate.abs()));
+        let most = along.iter().copied().chain(rates).fold(late.abs(), largest);
+        let mut h = if most > 0.0 { DIFFERENCE.min(share) / most } else { 1.0 };
+        // What it is to move along, over the size of what moves: that is rounded too.
+        let far = self.phi.iter().copied().fold(self.motion.time.hi.abs(), largest);
+        let place = if most > 0.0 { far / most } else { 0.0 };
+        let (mut before, _) = self.difference(column, late, h, value)?;
+        let mut found = before.clone();
+        // How far apart the nearest two differences of each value are; less than zero once they agree.
+        let mut apart = vec![f64::INFINITY; found.len()];
+        for _ in 1..LEVELS {
+            h *= FINER;
+            let (here, sizes) = self.difference(column, late, h, value)?;
+            for (k, (&now, &last)) in here.iter().zip(&before).enumerate() {
+                let off = (now - last).abs();
+                let rounding = UNITS * f64::EPSILON * (sizes[k] + last.abs() * place) / h;
+                if apart[k] < 0.0 {
+                    continue;
+                }
+                if off <= AGREE * last.abs() + rounding {
+                    (found[k], apart[k]) = (last, -1.0);
+                } else if off < apart[k] {
+                    (found[k], apart[k]) = (now, off);
+                }
+            }
+            if apart.iter().all(|&apart| apart < 0.0) {
+                break;
+            }
+            before = here;
+        }
+        Some(found)
+    }
+
+    /// The same by one difference of a length, and the sizes of the values it is of.
+    fn difference(
+        &self,
+        column: &[f64],
+        late: f64,
+        h: f64,
+        value: &mut dyn FnMut(&Motion) -> Option<Vec<f64>>,
+    ) -> Option<(Vec<f64>, Vec<f64>)> {
         let n = self.phi.len();
-        let most = size(&column[..n], &self.phi).max(size(&column[n..], &self.omega)).max(late.abs());
-        let h = if most > 0.0 { DIFFERENCE.min(share) / most } else { 1.0 };
-        let mut sum: Vec<f64> = Vec::new();
+        let (mut sum, mut sizes): (Vec<f64>, Vec<f64>) = Default::default();
         let mut beside = self.motion.clone();
         for [offset, weight] in STENCIL {
             let moved = |to: &mut [DoubleDouble], from: &[f64], by: &[f64]| {
@@ -74,9 +121,13 @@ impl Side {
             beside.time = self.motion.time + offset * h * late;
             let values = value(&beside)?;
             sum.resize(values.len(), 0.0);
-            sum.iter_mut().zip(values).for_each(|(sum, value)| *sum += weight / h * value);
+            sizes.resize(values.len(), 0.0);
+            for (k, value) in values.into_iter().enumerate() {
+                sum[k] += weight / h * value;
+                sizes[k] = sizes[k].max(value.abs());
+            }
         }
-        Some(sum)
+        Some((sum, sizes))
     }
 
     /// The rate of the gap of a wall \[m/s\], and its derivatives by the coordinates, zero on entry.

@@ -219,7 +219,7 @@ impl<'a> Parser<'a> {
             return Err(self.error(self.at, end, &problem, &hint));
         };
         self.at = end;
-        let mut units = vec![(first, self.power_of_unit())];
+        let mut units = vec![(first, self.power_of_unit()?)];
         loop {
             let before = self.at;
             let sign = match self.peek() {
@@ -235,7 +235,7 @@ impl<'a> Parser<'a> {
                 break;
             };
             self.at = end;
-            units.push((unit, sign * self.power_of_unit()));
+            units.push((unit, sign * self.power_of_unit()?));
         }
         Ok(units)
     }
@@ -248,15 +248,30 @@ impl<'a> Parser<'a> {
         (&self.text[self.at..end], end)
     }
 
-    /// `^2` behind a unit; 1 where there is none.
-    fn power_of_unit(&mut self) -> i32 {
-        let bytes = self.text.as_bytes();
-        match (bytes.get(self.at), bytes.get(self.at + 1)) {
-            (Some(b'^'), Some(digit @ b'1'..=b'9')) => {
-                self.at += 2;
-                i32::from(digit - b'0')
-            }
+    /// `^2` or `^-1` behind a unit; 1 where there is none.
+    fn power_of_unit(&mut self) -> Result<i32, FormulaError> {
+        if self.peek() != Some(b'^') {
+            return Ok(1);
+        }
+        let start = self.at;
+        self.at += 1;
+        let sign = match self.peek() {
+            Some(b'-') => -1,
             _ => 1,
+        };
+        self.at += usize::from(sign < 0);
+        let digit = self.peek().filter(u8::is_ascii_digit).map(|digit| i32::from(digit - b'0'));
+        self.at += usize::from(digit.is_some());
+        let goes_on =
+            self.text.as_bytes().get(self.at).is_some_and(|byte| matches!(byte, b'0'..=b'9' | b'.'));
+        match digit {
+            Some(digit @ 1..) if !goes_on && self.peek() != Some(b'^') => Ok(sign * digit),
+            _ => Err(self.error(
+                start,
+                start + 1,
+                "the power of a unit is not a whole number from 1 to 9 or -1 to -9",
+                "for example m^2 or s^-1; a number with its unit is raised in parentheses, as (2 m)^0.5",
+            )),
         }
     }
 
@@ -302,8 +317,9 @@ impl<'a> Parser<'a> {
         let open = self.at;
         self.at += 1;
         let mut arguments = vec![self.expression(0)?];
+        let mut is_swapped = false;
         if name == "if" {
-            arguments[0] = self.compared(arguments[0])?;
+            (arguments[0], is_swapped) = self.compared(arguments[0])?;
         }
         while self.peek() == Some(b',') {
             self.at += 1;
@@ -343,22 +359,23 @@ impl<'a> Parser<'a> {
                 let [above, below] = if name == "max" { [first, last] } else { [last, first] };
                 Node::Select(condition, above, below)
             }
+            _ if is_swapped => Node::Select(self.condition(first), last, arguments[1]),
             _ => Node::Select(self.condition(first), arguments[1], last),
         };
         Ok(self.push(node, start, end))
     }
 
-    /// The right side of a comparison, if one stands here: what is positive where it holds.
-    fn compared(&mut self, left: usize) -> Result<usize, FormulaError> {
-        let Some(operator @ (b'<' | b'>')) = self.peek() else { return Ok(left) };
+    /// The right side of a comparison, if one stands here: what is positive where it holds, or, where that is
+    /// true as well, where it does not: `a >= b` is not `a < b`, so that it holds where both are equal.
+    fn compared(&mut self, left: usize) -> Result<(usize, bool), FormulaError> {
+        let Some(operator @ (b'<' | b'>')) = self.peek() else { return Ok((left, false)) };
         let place = self.at;
         self.at += 1;
-        if self.text.as_bytes().get(self.at) == Some(&b'=') {
-            self.at += 1;
-        }
+        let has_equality = self.text.as_bytes().get(self.at) == Some(&b'=');
+        self.at += usize::from(has_equality);
         let right = self.expression(0)?;
-        let node =
-            if operator == b'<' { Node::Difference(right, left) } else { Node::Difference(left, right) };
-        Ok(self.push(node, place, place + 1))
+        let is_less = (operator == b'<') != has_equality;
+        let node = if is_less { Node::Difference(right, left) } else { Node::Difference(left, right) };
+        Ok((self.push(node, place, place + 1), has_equality))
     }
 }

@@ -229,6 +229,9 @@ pub(super) fn signals(fields: &Fields, taken: &[Known]) -> Result<Vec<Signal>, S
     Ok(all.into_iter().map(|(name, formula)| Signal { name, formula }).collect())
 }
 
+/// Columns that every trajectory has, beside which integrals stand by their names.
+const COLUMNS: [&str; 5] = ["kinetic", "potential", "work", "imbalance", "friction"];
+
 /// The integrals of a scene of so many bars.
 pub(super) fn integrals(
     fields: &Fields,
@@ -240,6 +243,7 @@ pub(super) fn integrals(
     let mut taken: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
     taken.extend(signals.iter().map(|signal| signal.name.as_str()));
     taken.extend(bars.bars.iter().map(|bar| bar.name.as_str()));
+    taken.extend(COLUMNS);
     let all = pairs(&at)?;
     check_keys(&at, taken)?;
     let first = bars.bars.len();
