@@ -68,8 +68,8 @@ impl<M> Projected<M> {
         if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
             let row = mechanism.constraints[projector.kernel.weakest.row].name();
             let what = format!(
-                "energy changed by {lost:.1e} of its scale where constraint {row} becomes dependent: the motion \
-                    left its branch"
+                "energy changed by {lost:.1e} of its scale where constraint {row} becomes dependent: the \
+                    motion left its branch"
             );
             return Err(stop(Cause::BranchLost, state, what, past_singular(name)));
         }

@@ -251,7 +251,8 @@ impl Gauss {
             t: state.time.hi,
             step: self.scratch.step,
             what: format!(
-                "{whose} oscillates at {:.2e} rad/s, {radians:.1} rad a step, with {:.0e} of the energy scale",
+                "{whose} oscillates at {:.2e} rad/s, {radians:.1} rad a step, with {:.0e} of the energy \
+                    scale",
                 found.fastest, found.share
             ),
             hint: format!("a step of {:.1e} s follows it", 1.0 / found.fastest),
