@@ -53,7 +53,7 @@ impl<'a> StudyFolder<'a> {
     ) -> Result<Self, Failure> {
         let path = flags.out.join(scene).join(study);
         if !flags.force {
-            Folder::is_empty(&path)?;
+            Folder::refuse_results(&path)?;
         }
         Ok(Self {
             path,

@@ -101,7 +101,7 @@ impl Folder {
         fs::create_dir_all(path).map_err(|source| FileError::Folder { folder: folder(), source })?;
         let lock = lock(path)?;
         if !overwrite {
-            Self::is_empty(path)?;
+            Self::refuse_results(path)?;
         }
         // Without their table the checkpoints are of no use.
         checkpoint::Checkpoints::none(path).remove()?;
@@ -109,11 +109,11 @@ impl Folder {
         Ok(Self { path: folder(), written: Vec::new(), _lock: lock })
     }
 
-    /// Whether a folder, which need not exist, holds neither results nor an interrupted run.
+    /// Refuses a folder, which need not exist, that holds results or an interrupted run.
     ///
     /// # Errors
     /// It does.
-    pub fn is_empty(path: &Path) -> Result<(), FileError> {
+    pub fn refuse_results(path: &Path) -> Result<(), FileError> {
         if checkpoint::is_in(path) {
             return Err(FileError::Interrupted { folder: path.to_owned() });
         }
