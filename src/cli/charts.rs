@@ -2,7 +2,7 @@
 
 use super::failure::Failure;
 use super::flags::TellFlags;
-use crate::chart::{Format, MotionGif, Picture, motion_apng, motion_gif};
+use crate::chart::{ChartError, Format, MotionGif, Picture, motion_apng, motion_gif};
 use crate::run::Folder;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -43,6 +43,14 @@ fn formats() -> impl TypedValueParser<Value = Format> {
 }
 
 impl ChartFlags {
+    /// What charts show, unless none are drawn.
+    ///
+    /// # Errors
+    /// Drawing fails.
+    pub fn drawn<T: Default>(&self, draw: impl FnOnce() -> Result<T, ChartError>) -> Result<T, ChartError> {
+        if self.no_charts { Ok(T::default()) } else { draw() }
+    }
+
     /// Writes a chart in every format wanted; `name` is without its ending.
     ///
     /// # Errors

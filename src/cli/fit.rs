@@ -49,7 +49,7 @@ pub fn run(flags: &FitFlags) -> Result<(), Failure> {
         object: report::object(&found),
         text: report::text(&found),
         #[cfg(feature = "charts")]
-        pictures: if flags.folder.charts.no_charts { Vec::new() } else { report::charts(&found)? },
+        pictures: flags.folder.charts.drawn(|| report::charts(&found))?,
         ..Study::default()
     };
     folder.publish(study, FILES)

@@ -39,7 +39,7 @@ pub fn run(flags: &KinematicsFlags) -> Result<(), Failure> {
         object: report::object(&found),
         text: report::text(&found),
         #[cfg(feature = "charts")]
-        pictures: if flags.folder.charts.no_charts { Vec::new() } else { report::charts(&found)? },
+        pictures: flags.folder.charts.drawn(|| report::charts(&found))?,
         ..Study::default()
     };
     folder.publish(study, FILES)

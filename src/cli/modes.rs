@@ -59,11 +59,10 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
         Found::Motion(found) => (in_motion::object(found), in_motion::text(found)),
     };
     #[cfg(feature = "charts")]
-    let (pictures, motions) = match &found {
-        _ if flags.folder.charts.no_charts => Default::default(),
-        Found::Rest(found) => at_rest::charts(found)?,
-        Found::Motion(found) => in_motion::charts(found)?,
-    };
+    let (pictures, motions) = flags.folder.charts.drawn(|| match &found {
+        Found::Rest(found) => at_rest::charts(found),
+        Found::Motion(found) => in_motion::charts(found),
+    })?;
     let study = Study {
         record: MODES_RECORD,
         object,

@@ -97,7 +97,7 @@ fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<Study, F
         object: report::object(&found, &sigmas),
         text: report::text(&found, &sigmas),
         #[cfg(feature = "charts")]
-        pictures: if flags.folder.charts.no_charts { Vec::new() } else { report::charts(&found, &sigmas)? },
+        pictures: flags.folder.charts.drawn(|| report::charts(&found, &sigmas))?,
         failure,
         ..Study::default()
     })
@@ -112,7 +112,7 @@ fn spectrum(template: &Template, flags: &SensitivityFlags) -> Result<Study, Fail
         object: report::spectrum_object(&found),
         text: report::spectrum_text(&found),
         #[cfg(feature = "charts")]
-        pictures: if flags.folder.charts.no_charts { Vec::new() } else { report::spectrum_charts(&found)? },
+        pictures: flags.folder.charts.drawn(|| report::spectrum_charts(&found))?,
         failure,
         ..Study::default()
     })

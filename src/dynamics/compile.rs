@@ -411,15 +411,13 @@ impl Mechanism {
 
     /// Centres of mass of all bodies \[m\] and their velocities \[m/s\] at these coordinates and rates.
     pub(crate) fn centres(&self, phi: &[f64], omega: &[f64]) -> Vec<[[f64; 2]; 2]> {
-        let (z, translations) = self.pose(phi);
-        let mut velocities = vec![Complex::ZERO; self.bodies.len()];
-        self.forest.origin_velocities(&z, omega, &mut velocities);
-        let centre = |(k, body): (usize, &Body)| {
-            let arm = z[k].turn(body.centre);
-            let moving = velocities[k] + arm.left().times(omega[k]);
-            [translations[k] + arm, moving].map(|vector| [vector.re, vector.im])
-        };
-        self.bodies.iter().enumerate().map(centre).collect()
+        let mut origins = [(); 2].map(|()| vec![Complex::ZERO; self.bodies.len()]);
+        let mut centres = Vec::with_capacity(self.bodies.len());
+        let at = (&self.elements(phi)[..], omega);
+        self.forest.each_centre(&self.bodies, at, &mut origins, |_, centre, velocity| {
+            centres.push([centre, velocity].map(|vector| [vector.re, vector.im]));
+        });
+        centres
     }
 
     /// Where a place of the scene is, from these \[m\].

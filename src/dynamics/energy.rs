@@ -166,19 +166,20 @@ impl Mechanism {
     /// The same body by body, from the motion of every centre of mass.
     #[inline(always)]
     fn energy_bodywise<T: Real>(&self, kernel: &mut Kernel<T>, phi: &[T], omega: &[T]) -> Energy<T> {
-        let (z, [translations, velocities]) = (&kernel.z, &mut kernel.translations);
-        self.forest.translations(z, translations);
-        self.forest.origin_velocities(z, omega, velocities);
         let gravity = Complex::of(self.gravity);
         let (mut kinetic, mut potential) = (T::ZERO, T::ZERO);
-        for (k, body) in self.bodies.iter().enumerate() {
-            let arm = z[k].turn(body.centre);
-            let velocity = velocities[k] + arm.left().times(omega[k]);
-            kinetic += velocity.norm_squared().scale(0.5 * body.mass)
-                + (omega[k] * omega[k]).scale(0.5 * body.inertia);
-            potential -= gravity.dot(translations[k] + arm).scale(body.mass);
-        }
-        Energy { kinetic, potential: potential + self.elastic_energy(z, phi) }
+        self.forest.each_centre(
+            &self.bodies,
+            (&kernel.z, omega),
+            &mut kernel.translations,
+            |k, centre, velocity| {
+                let body = &self.bodies[k];
+                kinetic += velocity.norm_squared().scale(0.5 * body.mass)
+                    + (omega[k] * omega[k]).scale(0.5 * body.inertia);
+                potential -= gravity.dot(centre).scale(body.mass);
+            },
+        );
+        Energy { kinetic, potential: potential + self.elastic_energy(&kernel.z, phi) }
     }
 
     /// Energy of springs and torsion springs \[J\].

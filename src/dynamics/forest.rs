@@ -4,6 +4,7 @@
 //! least there is, and with it the number of couplings.  Nobody chooses the tree; a hinge between bodies that
 //! are connected already becomes a pin, and so does one that an event of the scene closes or releases.
 
+use super::compile::Body;
 use super::constraint::Site;
 use super::point::Point;
 use crate::arithmetic::{Complex, Over, Real, Scalar};
@@ -176,6 +177,24 @@ impl<C: Real> Forest<C> {
                 }
                 BodyOrigin::Free(x) => Complex::new(omega[x], omega[x + 1]),
             };
+        }
+    }
+
+    /// Calls `see` with every body's number, its centre of mass \[m\] and the velocity of that \[m/s\] at
+    /// these elements and rates; the translational coordinates and their velocities go into `origins`.
+    #[inline(always)]
+    pub fn each_centre<T: Over<C>>(
+        &self,
+        bodies: &[Body<C>],
+        (z, omega): (&[Complex<T>], &[T]),
+        [translations, velocities]: &mut [Vec<Complex<T>>; 2],
+        mut see: impl FnMut(usize, Complex<T>, Complex<T>),
+    ) {
+        self.translations(z, translations);
+        self.origin_velocities(z, omega, velocities);
+        for (k, body) in bodies.iter().enumerate() {
+            let arm = z[k].turn(body.centre);
+            see(k, translations[k] + arm, velocities[k] + arm.left().times(omega[k]));
         }
     }
 

@@ -207,14 +207,10 @@ impl Sampler {
             sample.phi[k] = motion.unwrapped(k);
         }
         sample.omega.copy_from_slice(&self.omega);
-        let (z, [translations, velocities]) = (&self.plain.z, &mut self.translations);
-        mechanism.forest.translations(z, translations);
-        mechanism.forest.origin_velocities(z, &self.omega, velocities);
-        for (k, body) in mechanism.bodies.iter().enumerate() {
-            let arm = z[k].turn(body.centre);
-            sample.centre[k] = both(translations[k] + arm);
-            sample.velocity[k] = both(velocities[k] + arm.left().times(self.omega[k]));
-        }
+        let at = (&self.plain.z[..], &self.omega[..]);
+        mechanism.forest.each_centre(&mechanism.bodies, at, &mut self.translations, |k, centre, velocity| {
+            (sample.centre[k], sample.velocity[k]) = (both(centre), both(velocity));
+        });
         for (r, row) in mechanism.constraints.iter().enumerate() {
             self.jacobian.fill(DoubleDouble::ZERO);
             let posture = Posture { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };

@@ -6,7 +6,6 @@
 //! slider the torque it exerts on its body, [`ConstraintEquation`] by row.
 
 use super::sample::Sample;
-use crate::arithmetic::Complex;
 use crate::dynamics::Mechanism;
 use crate::dynamics::constraint::ConstraintEquation;
 use std::io::{self, Write};
@@ -106,18 +105,9 @@ pub fn row(mechanism: &Mechanism, sample: &Sample) -> Vec<f64> {
 
 /// A sample with the positions and velocities of the centres that follow from its angles and rates.
 fn placed(mechanism: &Mechanism, sample: &Sample) -> Sample {
-    let (z, translations) = mechanism.pose(&sample.phi);
-    let mut velocities = vec![Complex::ZERO; mechanism.bodies.len()];
-    mechanism.forest.origin_velocities(&z, &sample.omega, &mut velocities);
-    let arms: Vec<Complex<f64>> =
-        mechanism.bodies.iter().zip(&z).map(|(body, z)| z.turn(body.centre)).collect();
-    let both = |vector: Complex<f64>| [vector.re, vector.im];
-    let rates = velocities.iter().zip(&arms).zip(&sample.omega);
-    Sample {
-        centre: translations.iter().zip(&arms).map(|(&at, &arm)| both(at + arm)).collect(),
-        velocity: rates.map(|((&of, arm), &omega)| both(of + arm.left().times(omega))).collect(),
-        ..sample.clone()
-    }
+    let (centre, velocity) =
+        mechanism.centres(&sample.phi, &sample.omega).into_iter().map(|[at, moving]| (at, moving)).unzip();
+    Sample { centre, velocity, ..sample.clone() }
 }
 
 /// How many numbers that are.

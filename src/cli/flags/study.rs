@@ -257,7 +257,7 @@ pub struct FitFlags {
 /// Where a study of a scene leaves its results.
 #[derive(Clone, Debug, Args)]
 pub struct FolderFlags {
-    /// Folder under which that of the results is made, `SCENE/COMMAND`
+    /// Folder under which one of the scene is made, with that of the results in it
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
     pub out: PathBuf,
     /// Overwrite the results that are in the folder

@@ -320,15 +320,12 @@ impl<C: Decimal> ExactMechanism<C> {
     where
         C: crate::arithmetic::Over<C>,
     {
-        let zeros = || vec![Complex::ZERO; self.bodies.len()];
-        let (mut at, mut velocities) = (zeros(), zeros());
-        self.forest.translations(z, &mut at);
-        self.forest.origin_velocities(z, omega, &mut velocities);
-        let centre = |(k, body): (usize, &Body<C>)| {
-            let arm = z[k].turn(body.centre);
-            [at[k] + arm, velocities[k] + arm.left().times(omega[k])]
-        };
-        self.bodies.iter().enumerate().map(centre).collect()
+        let mut origins = [(); 2].map(|()| vec![Complex::ZERO; self.bodies.len()]);
+        let mut centres = Vec::with_capacity(self.bodies.len());
+        self.forest.each_centre(&self.bodies, (z, omega), &mut origins, |_, centre, velocity| {
+            centres.push([centre, velocity]);
+        });
+        centres
     }
 
     /// The start as the scene gives it, with what was found in doubles for the rest.

@@ -74,24 +74,22 @@ impl Side {
         let place = if most > 0.0 { far / most } else { 0.0 };
         let (mut before, _) = self.difference(column, late, h, value)?;
         let mut found = before.clone();
-        // How far apart the nearest two differences of each value are; less than zero once they agree.
-        let mut apart = vec![f64::INFINITY; found.len()];
+        // How far apart the nearest two differences of each value are that have none that agree.
+        let mut apart = vec![Some(f64::INFINITY); found.len()];
         for _ in 1..LEVELS {
             h *= FINER;
             let (here, sizes) = self.difference(column, late, h, value)?;
             for (k, (&now, &last)) in here.iter().zip(&before).enumerate() {
+                let Some(least) = apart[k] else { continue };
                 let off = (now - last).abs();
                 let rounding = UNITS * f64::EPSILON * (sizes[k] + last.abs() * place) / h;
-                if apart[k] < 0.0 {
-                    continue;
-                }
                 if off <= AGREE * last.abs() + rounding {
-                    (found[k], apart[k]) = (last, -1.0);
-                } else if off < apart[k] {
-                    (found[k], apart[k]) = (now, off);
+                    (found[k], apart[k]) = (last, None);
+                } else if off < least {
+                    (found[k], apart[k]) = (now, Some(off));
                 }
             }
-            if apart.iter().all(|&apart| apart < 0.0) {
+            if apart.iter().all(Option::is_none) {
                 break;
             }
             before = here;

@@ -365,8 +365,9 @@ impl<'a> Parser<'a> {
         Ok(self.push(node, start, end))
     }
 
-    /// The right side of a comparison, if one stands here: what is positive where it holds, or, where that is
-    /// true as well, where it does not: `a >= b` is not `a < b`, so that it holds where both are equal.
+    /// The right side of a comparison, if one stands here: what is positive where it holds; with true beside
+    /// it, what is positive where it does not hold.  `a >= b` is not `a < b`, so that it holds where both are
+    /// equal.
     fn compared(&mut self, left: usize) -> Result<(usize, bool), FormulaError> {
         let Some(operator @ (b'<' | b'>')) = self.peek() else { return Ok((left, false)) };
         let place = self.at;
