@@ -297,3 +297,113 @@ fn the_end_of_infinitely_many_bounces_beside_a_rough_rail_is_derived() {
         assert_near(*found, expected, 1e-8, path);
     }
 }
+
+/// Derivative of a function at a place.
+fn slope(f: impl Fn(f64) -> f64, x: f64) -> f64 {
+    let h = 1e-4;
+    (8.0 * (f(x + h) - f(x - h)) - (f(x + 2.0 * h) - f(x - 2.0 * h))) / (12.0 * h)
+}
+
+#[test]
+fn friction_with_little_weight_left_is_derived() {
+    // v = v0 - mu (m g - F) t/m: the normal force is 1e-4 of the weight.
+    let [m, g, mu, t] = [2.0, 9.81, 0.3, 1.0];
+    let lift = m * g * (1.0 - 1e-4);
+    let text = format!(
+        r#"{{"name": "light", "gravity": [0, -{g}],
+        "bars": [{{"name": "c", "mass": {m}, "centre": [0, 0], "inertia": 0.1, "length": 0.3}}],
+        "sliders": [{{"name": "S", "point": {{"body": "c", "point": [0, 0]}}, "angle": "locked",
+            "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "friction": {{"kinetic": {mu}}}}}],
+        "forces": [{{"name": "F", "body": "c", "point": [0, 0], "force": [0, {lift}]}}],
+        "start": {{"c": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [5, 0]}}}}, "until": {t}, "every": {t}}}"#
+    );
+    let by_mass = -mu * lift * t / (m * m);
+    let expected = [
+        ("bars.c.mass", by_mass),
+        ("gravity[1]", mu * t),
+        ("forces.F.force[1]", mu * t / m),
+        ("sliders.S.friction.kinetic", -(m * g - lift) * t / m),
+    ];
+    assert_slopes(&text, "c.vx", t, &expected);
+}
+
+#[test]
+fn an_impact_that_nearly_sticks_is_derived_by_its_friction() {
+    // The impulse of friction leaves the ball a speed of 1e-4 m/s along the wall: v = v0 - mu (1 + e) w.
+    let [e, mu, height, g] = [0.5, 0.3, 0.5, 9.81_f64];
+    let fall = (2.0 * g * height).sqrt();
+    let v = mu * (1.0 + e) * fall + 1e-4;
+    let text = format!(
+        r#"{{"name": "border", "gravity": [0, -{g}],
+        "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.1}}],
+        "walls": [{{"name": "floor", "body": "ball", "point": [0, 0],
+            "line": {{"through": [0, 0], "normal": [0, 1]}}, "restitution": {e}, "friction": {{"kinetic": {mu}}}}}],
+        "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{v:?}, 0]}}}},
+        "until": 0.5, "every": 0.5}}"#
+    );
+    let expected = [
+        ("walls.floor.friction.kinetic", -(1.0 + e) * fall),
+        ("walls.floor.restitution", -mu * fall),
+        ("start.ball.velocity[0]", 1.0),
+        ("gravity[1]", mu * (1.0 + e) * fall / (2.0 * g)),
+    ];
+    assert_slopes(&text, "ball.vx", 0.5, &expected);
+}
+
+#[test]
+fn gentle_bounces_are_derived_by_the_direction_of_the_wall() {
+    // The tenth bounce on an inclined wall approaches it with 5e-5 m/s.
+    let ([e, height, g], [vx, vy], at) = ([0.3, 0.3, 9.81], [2.5, 2.0], 0.692_887_091);
+    let text = format!(
+        r#"{{"name": "bounces", "gravity": [0, -{g}],
+        "bars": [{{"name": "ball", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.1}}],
+        "walls": [{{"name": "floor", "body": "ball", "point": [0, 0],
+            "line": {{"through": [0, 0], "normal": [-0.2, 1]}}, "restitution": {e}}}],
+        "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {height}], "velocity": [{vx}, {vy}]}}}},
+        "until": {at}, "every": {at}}}"#
+    );
+    // Along the wall and away from it.
+    let exact = |normal: f64, count: i32| {
+        let length = normal.hypot(1.0);
+        let (c, s) = (1.0 / length, normal / length);
+        let (away, pull) = (vx * s + vy * c, g * c);
+        let approach = (away * away + 2.0 * pull * height * c).sqrt();
+        let first = (away + approach) / pull;
+        let bounces: f64 = (1..count).map(|k| 2.0 * approach * f64::powi(e, k) / pull).sum();
+        let rate = approach * f64::powi(e, count) - pull * (at - first - bounces);
+        let along = vx * c - vy * s + g * s * at;
+        (along * c + rate * s, rate, approach * f64::powi(e, count))
+    };
+    let (_, rate, most) = exact(-0.2, 10);
+    assert!(rate.abs() < most && most < 5e-5, "{rate} {most}: not within the tenth bounce");
+    let expected = slope(|normal| exact(normal, 10).0, -0.2);
+    assert_slopes(&text, "ball.vx", at, &[("walls.floor.line.normal[0]", expected)]);
+}
+
+#[test]
+fn corners_near_a_number_are_not_reached_over() {
+    let text = |beside: f64| {
+        format!(
+            r#"{{"name": "corner", "gravity": [0, -9.81], "parameters": {{"k": {:?}}},
+            "bars": [{{"name": "c", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.3}}],
+            "sliders": [{{"name": "S", "point": {{"body": "c", "point": [0, 0]}}, "angle": "locked",
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}}}],
+            "forces": [{{"name": "F", "body": "c", "point": [0, 0], "force": ["max(k-1,0)", 0]}}],
+            "outputs": {{"o": "abs(k-1)*2"}},
+            "start": {{"c": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [1, 0]}}}},
+            "until": 1, "every": 1}}"#,
+            1.0 + beside
+        )
+    };
+    for beside in [1e-1, 1e-2, 1e-3, 1e-4, 1e-5] {
+        for (beside, expected) in [(beside, [2.0, 0.5]), (-beside, [-2.0, 0.0])] {
+            let found = derived(&template(&text(beside)), &["o", "c.vx"], &["k"], 1.0);
+            let error = found.inputs[0].error;
+            assert!(error <= 1e-6, "{beside}: {error}");
+            for (measure, expected) in found.measures.iter().zip(expected) {
+                let off = (measure.slopes[0] - expected).abs();
+                assert!(off <= 10.0 * error + 1e-11, "{beside}: {} by {off} of {error}", measure.name);
+            }
+        }
+    }
+}

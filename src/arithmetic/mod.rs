@@ -30,6 +30,7 @@ pub mod lanes;
 #[doc(hidden)]
 pub mod pairs;
 #[doc(hidden)]
+pub mod scratch;
 pub mod sincos;
 #[doc(hidden)]
 pub mod sum;

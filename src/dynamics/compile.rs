@@ -24,6 +24,7 @@ use super::recursive::Recursion;
 use super::tree::Tree;
 use super::units::Units;
 use crate::arithmetic::Complex;
+use crate::arithmetic::scratch::with_copies;
 use crate::scene::{Place, Scene};
 use constants::constants;
 pub(super) use constants::dense_constants;
@@ -327,11 +328,17 @@ impl Mechanism {
 
     /// Calls `then` with the configuration of a motion.
     pub(crate) fn seen<R>(&self, motion: &Motion, then: impl FnOnce(&Configuration<f64>) -> R) -> R {
-        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = motion.omega.iter().map(|omega| omega.hi).collect();
-        let z = self.elements(&phi);
-        let phi: Vec<f64> = (0..phi.len()).map(|k| motion.unwrapped(k)).collect();
-        then(&Configuration::new(&Values { time: motion.time.hi, phi: &phi, z: &z, omega: &omega }))
+        let n = motion.phi.len();
+        with_copies(Complex::ZERO, n, |z| {
+            with_copies(0.0, 2 * n, |values| {
+                let (phi, omega) = values.split_at_mut(n);
+                phi.iter_mut().zip(&motion.phi).for_each(|(to, phi)| *to = phi.hi);
+                omega.iter_mut().zip(&motion.omega).for_each(|(to, omega)| *to = omega.hi);
+                self.tree.unit_vectors::<f64, 0>(phi, z);
+                (0..n).for_each(|k| phi[k] = motion.unwrapped(k));
+                then(&Configuration::new(&Values { time: motion.time.hi, phi, z, omega }))
+            })
+        })
     }
 
     /// Finds the vibration of a rigid spring that the start gives energy to, and takes it out of the start:

@@ -19,9 +19,11 @@
 //! Source: P. C. Müller, *Calculation of Lyapunov exponents for dynamic systems with discontinuities*, Chaos,
 //! Solitons & Fractals 5 (1995).
 
+mod finer;
 mod side;
 mod together;
 
+pub(super) use finer::{Difference, Level, agreeing};
 pub(super) use side::{Side, plain};
 
 use super::contact::{Flight, Jump, Switch, come_to_rest};
@@ -44,8 +46,11 @@ const SHARE: f64 = 0.05;
 /// column add up to zero.
 pub(super) type Weighted = (f64, Arc<Mechanism>);
 
+/// Such mechanisms at distances that become finer.
+pub(super) type Levels = Vec<Level<Weighted>>;
+
 /// The neighbours of a column, by number, as they are after a jump.
-type Follow<'a> = dyn Fn(usize, &Jump) -> Result<Vec<Weighted>, String> + 'a;
+type Follow<'a> = dyn Fn(usize, &Jump) -> Result<Levels, String> + 'a;
 
 /// A function of a mechanism and a motion.
 type Function<'a> = &'a dyn Fn(&Arc<Mechanism>, &Motion) -> Option<Vec<f64>>;
@@ -54,7 +59,21 @@ type Function<'a> = &'a dyn Fn(&Arc<Mechanism>, &Motion) -> Option<Vec<f64>>;
 pub(super) struct Column<'a> {
     /// Coordinates, then rates.
     pub entries: &'a mut [f64],
-    pub neighbours: Vec<Weighted>,
+    pub neighbours: Levels,
+}
+
+impl Column<'_> {
+    /// The derivative of what a function tells of the neighbours beside what it tells `here`, where there are
+    /// any and it tells of all.
+    fn moved(&self, here: &[f64], value: impl Fn(&Arc<Mechanism>) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
+        let of = |(weight, neighbour): &Weighted| Some((*weight, value(neighbour)?));
+        agreeing(self.neighbours.len(), |level| {
+            let Level { far, list } = self.neighbours.get(level)?;
+            let values: Option<Vec<_>> = list.iter().map(of).collect();
+            Some(Difference::of(values?, here, *far))
+        })
+        .map(|(slopes, _)| slopes)
+    }
 }
 
 /// What happens at one moment.
@@ -111,7 +130,9 @@ pub(super) fn event_value(mechanism: &Mechanism, at: SwitchFunction, motion: &Mo
     mechanism.seen(motion, |here| match at {
         SwitchFunction::Event(number) => Some(laws.formulas.event_value(number, here, &laws.parameters)),
         SwitchFunction::Condition(number) => {
-            laws.formulas.condition_values(here, &laws.parameters, &laws.modes).get(number).copied()
+            let mut values = Vec::new();
+            laws.formulas.condition_values(here, &laws.parameters, &laws.modes, &mut values);
+            values.get(number).copied()
         }
         SwitchFunction::Other => None,
     })
@@ -129,12 +150,8 @@ fn derivative(
     let mut sum = side.slope(column.entries, late, share, &mut |motion| value(mechanism, motion))?;
     if !column.neighbours.is_empty() {
         let here = value(mechanism, &side.motion)?;
-        for (weight, neighbour) in &column.neighbours {
-            let there = value(neighbour, &side.motion)?;
-            for (sum, (there, here)) in sum.iter_mut().zip(there.iter().zip(&here)) {
-                *sum += weight * (there - here);
-            }
-        }
+        let moved = column.moved(&here, |neighbour| value(neighbour, &side.motion))?;
+        sum.iter_mut().zip(moved).for_each(|(sum, moved)| *sum += moved);
     }
     Some(sum)
 }

@@ -8,6 +8,7 @@ mod dependence;
 
 use super::law::{Acts, Law};
 use crate::arithmetic::Scalar;
+use crate::arithmetic::scratch::with_copies;
 use crate::arithmetic::tape::Symbol;
 use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::forest::Forest;
@@ -68,8 +69,20 @@ pub(super) struct Expression<C = f64> {
 }
 
 impl<C: Decimal> Expression<C> {
-    pub fn values<S: Scalar>(&self, at: &Configuration<S, C>, parameters: &[C], signals: &[S]) -> Vec<S> {
-        self.meanings.iter().map(|meaning| meaning.value(at, parameters, signals)).collect()
+    /// Calls `then` with what its names stand for.
+    pub fn with_values<S: Scalar, R>(
+        &self,
+        at: &Configuration<S, C>,
+        parameters: &[C],
+        signals: &[S],
+        then: impl FnOnce(&[S]) -> R,
+    ) -> R {
+        with_copies(S::ZERO, self.meanings.len(), |values| {
+            for (value, meaning) in values.iter_mut().zip(&self.meanings) {
+                *value = meaning.value(at, parameters, signals);
+            }
+            then(values)
+        })
     }
 
     /// Its value on the branches that `modes` say.
@@ -80,13 +93,13 @@ impl<C: Decimal> Expression<C> {
         signals: &[S],
         modes: &[bool],
     ) -> S {
-        let (values, modes) = (self.values(at, parameters, signals), self.modes(modes));
-        match &self.numbers {
-            None => self.formula.evaluate(&values, modes),
+        let modes = self.modes(modes);
+        self.with_values(at, parameters, signals, |values| match &self.numbers {
+            None => self.formula.evaluate(values, modes),
             Some(numbers) => {
-                self.formula.evaluate_over(&values, modes, |origin| at.constant(numbers.at(origin)))
+                self.formula.evaluate_over(values, modes, |origin| at.constant(numbers.at(origin)))
             }
-        }
+        })
     }
 
     /// Adds the values of its conditions on those branches.
@@ -98,12 +111,14 @@ impl<C: Decimal> Expression<C> {
         modes: &[bool],
         all: &mut Vec<S>,
     ) {
-        let (values, modes) = (self.values(at, parameters, signals), self.modes(modes));
+        let modes = self.modes(modes);
         let number = |origin: Origin, value: f64| match &self.numbers {
             Some(numbers) => at.constant(numbers.at(origin)),
             None => S::of(value),
         };
-        self.formula.condition_values_over(&values, modes, &number, all);
+        self.with_values(at, parameters, signals, |values| {
+            self.formula.condition_values_over(values, modes, &number, all);
+        });
     }
 
     /// Its value on those branches where `value` says what its names stand for; `None` where it does not.
@@ -118,6 +133,13 @@ impl<C: Decimal> Expression<C> {
 
     pub fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
         modes.get(self.first..self.first + self.formula.conditions()).unwrap_or(&[])
+    }
+}
+
+impl Expression {
+    /// Its value on the branches that hold at a configuration.
+    fn there(&self, at: &Configuration<f64>, parameters: &[f64], signals: &[f64]) -> f64 {
+        self.with_values(at, parameters, signals, |values| self.formula.value(values))
     }
 }
 
@@ -327,38 +349,38 @@ impl<C: Decimal> Formulas<C> {
         Ok(Some(Self { parameters, signals, laws, profiles, aims, events, conditions }))
     }
 
-    /// The signals on the branches that `modes` say.
-    pub(super) fn signals<S: Scalar>(
+    /// Calls `then` with the signals on the branches that `modes` say.
+    pub(super) fn with_signals<S: Scalar, R>(
         &self,
         at: &Configuration<S, C>,
         parameters: &[C],
         modes: &[bool],
-    ) -> Vec<S> {
-        let mut signals = Vec::with_capacity(self.signals.len());
-        for signal in &self.signals {
-            signals.push(signal.evaluated(at, parameters, &signals, modes));
-        }
-        signals
+        then: impl FnOnce(&[S]) -> R,
+    ) -> R {
+        with_copies(S::ZERO, self.signals.len(), |signals| {
+            for (number, signal) in self.signals.iter().enumerate() {
+                signals[number] = signal.evaluated(at, parameters, &signals[..number], modes);
+            }
+            then(signals)
+        })
     }
 
-    /// The values of all conditions, on the branches that `modes` say.
+    /// Appends the values of all conditions, on the branches that `modes` say.
     pub fn condition_values<S: Scalar>(
         &self,
         at: &Configuration<S, C>,
         parameters: &[C],
         modes: &[bool],
-    ) -> Vec<S> {
-        let mut all = Vec::with_capacity(self.conditions.len());
+        all: &mut Vec<S>,
+    ) {
         if self.conditions.is_empty() {
-            return all;
+            return;
         }
-        let signals = self.signals(at, parameters, modes);
-        for expression in self.switched() {
-            if expression.formula.conditions() > 0 {
-                expression.conditions(at, parameters, &signals, modes, &mut all);
+        self.with_signals(at, parameters, modes, |signals| {
+            for expression in self.switched().filter(|expression| expression.formula.conditions() > 0) {
+                expression.conditions(at, parameters, signals, modes, all);
             }
-        }
-        all
+        });
     }
 
     /// The aims of motors and walls that depend on the mechanism, on the branches that `modes` say.
@@ -368,8 +390,9 @@ impl<C: Decimal> Formulas<C> {
     pub fn aims(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<PlacedAim<'_, C>>, CompileError> {
         let aim = |(part, angles, expression): &'_ (Driven, Vec<usize>, Expression<C>)| {
             let formula = |at: &Configuration<Symbol, C>| {
-                let signals = self.signals(at, parameters, modes);
-                expression.evaluated(at, parameters, &signals, modes)
+                self.with_signals(at, parameters, modes, |signals| {
+                    expression.evaluated(at, parameters, signals, modes)
+                })
             };
             Aim::record(angles, formula)
                 .map(Arc::new)
@@ -399,41 +422,52 @@ impl Formulas {
         if self.conditions.is_empty() {
             return modes;
         }
-        let signals = self.signals_there(at, parameters);
-        for expression in self.switched() {
-            if expression.formula.conditions() > 0 {
-                modes.extend(expression.formula.modes(&expression.values(at, parameters, &signals)));
+        self.with_signals_there(at, parameters, |signals| {
+            for expression in self.switched().filter(|expression| expression.formula.conditions() > 0) {
+                let of = |values: &[f64]| expression.formula.modes(values);
+                modes.extend(expression.with_values(at, parameters, signals, of));
             }
-        }
+        });
         modes
     }
 
-    /// The signals on the branches that hold at a configuration.
-    fn signals_there(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
-        let mut signals = Vec::with_capacity(self.signals.len());
-        for signal in &self.signals {
-            let values = signal.values(at, parameters, &signals);
-            signals.push(signal.formula.value(&values));
-        }
-        signals
+    /// Calls `then` with the signals on the branches that hold at a configuration.
+    fn with_signals_there<R>(
+        &self,
+        at: &Configuration<f64>,
+        parameters: &[f64],
+        then: impl FnOnce(&[f64]) -> R,
+    ) -> R {
+        with_copies(0.0, self.signals.len(), |signals| {
+            for (number, signal) in self.signals.iter().enumerate() {
+                signals[number] = signal.there(at, parameters, &signals[..number]);
+            }
+            then(signals)
+        })
     }
 
-    fn value(&self, expression: &Expression, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
-        let signals = self.signals_there(at, parameters);
-        expression.formula.value(&expression.values(at, parameters, &signals))
+    /// Appends the functions of all events.
+    pub fn event_values(&self, at: &Configuration<f64>, parameters: &[f64], all: &mut Vec<f64>) {
+        self.with_signals_there(at, parameters, |signals| {
+            all.extend(self.events.iter().map(|event| event.when.there(at, parameters, signals)));
+        });
     }
 
-    /// The event function of event number `event`.
+    /// The function of event number `event`.
     pub fn event_value(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
-        self.value(&self.events[event].when, at, parameters)
+        self.with_signals_there(at, parameters, |signals| {
+            self.events[event].when.there(at, parameters, signals)
+        })
     }
 
     /// The parameters after an event.
     pub fn set_by(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
         let mut next = parameters.to_vec();
-        for (number, expression) in &self.events[event].set {
-            next[*number] = self.value(expression, at, parameters);
-        }
+        self.with_signals_there(at, parameters, |signals| {
+            for (number, expression) in &self.events[event].set {
+                next[*number] = expression.there(at, parameters, signals);
+            }
+        });
         next
     }
 }

@@ -118,7 +118,11 @@ impl<C: Decimal> Formulas<C> {
             UserForce::recorded(
                 owner,
                 |_| Symbol::ZERO,
-                |at, loads| loads.torque(0, self.condition_values(at, parameters, modes)[number]),
+                |at, loads| {
+                    let mut values = Vec::new();
+                    self.condition_values(at, parameters, modes, &mut values);
+                    loads.torque(0, values[number]);
+                },
             )
         };
         self.conditions.iter().enumerate().map(record).collect()
@@ -135,11 +139,13 @@ impl<C: Decimal + crate::arithmetic::Over<C>> Formulas<C> {
         parameters: &[C],
         modes: &[bool],
     ) -> Vec<C> {
-        let signals = self.signals(at, parameters, modes);
         let mut next = parameters.to_vec();
-        for (number, expression) in &self.events[event].set {
-            next[*number] = expression.formula.exact_value(&expression.values(at, parameters, &signals));
-        }
+        self.with_signals(at, parameters, modes, |signals| {
+            for (number, expression) in &self.events[event].set {
+                let of = |values: &[C]| expression.formula.exact_value(values);
+                next[*number] = expression.with_values(at, parameters, signals, of);
+            }
+        });
         next
     }
 }
@@ -203,7 +209,7 @@ impl<C: Decimal> Recorded<'_, C> {
     }
 
     fn signals(&self, at: &Configuration<Symbol, C>) -> Vec<Symbol> {
-        self.formulas.signals(at, self.parameters, self.modes)
+        self.formulas.with_signals(at, self.parameters, self.modes, |signals| signals.to_vec())
     }
 
     fn evaluate(

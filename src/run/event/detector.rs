@@ -151,7 +151,7 @@ impl EventDetector {
     }
 
     /// How many belong to the scene's events, those from outside and the conditions of laws.
-    fn before_friction(&self) -> usize {
+    pub(super) fn before_friction(&self) -> usize {
         let conditions = self.laws.as_ref().map_or(0, |laws| laws.modes.len());
         self.of_the_scene() + self.events.len() + conditions
     }
@@ -297,12 +297,12 @@ impl EventDetector {
         std::mem::take(&mut self.count)
     }
 
-    /// Values of the functions of events, the scene's and those from outside.
-    fn event_values(&self, at: &Configuration<f64>) -> Vec<f64> {
-        let of_the_scene = self.laws.iter().flat_map(|Laws { formulas, parameters, .. }| {
-            (0..formulas.events.len()).map(|event| formulas.event_value(event, at, parameters))
-        });
-        of_the_scene.chain(self.events.iter().map(|event| event.value(at))).collect()
+    /// Appends the values of the functions of events, the scene's and those from outside.
+    fn event_values(&self, at: &Configuration<f64>, all: &mut Vec<f64>) {
+        if let Some(Laws { formulas, parameters, .. }) = &self.laws {
+            formulas.event_values(at, parameters, all);
+        }
+        all.extend(self.events.iter().map(|event| event.value(at)));
     }
 
     /// Remembers the events whose functions a jump of the rates has carried across zero: they happen where
@@ -310,8 +310,11 @@ impl EventDetector {
     /// happened.
     pub fn jump(&mut self, [before, after]: [&Motion; 2]) {
         let has_begun = self.memory.last.iter().any(|(_, t)| *t == after.time);
-        let [before, after] =
-            [before, after].map(|motion| self.mechanism.seen(motion, |at| self.event_values(at)));
+        let [before, after] = [before, after].map(|motion| {
+            let mut values = Vec::new();
+            self.mechanism.seen(motion, |at| self.event_values(at, &mut values));
+            values
+        });
         let EventMemory { largest, resting, due, .. } = &mut self.memory;
         for (event, (before, after)) in before.into_iter().zip(after).enumerate() {
             let is_clear = before.abs().min(after.abs()) > NO_VALUE * largest[event];
@@ -332,7 +335,9 @@ impl EventDetector {
     pub fn conditions_at_zero(&self, [before, after]: [&Motion; 2], set: &[f64]) -> Vec<bool> {
         let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Vec::new() };
         let values = |motion: &Motion, parameters: &[f64]| {
-            self.mechanism.seen(motion, |at| formulas.condition_values(at, parameters, modes))
+            let mut values = Vec::new();
+            self.mechanism.seen(motion, |at| formulas.condition_values(at, parameters, modes, &mut values));
+            values
         };
         let largest = self.memory.largest.iter().skip(self.of_the_scene() + self.events.len());
         let values = values(before, parameters).into_iter().zip(values(after, set));
@@ -361,15 +366,20 @@ impl EventDetector {
 
     /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
-        let mut values: Vec<f64> = self.mechanism.seen(motion, |at| {
-            let mut values = self.event_values(at);
+        let mut values = Vec::with_capacity(self.functions());
+        self.append_values(motion, &mut values);
+        values
+    }
+
+    /// Appends them.
+    pub(super) fn append_values(&self, motion: &Motion, values: &mut Vec<f64>) {
+        self.mechanism.seen(motion, |at| {
+            self.event_values(at, values);
             if let Some(Laws { formulas, parameters, modes }) = &self.laws {
-                values.extend(formulas.condition_values(at, parameters, modes));
+                formulas.condition_values(at, parameters, modes, values);
             }
-            values
         });
         values.extend(self.friction.iter().flat_map(|watch| watch.values(motion)));
-        values
     }
 }
 

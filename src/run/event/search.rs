@@ -11,6 +11,9 @@ use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolate
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
+/// What the last coefficients of an interpolant may be over the least magnitude it can have: the function has
+/// no zero there, whatever its other digits are.
+const CERTAIN: f64 = 1e-3;
 /// Halvings of a step whose event functions no interpolant resolves.
 const HALVINGS: u32 = 4;
 /// Steps of the secant method at most.
@@ -95,13 +98,19 @@ impl EventDetector {
         all: &mut Vec<Passage>,
     ) {
         self.friction.iter().for_each(FrictionWatch::search);
-        let at = |share: f64, row: &mut Vec<f64>| row.extend(self.values(inside.at(begin + share * span)));
-        let resolved = self.resolved;
-        let is_enough = |curve: &Chebyshev| curve.tail() <= resolved * curve.most();
+        let at = |share: f64, row: &mut Vec<f64>| self.append_values(inside.at(begin + share * span), row);
+        let (resolved, largest) = (self.resolved, &self.memory.largest[..self.before_friction()]);
+        let is_enough = |event: usize, curve: &Chebyshev| {
+            let (off, most) = (curve.tail(), curve.most());
+            let stays_at_zero = largest.get(event).is_some_and(|largest| most <= NO_VALUE * largest);
+            off <= resolved * most || off <= CERTAIN * curve.least() || stays_at_zero
+        };
         let Interpolants { curves, values, nodes: Nodes { places, .. }, .. } =
-            interpolated(&DEGREES, at, |_, curve, _| is_enough(curve));
-        let is_resolved = curves.iter().all(|curve| is_enough(curve) || !curve.most().is_finite());
-        if !is_resolved && depth < HALVINGS {
+            interpolated(&DEGREES, at, |event, curve, _| is_enough(event, curve));
+        let of_event =
+            |(event, curve): (usize, &Chebyshev)| is_enough(event, curve) || !curve.most().is_finite();
+        let are_known: Vec<bool> = curves.iter().enumerate().map(of_event).collect();
+        if are_known.contains(&false) && depth < HALVINGS {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);
             return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
         }
@@ -110,7 +119,7 @@ impl EventDetector {
             if self.memory.resting.contains(&event) {
                 continue;
             }
-            let is_resolved = is_enough(curve) || !curve.most().is_finite();
+            let is_resolved = are_known[event];
             let part = Part { begin, span, curve, values: &values[event], places, is_resolved, is_last };
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),

@@ -1,6 +1,7 @@
 //! One side of what happens at a moment: a state, its accelerations, and derivatives along columns there.
 
 use super::Column;
+use super::finer::{Difference, agreeing};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
@@ -27,10 +28,6 @@ pub(in crate::run) fn plain(motion: &Motion) -> [Vec<f64>; 2] {
 /// Finer differences are each by this factor shorter than the one before, as many at most.
 const FINER: f64 = 1.0 / 8.0;
 const LEVELS: usize = 6;
-/// Two differences agree where they are apart by less than this share of themselves, or by so many units in
-/// the last place of the values they are of.
-const AGREE: f64 = 1e-10;
-const UNITS: f64 = 64.0;
 
 impl Side {
     pub fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
@@ -53,10 +50,8 @@ impl Side {
     }
 
     /// The derivative of a function of the motion along a column, and so much time \[s\] with it, by
-    /// differences of at most `share`; `None` where there is no such function.
-    ///
-    /// Where the function changes fast the differences become finer, until two of them agree; where no two
-    /// do, the finer of the two that are nearest to each other is taken, value by value.
+    /// differences of at most `share` that become finer [until two agree](agreeing); `None` where there is no
+    /// such function.
     pub fn slope(
         &self,
         column: &[f64],
@@ -68,47 +63,28 @@ impl Side {
         let largest = |most: f64, x: f64| most.max(x.abs());
         let rates = rates.iter().zip(&self.omega).map(|(x, rate)| x / (1.0 + rate.abs()));
         let most = along.iter().copied().chain(rates).fold(late.abs(), largest);
-        let mut h = if most > 0.0 { DIFFERENCE.min(share) / most } else { 1.0 };
+        let longest = if most > 0.0 { DIFFERENCE.min(share) / most } else { 1.0 };
         // What it is to move along, over the size of what moves: that is rounded too.
         let far = self.phi.iter().copied().fold(self.motion.time.hi.abs(), largest);
         let place = if most > 0.0 { far / most } else { 0.0 };
-        let (mut before, _) = self.difference(column, late, h, value)?;
-        let mut found = before.clone();
-        // How far apart the nearest two differences of each value are that have none that agree.
-        let mut apart = vec![Some(f64::INFINITY); found.len()];
-        for _ in 1..LEVELS {
-            h *= FINER;
-            let (here, sizes) = self.difference(column, late, h, value)?;
-            for (k, (&now, &last)) in here.iter().zip(&before).enumerate() {
-                let Some(least) = apart[k] else { continue };
-                let off = (now - last).abs();
-                let rounding = UNITS * f64::EPSILON * (sizes[k] + last.abs() * place) / h;
-                if off <= AGREE * last.abs() + rounding {
-                    (found[k], apart[k]) = (last, None);
-                } else if off < least {
-                    (found[k], apart[k]) = (now, Some(off));
-                }
-            }
-            if apart.iter().all(Option::is_none) {
-                break;
-            }
-            before = here;
-        }
-        Some(found)
+        agreeing(LEVELS, |level| {
+            let h = longest * f64::powi(FINER, level as i32);
+            Some(Difference::of(self.beside(column, late, h, value)?, &[], place / h))
+        })
+        .map(|(slopes, _)| slopes)
     }
 
-    /// The same by one difference of a length, and the sizes of the values it is of.
-    fn difference(
+    /// Values at the places of a difference of a length, with their weights.
+    fn beside(
         &self,
         column: &[f64],
         late: f64,
         h: f64,
         value: &mut dyn FnMut(&Motion) -> Option<Vec<f64>>,
-    ) -> Option<(Vec<f64>, Vec<f64>)> {
+    ) -> Option<Vec<(f64, Vec<f64>)>> {
         let n = self.phi.len();
-        let (mut sum, mut sizes): (Vec<f64>, Vec<f64>) = Default::default();
         let mut beside = self.motion.clone();
-        for [offset, weight] in STENCIL {
+        let mut at = |[offset, weight]: [f64; 2]| {
             let moved = |to: &mut [DoubleDouble], from: &[f64], by: &[f64]| {
                 for (to, (x, y)) in to.iter_mut().zip(from.iter().zip(by)) {
                     *to = DoubleDouble::from(x + offset * h * y);
@@ -117,15 +93,9 @@ impl Side {
             moved(&mut beside.phi, &self.phi, &column[..n]);
             moved(&mut beside.omega, &self.omega, &column[n..]);
             beside.time = self.motion.time + offset * h * late;
-            let values = value(&beside)?;
-            sum.resize(values.len(), 0.0);
-            sizes.resize(values.len(), 0.0);
-            for (k, value) in values.into_iter().enumerate() {
-                sum[k] += weight / h * value;
-                sizes[k] = sizes[k].max(value.abs());
-            }
-        }
-        Some((sum, sizes))
+            Some((weight / h, value(&beside)?))
+        };
+        STENCIL.into_iter().map(&mut at).collect()
     }
 
     /// The rate of the gap of a wall \[m/s\], and its derivatives by the coordinates, zero on entry.
@@ -150,10 +120,8 @@ impl Side {
             mechanism.contacts[contact].distance(self.motion.time, &self.phi, &z)
         };
         let mut change = dot(gradient, &column.entries[..self.phi.len()]);
-        if !column.neighbours.is_empty() {
-            let here = gap(mechanism);
-            let moved = |(weight, neighbour): &super::Weighted| weight * (gap(neighbour) - here);
-            change += column.neighbours.iter().map(moved).sum::<f64>();
+        if let Some(moved) = column.moved(&[gap(mechanism)], |neighbour| Some(vec![gap(neighbour)])) {
+            change += moved[0];
         }
         -change / rate
     }

@@ -6,7 +6,7 @@ use super::variation::{Crossing, Variation};
 use crate::dynamics::Mechanism;
 use crate::run::contact::Jump;
 use crate::run::event::SwitchFunction;
-use crate::run::saltation::{Column, Passage, Passed, Weighted, cross, engage};
+use crate::run::saltation::{Column, Levels, Passage, Passed, cross, engage};
 use std::sync::Arc;
 
 /// Parameters that events set, in which the columns may differ.
@@ -94,7 +94,7 @@ impl Variation {
     /// What comes of it, with the columns taken through.
     fn passed(&mut self, jumps: &[Jump]) -> Result<Passed, String> {
         let mut columns = std::mem::take(&mut self.columns);
-        let follow = |k: usize, jump: &Jump| -> Result<Vec<Weighted>, String> {
+        let follow = |k: usize, jump: &Jump| -> Result<Levels, String> {
             let mut beside = self.neighbours[k].clone().unwrap_or_default();
             let off = off(jumps).unwrap_or_else(|| self.off.clone());
             beside.follow(&jump.mechanism, &off, &self.set.known())?;

@@ -93,17 +93,20 @@ impl Expanded {
         let least = REST / (unit * unit);
         let mut sizes = Vec::new();
         for neighbours in neighbours.iter_mut() {
-            let (mut sum, mut size) = (vec![0.0; phi.len()], 0.0_f64);
-            for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
-                let weight = neighbour.weight;
-                for (sum, &acceleration) in sum.iter_mut().zip(neighbour.accelerations(t, &phi, &omega)) {
-                    *sum += weight * acceleration;
-                    size = size.max(ROUNDING * weight.abs() * acceleration.abs().max(least));
-                }
-            }
-            size = sum.iter().fold(size, |size, slope| size.max(AGREEMENT * slope.abs()));
-            forcing.push(sum);
-            sizes.push(size);
+            let mut size = 0.0_f64;
+            let moved = neighbours.as_mut().and_then(|neighbours| {
+                neighbours.derivative(|neighbour| {
+                    let weight = neighbour.weight.abs();
+                    let accelerations = neighbour.accelerations(t, &phi, &omega);
+                    for acceleration in accelerations {
+                        size = size.max(ROUNDING * weight * acceleration.abs().max(least));
+                    }
+                    accelerations.to_vec()
+                })
+            });
+            let moved = moved.unwrap_or_else(|| vec![0.0; phi.len()]);
+            sizes.push(moved.iter().fold(size, |size, slope| size.max(AGREEMENT * slope.abs())));
+            forcing.push(moved);
         }
         let mut first = 0;
         self.blocks.iter_mut().all(|(count, block)| {

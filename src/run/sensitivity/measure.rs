@@ -1,6 +1,7 @@
 //! What is derived: outputs at a time, extremes over the run, times of flips, events and impacts.
 
 use super::super::event::SwitchFunction;
+use super::neighbours::Neighbour;
 use super::variation::{Variation, plain};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
@@ -125,9 +126,10 @@ pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Der
     let mut slopes = vec![Vec::new(); values.len()];
     for (column, neighbours) in variation.columns.iter().zip(&mut variation.neighbours) {
         let mut sums = along(column, 0.0);
-        for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
-            let values = outputs_at(&neighbour.mechanism, &mut neighbour.kernel, motion, at);
-            sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += neighbour.weight * value);
+        let of =
+            |neighbour: &mut Neighbour| outputs_at(&neighbour.mechanism, &mut neighbour.kernel, motion, at);
+        if let Some(moved) = neighbours.as_mut().and_then(|neighbours| neighbours.derivative(of)) {
+            sums.iter_mut().zip(moved).for_each(|(sum, moved)| *sum += moved);
         }
         slopes.iter_mut().zip(sums).for_each(|(slopes, sum)| slopes.push(sum));
     }

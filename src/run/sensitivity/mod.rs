@@ -357,7 +357,11 @@ impl Study {
         });
         let rows = rows.collect();
         let by_series = variation.expanded.is_some();
-        let Self { scene, inputs, plan, .. } = self;
+        let Self { scene, mut inputs, plan, .. } = self;
+        // Corners nearby may have asked for shorter distances on the way.
+        for (input, neighbours) in inputs.iter_mut().zip(&variation.neighbours) {
+            input.error = neighbours.as_ref().map_or(input.error, |neighbours| neighbours.error);
+        }
         Sensitivity { scene, inputs, measures, outputs, rows, until: plan.until, lost, steps, by_series }
     }
 }

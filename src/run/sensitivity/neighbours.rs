@@ -6,17 +6,18 @@
 //! ```
 //!
 //! F stands for accelerations, constraints, gaps, impacts, outputs and the start, all at one and the same
-//! state.  They are smooth functions of p, so that the formula is right to 11 digits and more with an e that
-//! is found by trying: from one e to the next smaller one the error of truncation goes with e⁴, that of
-//! rounding with 1/e.  What a difference of *runs* suffers from, growth of rounding and of e itself with
-//! time, is not in it.
+//! state.  Where they are smooth functions of p the formula is right to 11 digits and more with an e that is
+//! found by trying: from one e to the next smaller one the error of truncation goes with e⁴, that of rounding
+//! with 1/e.  They may have corners nearby, as |N| of dry friction and impacts between sliding and sticking
+//! have; there e becomes smaller until two differences agree.  What a difference of *runs* suffers from,
+//! growth of rounding and of e itself with time, is not in it.
 
 use super::super::contact::in_modes;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::contact::metric::Metric;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::run::saltation::Weighted;
+use crate::run::saltation::{Difference, Level, Levels, agreeing};
 use crate::scene::{Template, Variable};
 use std::sync::Arc;
 
@@ -27,8 +28,15 @@ const FIRST: usize = 1;
 const ENOUGH: f64 = 1e-11;
 /// The estimated relative error that is too large for a derivative.
 const TOO_MUCH: f64 = 1e-4;
+/// That of a derivative which is zero as far as rounding shows.
+const DOUBTFUL: f64 = 1e-6;
 /// The change of a parameter that an event sets, over its value.
 const SET: f64 = 1e-3;
+/// Distances at which there are neighbours, each by this factor shorter than the one before.
+const LEVELS: i32 = 4;
+const FINER: f64 = 1.0 / 32.0;
+/// What differences may be apart over their size, and no more be extrapolated from: a corner is between them.
+const SMOOTH: f64 = 1e-5;
 /// What a change of the number by its own size does, over the values, below which it does nothing.
 const NOTHING: f64 = 1e-11;
 /// Size of a column, in changes of the number by its own size, below which its digits do not count.
@@ -75,9 +83,9 @@ impl Neighbour {
 /// The mechanisms for one number.
 #[derive(Clone, Debug, Default)]
 pub(in crate::run) struct Neighbours {
-    /// Empty where the number does nothing but move the start; those of parameters that events set are the
-    /// last.
-    pub list: Vec<Neighbour>,
+    /// At distances that become finer; empty where the number does nothing but move the start.  Those of
+    /// parameters that events set are the last.
+    pub levels: Vec<Level<Neighbour>>,
     /// Derivative of the start: all coordinates, then all rates.
     pub start: Vec<f64>,
     /// Estimated relative error of derivatives.
@@ -134,23 +142,31 @@ impl Neighbours {
             }
             _ => own?,
         };
-        Ok(Self::of(attempt, error, base.0))
+        let in_units = attempt.scale != number.1.abs();
+        let search = Search { template, number, base, until, in_units };
+        let levels = search.levels(attempt.change / attempt.scale);
+        Ok(Self::of(attempt, levels, error, base.0))
     }
 
-    fn of(attempt: Attempt, error: f64, base: &Mechanism) -> Self {
+    fn of(attempt: Attempt, finer: Vec<Level<(f64, Candidate)>>, error: f64, base: &Mechanism) -> Self {
         let (n, scale) = (base.coordinates(), attempt.scale);
-        let mut start = vec![0.0; 2 * n];
-        for (weight, candidate) in &attempt.list {
-            for k in 0..n {
-                start[k] += weight * candidate.start.unwrapped(k);
-                start[n + k] += weight * candidate.start.omega[k].hi;
-            }
-        }
-        if scale >= NEAR_ZERO && attempt.does_nothing() {
+        let does_nothing = attempt.does_nothing();
+        let coarsest = Level { far: scale / attempt.change, list: attempt.list };
+        let all: Vec<_> = std::iter::once(coarsest).chain(finer).collect();
+        let of = |(weight, Candidate { start, .. }): &(f64, Candidate)| {
+            let coordinates = (0..n).map(|k| start.unwrapped(k));
+            (*weight, coordinates.chain(start.omega.iter().map(|omega| omega.hi)).collect())
+        };
+        let start = agreeing(all.len(), |level| {
+            let Level { far, list } = &all[level];
+            Some(Difference::of(list.iter().map(of), &[], *far))
+        });
+        let mut start = start.map_or_else(|| vec![0.0; 2 * n], |(start, _)| start);
+        if scale >= NEAR_ZERO && does_nothing {
             // What there is is rounding, which would grow with time.
             start.fill(0.0);
         }
-        let is_alike = attempt.list.iter().all(|(_, candidate)| is_alike(&candidate.mechanism, base));
+        let is_alike = all[0].list.iter().all(|(_, candidate)| is_alike(&candidate.mechanism, base));
         let neighbour = |(weight, candidate): (f64, Candidate)| Neighbour {
             weight,
             set: None,
@@ -158,32 +174,59 @@ impl Neighbours {
             compiled: Arc::clone(&candidate.mechanism),
             mechanism: candidate.mechanism,
         };
-        let list = if is_alike { Vec::new() } else { attempt.list.into_iter().map(neighbour).collect() };
+        let levels = all.into_iter().filter(|_| !is_alike);
+        let level = |Level { far, list }| Level { far, list: list.into_iter().map(neighbour).collect() };
+        let levels = levels.map(level).collect();
         let unit = base.units.length.min(1.0) / base.units.time;
-        Self { list, start, error, floor: SMALL * unit / scale }
+        Self { levels, start, error, floor: SMALL * unit / scale }
     }
 
     /// Takes neighbours for parameters, by number, that events have set in `mechanism` with these derivatives
     /// instead of those there are, beside the mechanism as compiled.
     pub fn set(&mut self, compiled: &Arc<Mechanism>, mechanism: &Mechanism, given: &[(usize, f64)]) {
-        self.list.retain(|neighbour| neighbour.set.is_none());
         let parameters = mechanism.laws.as_ref().map_or(&[][..], |laws| &laws.parameters);
-        for &(number, slope) in given {
-            let value = parameters[number].abs();
-            let change = SET * if value == 0.0 { 1.0 } else { value };
-            self.list.extend(BOTH.iter().map(|[offset, weight]| Neighbour {
-                weight: weight * slope / change,
-                set: Some((number, offset * change)),
-                kernel: Kernel::new(compiled),
-                compiled: Arc::clone(compiled),
-                mechanism: Arc::clone(compiled),
-            }));
+        if self.levels.is_empty() && !given.is_empty() {
+            self.levels.resize(LEVELS as usize, Level { far: 0.0, list: Vec::new() });
         }
+        for (finer, Level { far, list }) in (0..).zip(&mut self.levels) {
+            list.retain(|neighbour| neighbour.set.is_none());
+            let share = SET * FINER.powi(finer);
+            for &(number, slope) in given {
+                let value = parameters[number].abs();
+                let change = share * if value == 0.0 { 1.0 } else { value };
+                *far = far.max(1.0 / share);
+                list.extend(BOTH.iter().map(|[offset, weight]| Neighbour {
+                    weight: weight * slope / change,
+                    set: Some((number, offset * change)),
+                    kernel: Kernel::new(compiled),
+                    compiled: Arc::clone(compiled),
+                    mechanism: Arc::clone(compiled),
+                }));
+            }
+        }
+        self.levels.retain(|level| !level.list.is_empty());
     }
 
     /// The mechanisms with their weights.
-    pub fn weighted(&self) -> Vec<Weighted> {
-        self.list.iter().map(|neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism))).collect()
+    pub fn weighted(&self) -> Levels {
+        let of = |neighbour: &Neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism));
+        let level =
+            |Level { far, list }: &Level<Neighbour>| Level { far: *far, list: list.iter().map(of).collect() };
+        self.levels.iter().map(level).collect()
+    }
+
+    /// The derivative of what a function tells of each neighbour; `None` where there are none.
+    pub fn derivative(&mut self, mut value: impl FnMut(&mut Neighbour) -> Vec<f64>) -> Option<Vec<f64>> {
+        let Self { levels, error, .. } = self;
+        let mut of = |neighbour: &mut Neighbour| (neighbour.weight, value(neighbour));
+        let (slopes, finest) = agreeing(levels.len(), |level| {
+            let Level { far, list } = levels.get_mut(level)?;
+            Some(Difference::of(list.iter_mut().map(&mut of), &[], *far))
+        })?;
+        if finest > 0 {
+            *error = error.max(ROUNDING * levels[finest].far);
+        }
+        Some(slopes)
     }
 
     /// Goes on with the parts that act, the contacts held and the branches of a mechanism, and with the
@@ -192,7 +235,7 @@ impl Neighbours {
     /// # Errors
     /// A neighbour cannot go on so.
     pub fn follow(&mut self, mechanism: &Mechanism, off: &[String], known: &[usize]) -> Result<(), String> {
-        for neighbour in &mut self.list {
+        for neighbour in self.levels.iter_mut().flat_map(|level| &mut level.list) {
             let whole = neighbour.compiled.with_all_parts();
             let mut acting = Mechanism::clone(whole);
             if let (Some(own), Some(laws)) = (&whole.laws, &mechanism.laws) {
@@ -229,6 +272,11 @@ impl Attempt {
         })
     }
 
+    /// True where what there is may be rounding.
+    fn is_rounding(&self) -> bool {
+        self.steepest() * self.change <= ROUNDING
+    }
+
     /// True where a change of the number by its scale does nothing: its derivative is zero.
     fn does_nothing(&self) -> bool {
         self.steepest() * self.scale < NOTHING
@@ -240,13 +288,18 @@ fn error(larger: &Attempt, smaller: &Attempt) -> f64 {
     if smaller.does_nothing() {
         return 0.0;
     }
-    let share = (smaller.change / larger.change).powi(4);
-    let mut error = 0.0_f64;
-    for ((before, now), size) in larger.slopes.iter().zip(&smaller.slopes).zip(&smaller.sizes) {
-        let apart = before.iter().zip(now).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
-        error = error.max(apart / size.max(f64::MIN_POSITIVE) * share);
+    if larger.is_rounding() && smaller.is_rounding() {
+        // As far as can be seen the number does nothing here, where it may do something farther away.
+        return DOUBTFUL;
     }
-    (error + ROUNDING / smaller.change) / smaller.steepest()
+    let mut apart = 0.0_f64;
+    for ((before, now), size) in larger.slopes.iter().zip(&smaller.slopes).zip(&smaller.sizes) {
+        let off = before.iter().zip(now).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        apart = apart.max(off / size.max(f64::MIN_POSITIVE));
+    }
+    let is_smooth = apart <= SMOOTH * smaller.steepest();
+    let share = if is_smooth { (smaller.change / larger.change).powi(4) } else { 1.0 };
+    (share * apart + ROUNDING / smaller.change) / smaller.steepest()
 }
 
 /// True where two mechanisms are the same but for how they start.
@@ -299,19 +352,29 @@ impl Search<'_> {
         }
     }
 
-    /// Scenes at a change over the number, on both sides of it or on one.
+    /// What those at a change over the number tell.
     fn attempt(&self, share: f64) -> Result<Attempt, String> {
-        let (_, value) = self.number;
-        let scale = if self.in_units { 1.0 } else { value.abs() };
-        let change = share * scale;
-        self.list(change, &BOTH)
-            .or_else(|_| self.list(change, &ONE))
-            .or_else(|_| self.list(-change, &ONE))
-            .map(|list| {
-                let change = change.abs();
-                let (slopes, sizes) = self.slopes(&list);
-                Attempt { change, scale, list, slopes, sizes }
-            })
+        let (list, scale) = (self.scenes(share)?, self.scale());
+        let (slopes, sizes) = self.slopes(&list);
+        Ok(Attempt { change: share * scale, scale, list, slopes, sizes })
+    }
+
+    /// Scenes at ever smaller changes than this one over the number, as far as there are such.
+    fn levels(&self, share: f64) -> Vec<Level<(f64, Candidate)>> {
+        let shares = (1..LEVELS).map(|level| share * FINER.powi(level));
+        let level = |share: f64| Some(Level { far: 1.0 / share, list: self.scenes(share).ok()? });
+        shares.map_while(level).collect()
+    }
+
+    /// Scenes at a change over the number, on both sides of it or on one.
+    fn scenes(&self, share: f64) -> Result<Vec<(f64, Candidate)>, String> {
+        let change = share * self.scale();
+        self.list(change, &BOTH).or_else(|_| self.list(change, &ONE)).or_else(|_| self.list(-change, &ONE))
+    }
+
+    /// Size of the number.
+    fn scale(&self) -> f64 {
+        if self.in_units { 1.0 } else { self.number.1.abs() }
     }
 
     fn list(&self, change: f64, offsets: &[[f64; 2]]) -> Result<Vec<(f64, Candidate)>, String> {

@@ -23,7 +23,7 @@ use super::collocation::{Collocation, STAGES};
 use super::crossing::SetNumbers;
 use super::expanded::{self, Expanded};
 use super::lyapunov::Dissipation;
-use super::neighbours::{Neighbours, residuals};
+use super::neighbours::{Neighbour, Neighbours, residuals};
 use crate::dynamics::jacobian::Jacobian;
 use crate::dynamics::kernel::Bias;
 use crate::dynamics::{Mechanism, Motion, State, Time};
@@ -288,7 +288,7 @@ impl Variation {
         self.pull.clear();
         let forcing = self.forcing.iter_mut();
         forcing.zip(&self.neighbours).for_each(|(forcing, neighbours)| {
-            let acts = neighbours.as_ref().is_some_and(|neighbours| !neighbours.list.is_empty());
+            let acts = neighbours.as_ref().is_some_and(|neighbours| !neighbours.levels.is_empty());
             forcing.clear();
             forcing.resize(if acts { STAGES * n } else { 0 }, 0.0);
         });
@@ -302,12 +302,9 @@ impl Variation {
                 continue;
             }
             for (forcing, neighbours) in self.forcing.iter_mut().zip(&mut self.neighbours) {
-                for neighbour in neighbours.iter_mut().flat_map(|neighbours| &mut neighbours.list) {
-                    let weight = neighbour.weight;
-                    let accelerations = neighbour.accelerations(t, &phi, &omega);
-                    for (sum, &acceleration) in forcing[i * n..(i + 1) * n].iter_mut().zip(accelerations) {
-                        *sum += weight * acceleration;
-                    }
+                let of = |neighbour: &mut Neighbour| neighbour.accelerations(t, &phi, &omega).to_vec();
+                if let Some(moved) = neighbours.as_mut().and_then(|neighbours| neighbours.derivative(of)) {
+                    forcing[i * n..(i + 1) * n].copy_from_slice(&moved);
                 }
             }
         }
@@ -324,15 +321,13 @@ impl Variation {
         ground.stand(mechanism, &state);
         let rows = mechanism.constraints.len();
         for (column, neighbours) in columns.iter_mut().zip(neighbours) {
-            let mut moved = [vec![0.0; rows], vec![0.0; rows]];
-            for neighbour in neighbours.iter().flat_map(|neighbours| &neighbours.list) {
+            let of = |neighbour: &mut Neighbour| {
                 let (positions, rates) = residuals(&neighbour.mechanism, t, &phi, &omega);
-                for r in 0..rows {
-                    moved[0][r] += neighbour.weight * positions[r];
-                    moved[1][r] += neighbour.weight * rates[r];
-                }
-            }
-            ground.keep_moved(mechanism, &state, column, [&moved[0], &moved[1]]);
+                [positions, rates].concat()
+            };
+            let moved = neighbours.as_mut().and_then(|neighbours| neighbours.derivative(of));
+            let moved = moved.unwrap_or_else(|| vec![0.0; 2 * rows]);
+            ground.keep_moved(mechanism, &state, column, [&moved[..rows], &moved[rows..]]);
         }
     }
 

@@ -24,6 +24,7 @@ pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
 use crate::arithmetic::Scalar;
+use crate::arithmetic::scratch::with_copies;
 use crate::scene::number::Decimal;
 
 /// The longest formula \[bytes\].
@@ -250,10 +251,20 @@ impl Formula {
         if let [Node::Name(number)] = self.nodes[..] {
             return values.get(number).copied().unwrap_or(S::ZERO);
         }
-        let mut results: Vec<S> = Vec::with_capacity(self.nodes.len());
+        with_copies(S::ZERO, self.nodes.len(), |results| self.fill(results, values, number, branches))
+    }
+
+    /// Fills in what every operation comes to; returns the last one.
+    fn fill<S: Scalar>(
+        &self,
+        results: &mut [S],
+        values: &[S],
+        number: &impl Fn(Origin, f64) -> S,
+        branches: &mut impl Branches<S>,
+    ) -> S {
         for (place, &node) in self.nodes.iter().enumerate() {
             let at = |node: usize| results[node];
-            let result = match node {
+            results[place] = match node {
                 Node::Name(number) => values.get(number).copied().unwrap_or(S::ZERO),
                 Node::Flip(condition, a) => {
                     if branches.is_positive(condition, at(self.conditions[condition])) {
@@ -278,7 +289,6 @@ impl Formula {
                 Node::Number(value) => number(Origin::Node(place), value),
                 node => self.smooth(node, at),
             };
-            results.push(result);
         }
         results.last().copied().unwrap_or(S::ZERO)
     }

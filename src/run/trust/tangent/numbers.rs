@@ -10,7 +10,7 @@
 use super::beside::{self, Beside};
 use super::{Path, Tangent};
 use crate::dynamics::{Coordinates, Mechanism, State};
-use crate::run::saltation::Weighted;
+use crate::run::saltation::{Level, Levels, Weighted};
 use std::sync::Arc;
 
 /// Difference of a parameter over its size.
@@ -35,6 +35,11 @@ fn on_both_sides(mechanism: &Mechanism, number: usize) -> Option<(f64, [Arc<Mech
 fn weighted(change: f64, half: f64, sides: [&Arc<Mechanism>; 2]) -> [Weighted; 2] {
     let weight = change / (2.0 * half);
     [(weight, Arc::clone(sides[0])), (-weight, Arc::clone(sides[1]))]
+}
+
+/// The one distance at which estimates have neighbours, where there are any.
+fn level(list: Vec<Weighted>) -> Levels {
+    if list.is_empty() { Levels::new() } else { vec![Level { far: 1.0 / DIFFERENCE, list }] }
 }
 
 /// What a parameter does to the powers of the rates.
@@ -100,30 +105,26 @@ impl<'a> Push<'a> {
 
 impl Tangent {
     /// The mechanisms with the parameters of a column whose parameters are so far from their values.
-    pub(super) fn neighbours(&self, given: &[f64]) -> Vec<Weighted> {
+    pub(super) fn neighbours(&self, given: &[f64]) -> Levels {
         let acting = self.parameters.iter().filter(|parameter| given[parameter.place] != 0.0);
         let of = |parameter: &Parameter| {
             let [ahead, behind] = &parameter.sides;
             weighted(given[parameter.place], parameter.half, [&ahead.0, &behind.0])
         };
-        acting.flat_map(of).collect()
+        level(acting.flat_map(of).collect())
     }
 
     /// The same beside another mechanism.
     ///
     /// # Errors
     /// There are no laws with such values.
-    pub(super) fn neighbours_at(
-        &self,
-        mechanism: &Mechanism,
-        given: &[f64],
-    ) -> Result<Vec<Weighted>, String> {
+    pub(super) fn neighbours_at(&self, mechanism: &Mechanism, given: &[f64]) -> Result<Levels, String> {
         let mut found = Vec::new();
         for (&number, &change) in self.set.iter().zip(given).filter(|(_, change)| **change != 0.0) {
             let (half, sides) = on_both_sides(mechanism, number).ok_or(NO_LAWS)?;
             found.extend(weighted(change, half, sides.each_ref()));
         }
-        Ok(found)
+        Ok(level(found))
     }
 
     /// Takes up the parameters in which neighbours differ.
