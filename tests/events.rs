@@ -5,6 +5,7 @@ use crate::common;
 
 use common::{pendulum, quarter_period, run};
 use driftless::Simulation;
+use driftless::run::trust::Level;
 use driftless::run::{MethodId, Outcome, Point, Request, Stabilization, Sweep, Vary, sweep};
 use driftless::scene::{Scene, Template, Wall, parse_scene};
 use driftless::stepping::Cause;
@@ -344,5 +345,37 @@ fn rows_at_the_time_of_an_event_show_what_comes_after_it() {
                 );
             }
         }
+    }
+}
+
+/// x = cos(2 t) comes to -0.99 shortly before it turns back, so that a small error of it moves the end of the
+/// run by much more, and with that a rotor of 50 rad/s.
+#[test]
+fn estimates_cover_when_an_event_ends_the_run() {
+    let text = r#"{"name": "slow", "gravity": [0, 0], "until": 3, "every": 1,
+        "bars": [{"name": "block", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1},
+                 {"name": "rotor", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
+        "sliders": [{"name": "rail", "point": {"body": "block", "point": [0, 0]}, "angle": "locked",
+                     "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "rotor", "point": [0, 0]}]}],
+        "points": [{"name": "p", "body": "block", "point": [0, 0]}],
+        "forces": [{"name": "pull", "body": "block", "point": [0, 0], "force": ["-4*p.x", 0]}],
+        "events": [{"name": "there", "when": "p.x + 0.99", "action": "stop"}],
+        "start": {"block": {"phi": 0, "omega": 0, "origin": [1, 0], "velocity": [0, 0]},
+                  "rotor": {"phi": 0, "omega": 50}}}"#;
+    let scene = parse_scene(text, "slow", &[]).expect("a scene");
+    let end = 0.5 * f64::acos(-0.99);
+    for (name, tolerance) in
+        [("taylor", 1e-5), ("dp8", 1e-5), ("dp5", 1e-6), ("radau5", 1e-5), ("dop853", 1e-5)]
+    {
+        let simulation = Simulation::new(&scene).expect("equations").method(method(name).expect("one"));
+        let simulation = simulation.tolerance(tolerance, tolerance).trust(Level::Full);
+        let outcome = simulation.run().expect("a run");
+        assert_eq!(outcome.ended_by.as_deref(), Some("there"), "{name}");
+        let off = (outcome.last.phi[1] - 50.0 * end).abs();
+        let trust = outcome.trust.expect("an estimate");
+        let estimate = trust.error_estimate.expect("a figure");
+        println!("{name}: off by {off:.1e}, estimate {estimate:.1e}");
+        assert!(off > 1e-8 && estimate > off / 3.0 && estimate < 10.0 * off, "{name}: {off:e}, {estimate:e}");
     }
 }

@@ -328,6 +328,9 @@ impl Running {
             if let Some(error_estimator) = error_estimator.as_mut().filter(|_| self.is_over || self.row == 1)
             {
                 error_estimator.observe(contact_driver.shown(), contact_driver.statistics());
+                if let (Some(name), Some(events)) = (&outcome.ended_by, &contact_driver.events) {
+                    error_estimator.ended_at(contact_driver.shown(), &|motion| events.value_of(name, motion));
+                }
                 outcome.trust_wall += error_estimator.take_wall();
             }
             if !self.is_over && pause() {

@@ -364,6 +364,12 @@ impl EventDetector {
         values.any(|(event, (value, largest))| value.abs() <= share * largest && !still.contains(&event))
     }
 
+    /// The value of the function of the event of this name.
+    pub fn value_of(&self, name: &str, motion: &Motion) -> Option<f64> {
+        let event = (0..self.functions()).find(|&event| self.name(event) == name)?;
+        self.values(motion).get(event).copied()
+    }
+
     /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.functions());

@@ -11,12 +11,14 @@ use super::measured::{Apart, LAST_DIGIT, Measured};
 use super::reference_run::{ReferenceRun, SavedReferenceRun, WorkBudget};
 use super::tangent::Tangent;
 use super::{CUT, DistanceMetric, HORIZON, LOST, Level, Trust};
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::clock::{Clock, still};
 use crate::run::methods::{MethodId, Stabilization};
 use crate::run::monitor::Monitor;
 use crate::run::plan::Plan;
+use crate::run::saltation::Side;
 use crate::stepping::{Statistics, StepError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -363,6 +365,35 @@ impl ErrorEstimator {
                 self.ease();
             }
         }
+    }
+
+    /// Told that an event has ended the run at a motion it was just shown, with the event's function: the
+    /// reference solution, moved to where that is zero, tells how far off the end is, as a whole.
+    pub(in crate::run) fn ended_at(&mut self, motion: &Motion, function: &dyn Fn(&Motion) -> Option<f64>) {
+        let Self { mechanism, metric, measured, reference_run: Some(reference_run), .. } = self else {
+            return;
+        };
+        let reference = &reference_run.motion;
+        if measured.lost.is_some() || reference.time != motion.time {
+            return;
+        }
+        let side = Side::new(mechanism, reference);
+        let values = &mut |motion: &Motion| Some(vec![function(motion)?]);
+        let rate = side.slope(&side.ahead(), 1.0, f64::INFINITY, values);
+        let (Some(rate), Some(value), Some(own)) = (rate, function(reference), function(motion)) else {
+            return;
+        };
+        let late = (own - value) / rate[0];
+        if !late.is_finite() {
+            return;
+        }
+        let mut there = reference.clone();
+        for (k, (omega, acceleration)) in side.omega.iter().zip(&side.acceleration).enumerate() {
+            there.phi[k] += DoubleDouble::from(late * omega);
+            there.omega[k] += DoubleDouble::from(late * acceleration);
+        }
+        measured.error = measured.error.max(metric.apart(motion, &there));
+        measured.rate = measured.rate.max(metric.rates_apart(motion, &there));
     }
 
     /// Goes on by a coarse series where only growth is still asked for: any motion nearby tells it.
