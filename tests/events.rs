@@ -379,3 +379,30 @@ fn estimates_cover_when_an_event_ends_the_run() {
         assert!(off > 1e-8 && estimate > off / 3.0 && estimate < 10.0 * off, "{name}: {off:e}, {estimate:e}");
     }
 }
+
+/// A ball that meets a wall which vibrates at 2000 rad/s shortly before the end: what the last digits of the inputs
+/// come to there is what they do to its speed.
+#[test]
+fn digits_of_the_inputs_are_counted_after_the_last_impact() {
+    let end = |velocity: f64| {
+        let text = format!(
+            r#"{{"name": "late", "gravity": [0, 0], "until": 1.2, "every": 0.3,
+            "bars": [{{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+            "walls": [{{"name": "wall", "body": "ball", "point": [0, 0], "restitution": 0.5,
+                "line": {{"through": [1, 0], "normal": [-1, 0]}},
+                "law": {{"start": 0, "rate": 0, "sines": [{{"amplitude": 0.001, "frequency": 2000, "phase": 0.4}}]}}}}],
+            "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{velocity:?}, 0]}}}}}}"#
+        );
+        let scene = parse_scene(&text, "late", &[]).expect("a scene");
+        let simulation = Simulation::new(&scene).expect("equations").method(MethodId::Taylor);
+        let outcome = simulation.tolerance(1e-12, 1e-12).trust(Level::Full).run().expect("a run");
+        assert_eq!((outcome.stop, outcome.impact_count), (None, 1));
+        (outcome.last.phi[1], outcome.trust.and_then(|trust| trust.input_error).expect("a figure"))
+    };
+    let change = 1e-9;
+    let slope = (end(1.0 + change).0 - end(1.0 - change).0) / (2.0 * change);
+    let (_, input_error) = end(1.0);
+    let expected = 1.1e-16 * slope.abs();
+    println!("{input_error:.1e} beside {expected:.1e}");
+    assert!(input_error > expected / 3.0 && input_error < 30.0 * expected, "{input_error:e}, {expected:e}");
+}

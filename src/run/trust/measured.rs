@@ -142,7 +142,7 @@ impl Measured {
         self.history = tangent.history();
         // Where the flow ended early, what inputs come to at the end is not known.
         if self.input_error.is_none() && tangent.lost().is_none() {
-            self.input_error = Some(LAST_DIGIT * tangent.reach(tangent.now()[0]));
+            self.input_error = Some(LAST_DIGIT * tangent.reach_ahead(self.until));
         }
     }
 

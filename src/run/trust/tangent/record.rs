@@ -33,6 +33,21 @@ impl Tangent {
         }
     }
 
+    /// The same up to the end of a run, which may lie in the step under way \[s\].
+    pub fn reach_ahead(&self, end: f64) -> f64 {
+        self.path.reach.max(self.moved((end - self.path.state.time.hi).max(0.0)))
+    }
+
+    /// What it comes to so much later \[s\] than the time reached.
+    fn moved(&self, later: f64) -> f64 {
+        let (f, Path { inputs, input_log, .. }) = (self.weights.len(), &self.path);
+        let square = |column: &Vec<f64>| {
+            (0..f).map(|i| ((column[i] + later * column[f + i]) * self.weights[i]).powi(2)).sum::<f64>()
+        };
+        (inputs.iter().map(square).sum::<f64>() / inputs.len() as f64).sqrt()
+            * libm::exp(input_log.min(700.0))
+    }
+
     /// Natural logarithm of the growth so far.
     pub fn growth(&self) -> f64 {
         self.path.log
@@ -103,12 +118,7 @@ impl Tangent {
 
     /// Keeps the growth at this time.
     pub(super) fn record(&mut self) {
-        let f = self.weights.len();
-        let Path { inputs, input_log, .. } = &self.path;
-        let square = |column: &Vec<f64>| (0..f).map(|i| (column[i] * self.weights[i]).powi(2)).sum::<f64>();
-        let moved = (inputs.iter().map(square).sum::<f64>() / inputs.len() as f64).sqrt()
-            * libm::exp(input_log.min(700.0));
-        self.path.reach = self.path.reach.max(moved);
+        self.path.reach = self.path.reach.max(self.moved(0.0));
         self.path.seen += 1;
         if !self.path.seen.is_multiple_of(self.path.stride) {
             return;
