@@ -94,8 +94,8 @@ fn error(larger: &Attempt, smaller: &Attempt) -> f64 {
     (share * apart + ROUNDING / smaller.change) / smaller.steepest()
 }
 
-/// What distances are looked for: for a number of a scene whose mechanism and start are these, for a run up to
-/// `until` \[s\].
+/// What distances are looked for: for a number of a scene whose mechanism and start are these, for a run
+/// up to `until` \[s\].
 pub(super) struct Search<'a> {
     pub template: &'a Template,
     pub number: (&'a Variable, f64),
