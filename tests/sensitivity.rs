@@ -562,7 +562,9 @@ fn a_spectrum_ends_where_directions_come_or_go() {
         );
         let found = lyapunov(&Template::new(text, "two".into(), &[]), None, None, &mut || false);
         let found = found.expect("a spectrum");
-        assert!(found.lost.as_ref().is_some_and(|lost| lost.contains(why)), "{:?}", found.lost);
+        let time = format!("at t = {} s", found.until);
+        let is_told = |lost: &String| lost.contains(why) && lost.ends_with(&time);
+        assert!(found.lost.as_ref().is_some_and(is_told), "{:?} beside {time}", found.lost);
         assert!(found.until > 0.1 && found.expected_sum < -0.1, "{} {}", found.until, found.expected_sum);
         assert!(found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
     };

@@ -9,9 +9,7 @@ mod properties;
 mod switched;
 mod turns;
 
-use super::Motion;
 use super::assembly::Assembly;
-use super::configuration::{Configuration, Values};
 use super::constraint::{self, ConstraintEquation, Site};
 use super::force::formula::{Driven, Formulas};
 use super::force::{Action, Spring, Torsion, UserForce, Vibration};
@@ -24,7 +22,6 @@ use super::recursive::Recursion;
 use super::tree::Tree;
 use super::units::Units;
 use crate::arithmetic::Complex;
-use crate::arithmetic::scratch::with_copies;
 use crate::scene::{Place, Scene};
 use constants::constants;
 pub(super) use constants::dense_constants;
@@ -324,21 +321,6 @@ impl Mechanism {
             }
         }
         Ok(mechanism)
-    }
-
-    /// Calls `then` with the configuration of a motion.
-    pub(crate) fn seen<R>(&self, motion: &Motion, then: impl FnOnce(&Configuration<f64>) -> R) -> R {
-        let n = motion.phi.len();
-        with_copies(Complex::ZERO, n, |z| {
-            with_copies(0.0, 2 * n, |values| {
-                let (phi, omega) = values.split_at_mut(n);
-                phi.iter_mut().zip(&motion.phi).for_each(|(to, phi)| *to = phi.hi);
-                omega.iter_mut().zip(&motion.omega).for_each(|(to, omega)| *to = omega.hi);
-                self.tree.unit_vectors::<f64, 0>(phi, z);
-                (0..n).for_each(|k| phi[k] = motion.unwrapped(k));
-                then(&Configuration::new(&Values { time: motion.time.hi, phi, z, omega }))
-            })
-        })
     }
 
     /// Finds the vibration of a rigid spring that the start gives energy to, and takes it out of the start:

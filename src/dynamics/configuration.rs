@@ -1,7 +1,8 @@
 //! Where a mechanism is at a moment, as user-defined forces and events see it.
 
 use super::constraint::Site;
-use super::{CompileError, Mechanism};
+use super::{CompileError, Mechanism, Motion};
+use crate::arithmetic::scratch::with_copies;
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 
 /// Time, angles, rates and points of a mechanism at one moment, over any scalar: plain numbers where an event
@@ -122,6 +123,21 @@ impl<S: Scalar + Over<C>, C: Real> Source<S, C> for Values<'_, S> {
 }
 
 impl Mechanism {
+    /// Calls `then` with the configuration of a motion.
+    pub(crate) fn seen<R>(&self, motion: &Motion, then: impl FnOnce(&Configuration<f64>) -> R) -> R {
+        let n = motion.phi.len();
+        with_copies(Complex::ZERO, n, |z| {
+            with_copies(0.0, 2 * n, |values| {
+                let (phi, omega) = values.split_at_mut(n);
+                phi.iter_mut().zip(&motion.phi).for_each(|(to, phi)| *to = phi.hi);
+                omega.iter_mut().zip(&motion.omega).for_each(|(to, omega)| *to = omega.hi);
+                self.tree.unit_vectors::<f64, 0>(phi, z);
+                (0..n).for_each(|k| phi[k] = motion.unwrapped(k));
+                then(&Configuration::new(&Values { time: motion.time.hi, phi, z, omega }))
+            })
+        })
+    }
+
     /// Number of the bar of this name.
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 //! on the other branch, so that no method ever steps across a corner.
 
 mod dependence;
+mod there;
 
 use super::law::{Acts, Law};
 use crate::arithmetic::Scalar;
@@ -133,13 +134,6 @@ impl<C: Decimal> Expression<C> {
 
     pub fn modes<'a>(&self, modes: &'a [bool]) -> &'a [bool] {
         modes.get(self.first..self.first + self.formula.conditions()).unwrap_or(&[])
-    }
-}
-
-impl Expression {
-    /// Its value on the branches that hold at a configuration.
-    fn there(&self, at: &Configuration<f64>, parameters: &[f64], signals: &[f64]) -> f64 {
-        self.with_values(at, parameters, signals, |values| self.formula.value(values))
     }
 }
 
@@ -412,62 +406,5 @@ impl<C: Decimal> Formulas<C> {
     fn switched(&self) -> impl Iterator<Item = &Expression<C>> {
         let laws = self.signals.iter().chain(self.acting());
         laws.chain(self.events.iter().filter(|_| C::HAS_CONSTANTS).map(|event| &event.when))
-    }
-}
-
-impl Formulas {
-    /// The modes at a configuration, by the signs of the conditions there.
-    pub fn modes(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<bool> {
-        let mut modes = Vec::with_capacity(self.conditions.len());
-        if self.conditions.is_empty() {
-            return modes;
-        }
-        self.with_signals_there(at, parameters, |signals| {
-            for expression in self.switched().filter(|expression| expression.formula.conditions() > 0) {
-                let of = |values: &[f64]| expression.formula.modes(values);
-                modes.extend(expression.with_values(at, parameters, signals, of));
-            }
-        });
-        modes
-    }
-
-    /// Calls `then` with the signals on the branches that hold at a configuration.
-    fn with_signals_there<R>(
-        &self,
-        at: &Configuration<f64>,
-        parameters: &[f64],
-        then: impl FnOnce(&[f64]) -> R,
-    ) -> R {
-        with_copies(0.0, self.signals.len(), |signals| {
-            for (number, signal) in self.signals.iter().enumerate() {
-                signals[number] = signal.there(at, parameters, &signals[..number]);
-            }
-            then(signals)
-        })
-    }
-
-    /// Appends the functions of all events.
-    pub fn event_values(&self, at: &Configuration<f64>, parameters: &[f64], all: &mut Vec<f64>) {
-        self.with_signals_there(at, parameters, |signals| {
-            all.extend(self.events.iter().map(|event| event.when.there(at, parameters, signals)));
-        });
-    }
-
-    /// The function of event number `event`.
-    pub fn event_value(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
-        self.with_signals_there(at, parameters, |signals| {
-            self.events[event].when.there(at, parameters, signals)
-        })
-    }
-
-    /// The parameters after an event.
-    pub fn set_by(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
-        let mut next = parameters.to_vec();
-        self.with_signals_there(at, parameters, |signals| {
-            for (number, expression) in &self.events[event].set {
-                next[*number] = expression.there(at, parameters, signals);
-            }
-        });
-        next
     }
 }

@@ -339,6 +339,27 @@ fn subtract(columns: &mut [Vec<f64>], from: usize, what: usize, share: f64) {
     rest[0].iter_mut().zip(&before[what]).for_each(|(entry, other)| *entry -= share * other);
 }
 
+impl Orthonormal {
+    /// Ends the columns where their directions are not those of the start any more, or volumes unknown.
+    fn check(&self, variation: &mut Variation) {
+        if variation.lost.is_some() {
+            return;
+        }
+        let why = if !variation.mechanism.held.is_empty() {
+            "a point stays on its wall, and directions are lost"
+        } else if !in_force(&variation.mechanism).eq(&self.kept) {
+            "a joint closes or opens, and there are fewer or more directions"
+        } else if variation.met_several {
+            "several walls are met at once, and volumes are not followed"
+        } else if variation.set.differ() {
+            "an event sets a number otherwise beside the motion, and volumes are not followed"
+        } else {
+            return;
+        };
+        variation.lose(why);
+    }
+}
+
 impl Look for Orthonormal {
     fn next(&self) -> Option<f64> {
         (self.next <= KEPT).then(|| self.until * self.next as f64 / KEPT as f64)
@@ -350,20 +371,14 @@ impl Look for Orthonormal {
         self.rows.push((time, self.logs.clone()));
     }
 
+    fn crossed(&mut self, variation: &mut Variation, _motion: &Motion, _time: f64) {
+        self.check(variation);
+    }
+
     fn stepped(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
+        self.check(variation);
         if variation.lost.is_some() {
             return;
-        }
-        if !variation.mechanism.held.is_empty() {
-            return variation.lose("a point stays on its wall, and directions are lost");
-        }
-        if !in_force(&variation.mechanism).eq(&self.kept) {
-            return variation.lose("a joint closes or opens, and there are fewer or more directions");
-        }
-        if variation.met_several || variation.set.differ() {
-            let why = "several walls are met at once, or an event sets a number otherwise beside it, and \
-                volumes are not followed";
-            return variation.lose(why);
         }
         self.renew(variation, motion);
         self.now = time;

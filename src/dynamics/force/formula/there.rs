@@ -1,0 +1,70 @@
+//! Formulas in doubles on the branches that hold at a configuration, by the signs of their conditions there:
+//! functions of events, what events set, and which branches a motion is on.
+
+use super::{Expression, Formulas};
+use crate::arithmetic::scratch::with_copies;
+use crate::dynamics::Configuration;
+
+impl Expression {
+    /// Its value on the branches that hold at a configuration.
+    fn there(&self, at: &Configuration<f64>, parameters: &[f64], signals: &[f64]) -> f64 {
+        self.with_values(at, parameters, signals, |values| self.formula.value(values))
+    }
+}
+
+impl Formulas {
+    /// The modes at a configuration, by the signs of the conditions there.
+    pub fn modes(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<bool> {
+        let mut modes = Vec::with_capacity(self.conditions.len());
+        if self.conditions.is_empty() {
+            return modes;
+        }
+        self.with_signals_there(at, parameters, |signals| {
+            for expression in self.switched().filter(|expression| expression.formula.conditions() > 0) {
+                let of = |values: &[f64]| expression.formula.modes(values);
+                modes.extend(expression.with_values(at, parameters, signals, of));
+            }
+        });
+        modes
+    }
+
+    /// Calls `then` with the signals on the branches that hold at a configuration.
+    fn with_signals_there<R>(
+        &self,
+        at: &Configuration<f64>,
+        parameters: &[f64],
+        then: impl FnOnce(&[f64]) -> R,
+    ) -> R {
+        with_copies(0.0, self.signals.len(), |signals| {
+            for (number, signal) in self.signals.iter().enumerate() {
+                signals[number] = signal.there(at, parameters, &signals[..number]);
+            }
+            then(signals)
+        })
+    }
+
+    /// Appends the functions of all events.
+    pub fn event_values(&self, at: &Configuration<f64>, parameters: &[f64], all: &mut Vec<f64>) {
+        self.with_signals_there(at, parameters, |signals| {
+            all.extend(self.events.iter().map(|event| event.when.there(at, parameters, signals)));
+        });
+    }
+
+    /// The function of event number `event`.
+    pub fn event_value(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> f64 {
+        self.with_signals_there(at, parameters, |signals| {
+            self.events[event].when.there(at, parameters, signals)
+        })
+    }
+
+    /// The parameters after an event.
+    pub fn set_by(&self, event: usize, at: &Configuration<f64>, parameters: &[f64]) -> Vec<f64> {
+        let mut next = parameters.to_vec();
+        self.with_signals_there(at, parameters, |signals| {
+            for (number, expression) in &self.events[event].set {
+                next[*number] = expression.there(at, parameters, signals);
+            }
+        });
+        next
+    }
+}
