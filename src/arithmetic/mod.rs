@@ -29,8 +29,8 @@ mod elementary;
 pub mod lanes;
 #[doc(hidden)]
 pub mod pairs;
+pub(crate) mod scratch;
 #[doc(hidden)]
-pub mod scratch;
 pub mod sincos;
 #[doc(hidden)]
 pub mod sum;

@@ -130,9 +130,7 @@ pub(super) fn event_value(mechanism: &Mechanism, at: SwitchFunction, motion: &Mo
     mechanism.seen(motion, |here| match at {
         SwitchFunction::Event(number) => Some(laws.formulas.event_value(number, here, &laws.parameters)),
         SwitchFunction::Condition(number) => {
-            let mut values = Vec::new();
-            laws.formulas.condition_values(here, &laws.parameters, &laws.modes, &mut values);
-            values.get(number).copied()
+            laws.formulas.condition_values(here, &laws.parameters, &laws.modes).get(number).copied()
         }
         SwitchFunction::Other => None,
     })

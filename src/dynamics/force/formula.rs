@@ -351,16 +351,37 @@ impl<C: Decimal> Formulas<C> {
         modes: &[bool],
         then: impl FnOnce(&[S]) -> R,
     ) -> R {
+        self.with_signals_by(|signal, known| signal.evaluated(at, parameters, known, modes), then)
+    }
+
+    /// The same where `value` finds a signal from those before it.
+    fn with_signals_by<S: Scalar, R>(
+        &self,
+        value: impl Fn(&Expression<C>, &[S]) -> S,
+        then: impl FnOnce(&[S]) -> R,
+    ) -> R {
         with_copies(S::ZERO, self.signals.len(), |signals| {
             for (number, signal) in self.signals.iter().enumerate() {
-                signals[number] = signal.evaluated(at, parameters, &signals[..number], modes);
+                signals[number] = value(signal, &signals[..number]);
             }
             then(signals)
         })
     }
 
-    /// Appends the values of all conditions, on the branches that `modes` say.
+    /// The values of all conditions, on the branches that `modes` say.
     pub fn condition_values<S: Scalar>(
+        &self,
+        at: &Configuration<S, C>,
+        parameters: &[C],
+        modes: &[bool],
+    ) -> Vec<S> {
+        let mut all = Vec::with_capacity(self.conditions.len());
+        self.append_condition_values(at, parameters, modes, &mut all);
+        all
+    }
+
+    /// Appends them.
+    pub fn append_condition_values<S: Scalar>(
         &self,
         at: &Configuration<S, C>,
         parameters: &[C],

@@ -118,11 +118,7 @@ impl<C: Decimal> Formulas<C> {
             UserForce::recorded(
                 owner,
                 |_| Symbol::ZERO,
-                |at, loads| {
-                    let mut values = Vec::new();
-                    self.condition_values(at, parameters, modes, &mut values);
-                    loads.torque(0, values[number]);
-                },
+                |at, loads| loads.torque(0, self.condition_values(at, parameters, modes)[number]),
             )
         };
         self.conditions.iter().enumerate().map(record).collect()

@@ -298,9 +298,9 @@ impl EventDetector {
     }
 
     /// Appends the values of the functions of events, the scene's and those from outside.
-    fn event_values(&self, at: &Configuration<f64>, all: &mut Vec<f64>) {
+    fn append_event_values(&self, at: &Configuration<f64>, all: &mut Vec<f64>) {
         if let Some(Laws { formulas, parameters, .. }) = &self.laws {
-            formulas.event_values(at, parameters, all);
+            formulas.append_event_values(at, parameters, all);
         }
         all.extend(self.events.iter().map(|event| event.value(at)));
     }
@@ -312,7 +312,7 @@ impl EventDetector {
         let has_begun = self.memory.last.iter().any(|(_, t)| *t == after.time);
         let [before, after] = [before, after].map(|motion| {
             let mut values = Vec::new();
-            self.mechanism.seen(motion, |at| self.event_values(at, &mut values));
+            self.mechanism.seen(motion, |at| self.append_event_values(at, &mut values));
             values
         });
         let EventMemory { largest, resting, due, .. } = &mut self.memory;
@@ -335,9 +335,7 @@ impl EventDetector {
     pub fn conditions_at_zero(&self, [before, after]: [&Motion; 2], set: &[f64]) -> Vec<bool> {
         let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Vec::new() };
         let values = |motion: &Motion, parameters: &[f64]| {
-            let mut values = Vec::new();
-            self.mechanism.seen(motion, |at| formulas.condition_values(at, parameters, modes, &mut values));
-            values
+            self.mechanism.seen(motion, |at| formulas.condition_values(at, parameters, modes))
         };
         let largest = self.memory.largest.iter().skip(self.of_the_scene() + self.events.len());
         let values = values(before, parameters).into_iter().zip(values(after, set));
@@ -380,9 +378,9 @@ impl EventDetector {
     /// Appends them.
     pub(super) fn append_values(&self, motion: &Motion, values: &mut Vec<f64>) {
         self.mechanism.seen(motion, |at| {
-            self.event_values(at, values);
+            self.append_event_values(at, values);
             if let Some(Laws { formulas, parameters, modes }) = &self.laws {
-                formulas.condition_values(at, parameters, modes, values);
+                formulas.append_condition_values(at, parameters, modes, values);
             }
         });
         values.extend(self.friction.iter().flat_map(|watch| watch.values(motion)));

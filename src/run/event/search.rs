@@ -107,10 +107,10 @@ impl EventDetector {
         };
         let Interpolants { curves, values, nodes: Nodes { places, .. }, .. } =
             interpolated(&DEGREES, at, |event, curve, _| is_enough(event, curve));
-        let of_event =
+        let is_resolved =
             |(event, curve): (usize, &Chebyshev)| is_enough(event, curve) || !curve.most().is_finite();
-        let are_known: Vec<bool> = curves.iter().enumerate().map(of_event).collect();
-        if are_known.contains(&false) && depth < HALVINGS {
+        let are_resolved: Vec<bool> = curves.iter().enumerate().map(is_resolved).collect();
+        if are_resolved.contains(&false) && depth < HALVINGS {
             self.passages(inside, begin, 0.5 * span, depth + 1, all);
             return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
         }
@@ -119,7 +119,7 @@ impl EventDetector {
             if self.memory.resting.contains(&event) {
                 continue;
             }
-            let is_resolved = are_known[event];
+            let is_resolved = are_resolved[event];
             let part = Part { begin, span, curve, values: &values[event], places, is_resolved, is_last };
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),

@@ -18,8 +18,8 @@ pub(in crate::run) struct Level<T> {
 
 /// Derivatives of some functions by one difference, and what rounding leaves of them.
 pub(in crate::run) struct Difference {
-    pub slopes: Vec<f64>,
-    pub rounding: Vec<f64>,
+    slopes: Vec<f64>,
+    rounding: Vec<f64>,
 }
 
 impl Difference {

@@ -2,7 +2,6 @@
 //! functions of events, what events set, and which branches a motion is on.
 
 use super::{Expression, Formulas};
-use crate::arithmetic::scratch::with_copies;
 use crate::dynamics::Configuration;
 
 impl Expression {
@@ -35,16 +34,11 @@ impl Formulas {
         parameters: &[f64],
         then: impl FnOnce(&[f64]) -> R,
     ) -> R {
-        with_copies(0.0, self.signals.len(), |signals| {
-            for (number, signal) in self.signals.iter().enumerate() {
-                signals[number] = signal.there(at, parameters, &signals[..number]);
-            }
-            then(signals)
-        })
+        self.with_signals_by(|signal, known| signal.there(at, parameters, known), then)
     }
 
     /// Appends the functions of all events.
-    pub fn event_values(&self, at: &Configuration<f64>, parameters: &[f64], all: &mut Vec<f64>) {
+    pub fn append_event_values(&self, at: &Configuration<f64>, parameters: &[f64], all: &mut Vec<f64>) {
         self.with_signals_there(at, parameters, |signals| {
             all.extend(self.events.iter().map(|event| event.when.there(at, parameters, signals)));
         });
