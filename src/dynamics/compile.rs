@@ -331,8 +331,7 @@ impl Mechanism {
             return Ok(());
         }
         let given = self.start_with_vibration(scene);
-        let phi: Vec<f64> = given.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = given.omega.iter().map(|omega| omega.hi).collect();
+        let [phi, omega] = given.rounded();
         let mut z = vec![Complex::ZERO; phi.len()];
         self.tree.unit_vectors::<f64, 0>(&phi, &mut z);
         let scale = self.scale_of_energy(&self.start(scene));

@@ -56,8 +56,7 @@ pub(super) fn moment<T: Real>(t: Time) -> T {
 impl Mechanism {
     /// Magnitudes of the forces from outside at a motion, times `size` \[m\], and of their torques \[J\].
     pub(super) fn forces_at_start(&self, start: &Motion, size: f64) -> f64 {
-        let [phi, omega] = [&start.phi, &start.omega]
-            .map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+        let [phi, omega] = start.rounded();
         let z = self.elements(&phi);
         let magnitudes = self
             .forces

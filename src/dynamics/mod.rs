@@ -408,6 +408,11 @@ impl Motion {
         }
     }
 
+    /// Coordinates \[rad, m\] and rates \[rad/s, m/s\] in plain doubles.
+    pub(crate) fn rounded(&self) -> [Vec<f64>; 2] {
+        [&self.phi, &self.omega].map(|all| all.iter().map(|x| x.hi).collect())
+    }
+
     /// The winding angle of a body \[rad\].
     pub fn unwrapped(&self, body: usize) -> f64 {
         angle::unwrapped(self.phi[body], self.turns[body])

@@ -72,8 +72,7 @@ impl Stiffness {
     pub fn at_start(mechanism: &Mechanism, start: &Motion) -> Option<Self> {
         let has_any =
             !mechanism.springs.is_empty() || !mechanism.torsions.is_empty() || !mechanism.forces.is_empty();
-        let [phi, omega] = [&start.phi, &start.omega]
-            .map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+        let [phi, omega] = start.rounded();
         has_any.then(|| Self::at(mechanism, start.time, &phi, &omega))
     }
 
@@ -287,8 +286,7 @@ mod tests {
     fn measured(scene: &Scene) -> Stiffness {
         let mechanism = Mechanism::new(scene).expect("equations");
         let start = mechanism.start(scene);
-        let [phi, omega] =
-            [&start.phi, &start.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+        let [phi, omega] = start.rounded();
         Stiffness::at(&mechanism, start.time, &phi, &omega)
     }
 

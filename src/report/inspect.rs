@@ -134,8 +134,7 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
 /// Looks at a moment of a motion; the mechanism is the one of that moment, as
 /// [`Running::mechanism`](crate::run::Running::mechanism) gives it.
 pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
-    let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
-    let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
+    let [phi, omega] = start.rounded();
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
     mechanism.spread_multipliers(&mut kernel);

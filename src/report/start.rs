@@ -13,7 +13,7 @@ use crate::scene::Scene;
 /// Drawing fails.
 pub fn chart(scene: &Scene, mechanism: &Mechanism) -> Result<Picture, ChartError> {
     let start = mechanism.start(scene);
-    let [phi, omega] = [&start.phi, &start.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+    let [phi, omega] = start.rounded();
     drawn(scene, mechanism, &phi, &omega, "Start", Vec::new())
 }
 

@@ -6,7 +6,6 @@
 
 use super::contact::ContactDriver;
 use super::running::Outcome;
-use super::saltation::plain;
 use crate::arithmetic::Complex;
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::friction::modes::{HINT, JAMS, Modes};
@@ -111,7 +110,7 @@ impl FrictionWatch {
     /// begins, and everywhere where it is near zero.
     pub fn values(&self, motion: &Motion) -> Vec<f64> {
         let mechanism = &*self.mechanism;
-        let [phi, omega] = plain(motion);
+        let [phi, omega] = motion.rounded();
         let is_sticking = mechanism.sticking() > 0;
         if let Some(regularity) = self.regularity.get() {
             let mut values = self.sliding(motion.time, &phi, &omega);
@@ -155,7 +154,7 @@ impl FrictionWatch {
             kernel.accelerate::<0>(mechanism, time, phi, omega, Bias::default());
             (kernel.friction_forces(mechanism, time, phi, omega)[place][0], kernel.load.clone())
         };
-        let [mut phi, mut omega] = plain(motion);
+        let [mut phi, mut omega] = motion.rounded();
         let (now, accelerations) = force(motion.time, &phi, &omega);
         let h = A_MOMENT * mechanism.units.time;
         for ((phi, omega), acceleration) in phi.iter_mut().zip(&mut omega).zip(accelerations) {
@@ -204,7 +203,7 @@ impl ContactDriver {
             return Ok((staying, Vec::new()));
         }
         let motion = self.motion();
-        let [phi, omega] = plain(&motion);
+        let [phi, omega] = motion.rounded();
         let z: Vec<Complex<f64>> = self.free.elements(&phi);
         let at = Moment { t: motion.time, phi: &phi, z: &z, omega: &omega };
         let found = self.free.modes_at(at, &self.mechanism.modes, [&staying, touching], transition);

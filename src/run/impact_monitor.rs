@@ -84,7 +84,7 @@ pub(super) fn check(
 ) -> Result<(), String> {
     unmoved(mechanism, UNMOVED, before, after)?;
     let contact = &mechanism.contacts[claim.contact];
-    let phi: Vec<f64> = before.phi.iter().map(|phi| phi.hi).collect();
+    let [phi, _] = before.rounded();
     let (gap, rounding) = gap(contact, mechanism.bodies.len(), before.time.hi, &phi);
     if beyond(gap.abs(), closed(tolerance) + rounding) {
         return Err(format!("the point is {:.2e} m from the wall at the impact", gap * contact.length));
@@ -214,8 +214,7 @@ fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
 impl Contact {
     /// Velocity of the point along the normal, seen from the wall, and that of the wall \[m/s\].
     fn normal_velocity(&self, t: f64, z: &[Complex<DoubleDouble>], motion: &Motion) -> (f64, f64) {
-        let [phi, omega] =
-            [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+        let [phi, omega] = motion.rounded();
         let plain = elements(self.angles(), &phi);
         let own = self.travel_rate(Time::of(t), &phi, &plain, &omega).unwrap_or(0.0);
         (self.velocity(self.normal, z, &motion.omega).hi - own, own)

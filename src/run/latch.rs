@@ -116,7 +116,7 @@ pub(super) fn modes(mechanism: &Mechanism, modes: &[Mode], held: &[usize]) -> Ve
 
 /// Refuses walls that are switched on, or moved at once, in front of their points.
 fn behind([before, after]: [&Mechanism; 2], motion: &Motion) -> Result<(), (String, &'static str)> {
-    let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
+    let [phi, _] = motion.rounded();
     let changed = before.contacts.iter().zip(&after.contacts).filter(|(before, after)| {
         !after.is_off
             && (before.is_off || (&before.row.law, &before.row.aim) != (&after.row.law, &after.row.aim))
@@ -138,7 +138,7 @@ fn behind([before, after]: [&Mechanism; 2], motion: &Motion) -> Result<(), (Stri
 
 /// C of every row \[rad, m\].
 fn residuals(mechanism: &Mechanism, motion: &Motion) -> Vec<f64> {
-    let [phi, omega] = [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+    let [phi, omega] = motion.rounded();
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.linearise_at::<0>(mechanism, motion.time, &phi, &omega);
     kernel.rows.iter().map(|row| row.position).collect()
@@ -146,7 +146,7 @@ fn residuals(mechanism: &Mechanism, motion: &Motion) -> Vec<f64> {
 
 /// Rates after all rows have taken hold, their impulses, and the work of motors and walls \[J\].
 pub(super) fn plastic(mechanism: &Mechanism, motion: &Motion) -> Option<(Vec<f64>, Vec<f64>, f64)> {
-    let [phi, omega] = [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+    let [phi, omega] = motion.rounded();
     let metric = Metric::at(mechanism, motion.time, &phi, &omega)?;
     let before = metric.velocity(&omega);
     let change = metric.kept(&before) - &before;

@@ -193,7 +193,7 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
         }
     }
     let start = mechanism.start(scene);
-    let first: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+    let [first, _] = start.rounded();
     let others = mechanism.other_assemblies(scene, starts);
     let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST) } else { Vec::new() };
     let mut search = Search::new(mechanism, [&first].into_iter().chain(&others).chain(&more));

@@ -24,7 +24,7 @@ mod side;
 mod together;
 
 pub(super) use finer::{Difference, Level, agreeing};
-pub(super) use side::{Side, plain};
+pub(super) use side::Side;
 
 use super::contact::{Flight, Jump, Switch, come_to_rest};
 use super::event::SwitchFunction;
@@ -372,7 +372,7 @@ fn strike(
 ) -> Result<(), String> {
     let side = Side::resting(before);
     let rates = |of: &Arc<Mechanism>, motion: &Motion| {
-        let [phi, omega] = plain(motion);
+        let [phi, omega] = motion.rounded();
         let impact = striking(of, &mechanism.held).impact_at(contact, motion.time, &phi, &omega);
         impact.map(|impact| impact.omega)
     };

@@ -198,7 +198,7 @@ impl Mechanism {
                 return Err(CompileError::SpringWithoutLength(spring.name.clone()));
             }
         }
-        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+        let [phi, _] = start.rounded();
         let plain: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
         for contact in self.contacts.iter().filter(|contact| !scene.is_inactive(&contact.row.name)) {
             let travel = contact.travel(start.time, &phi, &plain).unwrap_or(0.0);

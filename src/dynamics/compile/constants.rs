@@ -72,7 +72,7 @@ impl Mechanism {
     /// The mass matrix at the start must be positive definite.
     pub(super) fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
         let start = self.start(scene);
-        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+        let [phi, _] = start.rounded();
         let mut kernel = Kernel::<f64>::new(self);
         kernel.unit_vectors::<0>(self, &phi);
         kernel.mass_matrix::<0>(self);

@@ -32,8 +32,7 @@ impl Mechanism {
         let mut z = vec![Complex::ZERO; self.coordinates()];
         self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
         let z: Vec<Complex<f64>> = z.iter().map(|z| Complex::new(z.re.hi, z.im.hi)).collect();
-        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
+        let [phi, omega] = start.rounded();
         let own: Vec<f64> = self
             .contacts
             .iter()

@@ -222,8 +222,7 @@ impl Mechanism {
         if self.frictions.is_empty() {
             return None;
         }
-        let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
-        let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
+        let [phi, omega] = start.rounded();
         let z = self.elements(&phi);
         let is_still = |contact: &usize| {
             let contact = &self.contacts[*contact];

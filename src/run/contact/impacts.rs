@@ -362,13 +362,8 @@ impl ContactDriver {
     /// The present motion in doubles.
     pub(super) fn present_state(&mut self) -> PresentState {
         let motion = self.motion();
-        let phi: Vec<f64> = motion.phi.iter().map(|phi| phi.hi).collect();
-        PresentState {
-            t: motion.time,
-            z: self.free.elements(&phi),
-            omega: motion.omega.iter().map(|omega| omega.hi).collect(),
-            phi,
-        }
+        let [phi, omega] = motion.rounded();
+        PresentState { t: motion.time, z: self.free.elements(&phi), omega, phi }
     }
 }
 

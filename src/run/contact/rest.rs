@@ -17,7 +17,6 @@
 //! ```
 
 use super::super::running::Outcome;
-use super::super::saltation::plain;
 use super::{ContactDriver, NO_SPEED};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::Posture;
@@ -45,7 +44,7 @@ struct Course {
 
 impl Course {
     fn of(mechanism: &Mechanism, motion: &Motion) -> Self {
-        let [phi, omega] = plain(motion);
+        let [phi, omega] = motion.rounded();
         let mut kernel = Kernel::<f64>::new(mechanism);
         kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
         let (power, _) = kernel.powers(mechanism, motion.time, &phi, &omega);
@@ -62,7 +61,7 @@ impl Flight {
 
     /// Those of one wall beside others.
     fn new(held: &Mechanism, contact: usize, motion: &Motion) -> Option<Self> {
-        let [phi, omega] = plain(motion);
+        let [phi, omega] = motion.rounded();
         let z = held.elements(&phi);
         let wall = &held.contacts[contact];
         let speed = wall.gap_rate(motion.time, &phi, &z, &omega);
@@ -99,7 +98,7 @@ pub(in crate::run) fn come_to_rest(
     if flights.is_empty() && !held.sliding().any(|(friction, _)| is_new(friction.normal)) {
         return Some(());
     }
-    let [phi, omega] = plain(motion);
+    let [phi, omega] = motion.rounded();
     let t = motion.time;
     let close = |omega: &[f64]| held.without_normal_rates(t, &phi, omega);
     let closed = close(&omega)?;

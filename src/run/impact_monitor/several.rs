@@ -21,7 +21,7 @@ pub(in crate::run) fn check_several(
     energy_lost: f64,
 ) -> Result<(), String> {
     unmoved(mechanism, UNMOVED, before, after)?;
-    let phi: Vec<f64> = before.phi.iter().map(|phi| phi.hi).collect();
+    let [phi, _] = before.rounded();
     let [drift, slip] = slips(mechanism, before, after)?;
     if beyond(slip, AGREES.max(2.0 * drift)) {
         return Err(format!("another constraint slips by {slip:.2e} of its speed after the impact"));

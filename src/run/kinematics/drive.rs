@@ -256,7 +256,7 @@ fn find(scene: &mut Scene, drive: &Drive) -> Result<(Slot, f64, f64), Kinematics
 
 /// The travel of a slider at the start \[m\].
 fn travel(scene: &Scene, mechanism: &Mechanism, start: &Motion, slider: usize) -> f64 {
-    let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
+    let [phi, _] = start.rounded();
     let (z, translations) = mechanism.pose(&phi);
     let slider = &scene.sliders[slider];
     let [point, foot] =

@@ -118,7 +118,7 @@ pub fn periodic(
     }
     let mechanism = &Arc::new(mechanism.without_events());
     let start = mechanism.start(scene);
-    let first = [&start.phi, &start.omega].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+    let first = start.rounded();
     let mut local = Local::new(mechanism);
     let period = match period {
         Some(period) => period,

@@ -58,8 +58,7 @@ pub(super) fn fixed_step(
 /// lightest part, gravity, springs and motors.
 pub(super) fn fastest_rate(scene: &Scene, mechanism: &Mechanism) -> f64 {
     let start = mechanism.start(scene);
-    let phi: Vec<f64> = start.phi.iter().map(|phi| phi.hi).collect();
-    let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
+    let [phi, omega] = start.rounded();
     let mut kernel = Kernel::<f64>::new(mechanism);
     let energy = mechanism.energy(&mut kernel, &phi, &omega);
     kernel.factor::<0>(mechanism, &omega);

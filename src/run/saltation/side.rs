@@ -20,11 +20,6 @@ pub(in crate::run) struct Side {
     pub acceleration: Vec<f64>,
 }
 
-/// Coordinates and rates in plain doubles.
-pub(in crate::run) fn plain(motion: &Motion) -> [Vec<f64>; 2] {
-    [&motion.phi, &motion.omega].map(|all| all.iter().map(|x| x.hi).collect())
-}
-
 /// Finer differences are each by this factor shorter than the one before, as many at most.
 const FINER: f64 = 1.0 / 8.0;
 const LEVELS: usize = 6;
@@ -40,7 +35,7 @@ impl Side {
 
     /// The same without accelerations.
     pub fn resting(motion: &Motion) -> Self {
-        let [phi, omega] = plain(motion);
+        let [phi, omega] = motion.rounded();
         Self { motion: motion.clone(), acceleration: Vec::new(), phi, omega }
     }
 

@@ -43,7 +43,7 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
     walls.sort_unstable();
     walls.dedup();
     let moment = Moment { mechanism, before: &first.before, walls: &walls };
-    let after: Vec<f64> = last.after.omega.iter().map(|omega| omega.hi).collect();
+    let [_, after] = last.after.rounded();
     let mut passed = Passed::default();
     let side = Side::new(moment.mechanism, moment.before);
     for (wall, gradient, approach) in moment.met(&side) {

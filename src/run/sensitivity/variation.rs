@@ -29,7 +29,7 @@ use crate::dynamics::kernel::Bias;
 use crate::dynamics::{Mechanism, Motion, State, Time};
 use crate::run::driver::Pause;
 use crate::run::running::Outcome;
-use crate::run::saltation::{self, set_by_events};
+use crate::run::saltation::set_by_events;
 use crate::stepping::StepError;
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -352,7 +352,7 @@ impl Variation {
 
 /// Time, coordinates and rates in plain doubles.
 pub(super) fn plain(motion: &Motion) -> (Time, Vec<f64>, Vec<f64>) {
-    let [phi, omega] = saltation::plain(motion);
+    let [phi, omega] = motion.rounded();
     (motion.time, phi, omega)
 }
 
