@@ -554,6 +554,31 @@ fn walls_and_dry_friction_have_their_forces() {
     assert!((friction.min[0] + 0.2 * weight).abs() < 1e-11 && friction.max[0].abs() < 1e-11, "{friction:?}");
 }
 
+/// A ball falls from 5 m in 1 s, comes off at half its speed, and that event ends the run: no step follows in
+/// which the outputs after the impact are seen.
+#[test]
+fn extremes_have_the_jump_that_ends_a_run() {
+    let text = r#"{"name": "ball", "gravity": [0, -10], "until": 3, "every": 0.1,
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1}],
+        "points": [{"name": "p", "body": "b", "point": [0, 0]}],
+        "walls": [{"name": "W", "body": "b", "point": [0, 0], "restitution": 0.5,
+         "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "events": [{"name": "up", "when": "p.vy", "direction": "rising", "action": "stop"}],
+        "outputs": {"v": "p.vy", "k": "p.vy^2"},
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 5], "velocity": [0, 0]}}}"#;
+    let scene = parse_scene(text, "ball", &[]).expect("a scene");
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = run(&scene, &adaptive(method, 1e-10));
+        assert_eq!(outcome.ended_by.as_deref(), Some("up"), "{method}");
+        let v = found(&outcome.extremes, "v");
+        assert!((v.max[0] - 5.0).abs() < 1e-7 && (v.min[0] + 10.0).abs() < 1e-7, "{method}: {v:?}");
+        assert!(v.max[1] == outcome.last.t && (v.max[1] - 1.0).abs() < 1e-7, "{method}: {v:?}");
+        // Over 1 s: -10 t and (10 t)².
+        assert!((v.mean + 5.0).abs() < 1e-7, "{method}: {v:?}");
+        assert!((found(&outcome.extremes, "k").mean - 100.0 / 3.0).abs() < 1e-6, "{method}");
+    }
+}
+
 #[test]
 fn an_absolute_value_of_zero_has_no_sign() {
     let scene = with(crate::common::free(), &["abs(bar1.vx)", "-abs(bar2.omega)"]);

@@ -56,6 +56,10 @@ impl ContactDriver {
         match action {
             Action::Record => Ok(()),
             Action::Stop => {
+                let motion = self.motion();
+                if let Some(extremes) = &mut self.extremes {
+                    extremes.end(&motion);
+                }
                 self.ended_by = Some(name);
                 Ok(())
             }
@@ -201,8 +205,7 @@ impl ContactDriver {
 /// Whether a point that is held is on its wall and moves with it; no longer where a corner or a parameter of
 /// the wall's law has moved it.
 fn stays(free: &Mechanism, contact: usize, motion: &Motion) -> bool {
-    let [phi, omega] =
-        [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+    let [phi, omega] = motion.rounded();
     let (contact, z) = (&free.contacts[contact], free.elements(&phi));
     if !contact.row.moves() {
         return true;
@@ -214,8 +217,7 @@ fn stays(free: &Mechanism, contact: usize, motion: &Motion) -> bool {
 
 /// The constraint that a motion does not satisfy.
 fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
-    let [phi, omega] =
-        [&motion.phi, &motion.omega].map(|values| values.iter().map(|value| value.hi).collect::<Vec<f64>>());
+    let [phi, omega] = motion.rounded();
     if phi.iter().chain(&omega).any(|x| !x.is_finite()) {
         return Some("gives numbers that are not finite".into());
     }

@@ -7,7 +7,7 @@
 //! interpolation of the motion.
 
 use super::inside::{Inside, StepWatcher};
-use super::magnitude::changes;
+use super::magnitude::{changes, last_digits};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
@@ -35,12 +35,16 @@ const PASSED: f64 = 1e-8;
 /// Part of what an output changes by in one unit of a coordinate or rate that is rounding: what is no more
 /// stays at zero.
 const ROUNDING: f64 = 1e-13;
+/// What the last digits of coordinates and rates do to an output, so many times, is rounding as well.
+const DIGITS: f64 = 16.0;
 /// Variation up to which an output is constant, over its size.
 const CONSTANT: f64 = 1e-14;
 /// Steps until the next one is tried to be passed over, after one that was not.
 const WAITS: u8 = 1;
 /// Halvings of a step that no interpolant resolves: an output may have corners.
 const HALVINGS: u32 = 6;
+/// Of these the first ones, in whose halves it is asked whether it may be rounding instead.
+const DOUBTS: u32 = 2;
 /// Halvings of the bracket of an extreme, and golden sections of one beside a corner.
 const ROUNDS: usize = 48;
 
@@ -260,6 +264,34 @@ impl ExtremesDetector {
         true
     }
 
+    /// Looks for what is rounding where no interpolant resolves the outputs; true where there is much more
+    /// than was known.
+    fn has_more_rounding(&mut self, inside: &mut dyn Inside, t: Time) -> bool {
+        let found = last_digits(inside.at(t), |motion| {
+            let mut values = Vec::new();
+            self.values(motion, &mut values);
+            values
+        });
+        let mut is_more = false;
+        for (rounding, found) in self.memory.rounding.iter_mut().zip(found) {
+            let found = DIGITS * found;
+            if found.is_finite() && found > 2.0 * *rounding {
+                (*rounding, is_more) = (found, true);
+            }
+        }
+        is_more
+    }
+
+    /// Takes the outputs at the end of a run, where a jump has made the event that ends it happen: no step
+    /// follows.
+    pub fn end(&mut self, motion: &Motion) {
+        let mut values = Vec::new();
+        self.values(motion, &mut values);
+        for (found, value) in self.memory.found.iter_mut().zip(values) {
+            found.see(value, motion.time.hi);
+        }
+    }
+
     fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
         let rounding = self.memory.rounding.clone();
         let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
@@ -269,6 +301,9 @@ impl ExtremesDetector {
             tail <= (RESOLVED * size).max(rounding[k]) || tail <= NOISE * size && is_noise
         };
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
+        if !is_resolved && depth <= DOUBTS && self.has_more_rounding(inside, begin + 0.5 * span) {
+            return self.look(inside, begin, span, depth);
+        }
         if !is_resolved && depth < HALVINGS {
             self.look(inside, begin, 0.5 * span, depth + 1);
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
@@ -379,48 +414,4 @@ impl StepWatcher for ExtremesDetector {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::dynamics::Mechanism;
-    use crate::scene::parse_scene;
-
-    /// A bar at rest but for rounding, and how often it was looked at.
-    struct Resting(Motion, usize);
-
-    impl Inside for Resting {
-        fn span(&self) -> (Time, Time) {
-            (Time::from(0.0), Time::from(1.0))
-        }
-
-        fn at(&mut self, time: Time) -> &Motion {
-            self.0.time = time;
-            self.0.phi[0] = DoubleDouble::from(1e-17 * libm::sin(1e6 * time.hi));
-            self.1 += 1;
-            &self.0
-        }
-
-        fn roughly_at(&mut self, time: Time) -> &Motion {
-            self.at(time)
-        }
-    }
-
-    /// No interpolant resolves it, nor halves of the step, of which there were 64 with 33 points each.
-    #[test]
-    fn rounding_of_an_output_is_not_looked_into() {
-        let text = r#"{"name": "bar", "gravity": [0, 0], "outputs": {"one": "b.sin"},
-            "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
-            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b",
-             "point": [0, 0]}]}],
-            "start": {"b": {"phi": 0, "omega": 0}}, "until": 1, "every": 1}"#;
-        let scene = parse_scene(text, "scene", &[]).expect("a scene");
-        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
-        let mut detector = ExtremesDetector::new(&mechanism).expect("an output");
-        let mut inside = Resting(mechanism.start(&scene), 0);
-        for _ in 0..4 {
-            detector.step(&mut inside);
-        }
-        assert!(inside.1 < 100, "{} looks", inside.1);
-        let found = &detector.extremes()[0];
-        assert!(found.max[0] <= 1e-17 && found.min[0] >= -1e-17 && found.rms <= 1e-17, "{found:?}");
-    }
-}
+mod tests;

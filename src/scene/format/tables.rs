@@ -251,7 +251,7 @@ pub(in crate::scene) static EVENT: Table = Table {
             "action",
             Shape::Word(&["record", "stop"]),
             "\"stop\"",
-            "\"stop\" ends the run there; \"record\" if absent.",
+            "\"stop\" ends the run there, and the event switches and sets nothing; \"record\" if absent.",
         ),
         optional("on", Shape::Names, "[\"latch\"]", "Parts that act from then on; none if absent."),
         optional(
