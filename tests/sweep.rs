@@ -951,3 +951,37 @@ mod command {
         assert_eq!(program.files(), ["free.json", "wall.json"]);
     }
 }
+
+/// A body on a spring of no length in its centre turns evenly, to the last digit, and goes on an ellipse: what is off is
+/// its position alone.
+#[test]
+fn estimates_of_points_in_lanes_count_positions() {
+    let text = r#"{"name": "ellipse", "gravity": [0, 0], "until": 20, "every": 20,
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 2}],
+        "springs": [{"name": "K", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}],
+                     "stiffness": 36, "free_length": 0}],
+        "start": {"b": {"phi": 0.3, "omega": 1, "origin": [1, 0], "velocity": [0, 3]}}}"#;
+    let template = Template::new(text.into(), "ellipse".into(), &[]);
+    for tolerance in [1e-4, 1e-7] {
+        let request = Request {
+            method: Some("taylor".parse().expect("a method")),
+            rtol: Some(tolerance),
+            ..Request::default()
+        };
+        let vary = vec!["bars.b.mass=1..4:8".parse().expect("a range")];
+        let plan = Sweep::new(&template, vary, &request).expect("a sweep").trusted(Level::Auto);
+        let mut count = 0;
+        sweep(&plan, 1, &mut |point: &Point| {
+            let w = f64::sqrt(36.0 / point.values[0]);
+            let (s, c) = (w * 20.0).sin_cos();
+            let off = (point.phi[1] - c).abs().max((point.phi[2] - 3.0 / w * s).abs()) / 2.0;
+            let estimate = point.trust.as_ref().and_then(|trust| trust.error).expect("an estimate");
+            println!("{tolerance:e}: off by {off:.1e}, estimate {estimate:.1e}");
+            assert!(estimate > off / 3.0 && estimate < 10.0 * off + 1e-13, "{off:e}, {estimate:e}");
+            count += 1;
+            Ok(())
+        })
+        .expect("all points");
+        assert_eq!(count, 8);
+    }
+}

@@ -9,13 +9,11 @@
 use super::ensemble::Ensemble;
 use super::point::Ready;
 use super::watching::Watching;
-use crate::arithmetic::{DoubleDouble, Scalar};
-use crate::dynamics::{State, Time};
-use crate::run::drift::larger;
+use crate::dynamics::{Motion, Time};
 use crate::run::plan::Plan;
-use crate::run::trust::{CAUTION, HORIZON, LEAST, Trust, crossing};
+use crate::run::trust::{CAUTION, DistanceMetric, HORIZON, LEAST, Trust, crossing};
 use crate::stepping::Tolerance;
-use crate::stepping::taylor::batch::{Batch, BatchMember, Going};
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going, read};
 
 /// Tolerance of the second integration over that of the first, its least, and its order.
 const FINER: f64 = 100.0;
@@ -25,8 +23,8 @@ const ORDER: usize = 24;
 /// How far a point may be trusted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointTrust {
-    /// The largest error of an angle \[rad\] up to the end, or up to the horizon; `None` where it is not
-    /// known.
+    /// The largest error of an angle \[rad\], or of a position over the longest bar, up to the end or the
+    /// horizon; `None` where it is not known.
     pub error: Option<f64>,
     /// The first time it passes 1e-3 rad \[s\].
     pub horizon: Option<f64>,
@@ -48,7 +46,7 @@ impl From<&Trust> for PointTrust {
 /// What is known of a lane.
 #[derive(Clone, Default)]
 struct Known {
-    /// The time looked at last \[s\], and the largest difference so far \[rad\].
+    /// The time looked at last \[s\], and the largest difference so far \[rad, or positions over the size\].
     last: [f64; 2],
     horizon: Option<f64>,
     is_lost: bool,
@@ -59,6 +57,8 @@ pub(super) struct Judge<'a> {
     ensemble: Ensemble,
     members: Vec<BatchMember<'a>>,
     known: Vec<Known>,
+    /// Room for a motion of both.
+    motions: [Motion; 2],
 }
 
 impl<'a> Judge<'a> {
@@ -76,23 +76,24 @@ impl<'a> Judge<'a> {
             ),
             members: ready.iter().map(|ready| ready.member(2)).collect(),
             known: vec![Known::default(); ready.len()],
+            motions: Default::default(),
         }
     }
 
     /// Goes on to an output time, and compares all points: at their ends, where these come before it.
     pub(super) fn integrate(&mut self, points: &[BatchMember], until: Time) {
-        let Self { ensemble, members, known } = self;
+        let Self { ensemble, members, known, motions } = self;
         for (number, point) in points.iter().enumerate() {
             if point.state.time < until {
                 let member = &mut members[number..=number];
                 ensemble.integrate(number, member, point.state.time, &mut |_, _| Going::On);
-                known[number].take(&point.state, &members[number]);
+                known[number].take(point, &members[number], motions);
             }
         }
         ensemble.integrate(0, members, until, &mut |_, _| Going::On);
         for ((point, member), known) in points.iter().zip(members).zip(known) {
             if point.state.time >= until {
-                known.take(&point.state, member);
+                known.take(point, member, motions);
             }
         }
     }
@@ -111,20 +112,19 @@ impl<'a> Judge<'a> {
 }
 
 impl Known {
-    fn take(&mut self, point: &State, finer: &BatchMember) {
-        let difference = |k: usize| {
-            let turns = point.turns[k].wrapping_sub(finer.state.turns[k]) as f64;
-            (point.unknown(k) - finer.state.unknown(k) + DoubleDouble::TAU.scale(turns)).hi
-        };
-        let apart = (0..point.turns.len()).fold(0.0, |most, k| larger(most, difference(k).abs()));
+    fn take(&mut self, point: &BatchMember, finer: &BatchMember, motions: &mut [Motion; 2]) {
+        for (motion, member) in motions.iter_mut().zip([point, finer]) {
+            read(member.mechanism, &member.state, motion);
+        }
+        let apart = DistanceMetric::new(point.mechanism).apart(&motions[0], &motions[1]);
         let [t, error] = self.last;
         if finer.stopped.is_some() || !apart.is_finite() {
             self.is_lost = true;
         } else if !self.is_lost {
             if apart > HORIZON && self.horizon.is_none() {
-                self.horizon = Some(crossing([t, error], [point.time.hi, apart]));
+                self.horizon = Some(crossing([t, error], [point.state.time.hi, apart]));
             }
-            self.last = [point.time.hi, error.max(apart)];
+            self.last = [point.state.time.hi, error.max(apart)];
         }
     }
 }

@@ -43,6 +43,8 @@ const LOOKS_INSIDE: f64 = 200.0;
 const MOST_OWN_ERROR: f64 = 2.0;
 /// Share of the budget for double-double, after which doubles go on, of runs near rounding.
 const NEAR_ROUNDING: f64 = 0.5;
+/// What an event's function may be off zero where it ends a run, over its rate, in units of time.
+const AT_ZERO: f64 = 1e-4;
 
 /// A reference solution, and what it has measured so far.
 pub(in crate::run) struct ErrorEstimator {
@@ -101,8 +103,7 @@ impl Torques {
     fn apart(&mut self, mechanism: &Mechanism, motions: [&Motion; 2]) -> [f64; 2] {
         let Self { kernel, of } = self;
         for (torques, motion) in of.iter_mut().zip(motions) {
-            let [phi, omega] = [&motion.phi, &motion.omega]
-                .map(|values| values.iter().map(|value| value.hi).collect::<Vec<_>>());
+            let [phi, omega] = motion.rounded();
             kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
             mechanism.spread_multipliers(kernel);
             torques.clear();
@@ -367,14 +368,15 @@ impl ErrorEstimator {
         }
     }
 
-    /// Told that an event has ended the run at a motion it was just shown, with the event's function: the
-    /// reference solution, moved to where that is zero, tells how far off the end is, as a whole.
+    /// Told that an event has ended the run at a motion it was just shown, with its function: where no jump
+    /// made it happen the reference solution, moved to where that is zero, tells how far off the end is.
     pub(in crate::run) fn ended_at(&mut self, motion: &Motion, function: &dyn Fn(&Motion) -> Option<f64>) {
-        let Self { mechanism, metric, measured, reference_run: Some(reference_run), .. } = self else {
+        let Self { mechanism, metric, measured, events, reference_run: Some(reference_run), .. } = self
+        else {
             return;
         };
         let reference = &reference_run.motion;
-        if measured.lost.is_some() || reference.time != motion.time {
+        if measured.lost.is_some() || reference.time != motion.time || *events != reference_run.events() {
             return;
         }
         let side = Side::new(mechanism, reference);
@@ -384,7 +386,7 @@ impl ErrorEstimator {
             return;
         };
         let late = (own - value) / rate[0];
-        if !late.is_finite() {
+        if !late.is_finite() || own.abs() > AT_ZERO * mechanism.units.time * rate[0].abs() {
             return;
         }
         let mut there = reference.clone();
