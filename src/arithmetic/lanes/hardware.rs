@@ -315,6 +315,8 @@ impl Signed for Avx512 {
 }
 
 impl Slots for Avx512 {
+    type Half = Avx;
+
     const COUNT: usize = 8;
     const UNROLLED: bool = true;
 
@@ -337,8 +339,6 @@ impl Slots for Avx512 {
 }
 
 impl EightLanes for Avx512 {
-    type Half = Avx;
-
     const VECTORS: usize = 1;
 
     #[inline(always)]

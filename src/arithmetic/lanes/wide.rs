@@ -11,6 +11,9 @@ pub use super::hardware::WideHardware;
 
 /// Up to eight doubles.
 pub trait Slots: Arithmetic + Send {
+    /// Four lanes of the same processor.
+    type Half: Lanes;
+
     /// How many.
     const COUNT: usize;
     /// True where long kernels are worth unrolling.
@@ -49,9 +52,6 @@ macro_rules! lane_by_lane {
 
 /// Eight doubles.
 pub trait EightLanes: Slots + Signed {
-    /// Four of them.
-    type Half: Lanes;
-
     /// How many vectors they are in, 1 or 2.
     const VECTORS: usize;
 
@@ -157,6 +157,8 @@ pub(super) fn each_of_eight<W: Slots, const N: usize>(lanes: [W; N], f: fn([f64;
 }
 
 impl<L: Lanes> Slots for [L; 2] {
+    type Half = L;
+
     const COUNT: usize = 8;
     const UNROLLED: bool = L::UNROLLED;
 
@@ -178,8 +180,6 @@ impl<L: Lanes> Slots for [L; 2] {
 }
 
 impl<L: Lanes> EightLanes for [L; 2] {
-    type Half = L;
-
     const VECTORS: usize = 2;
 
     #[inline(always)]
@@ -233,6 +233,8 @@ impl<L: Lanes> Arithmetic for Single<L> {
 }
 
 impl<L: Lanes> Slots for Single<L> {
+    type Half = L;
+
     const COUNT: usize = 1;
     const UNROLLED: bool = L::UNROLLED;
 

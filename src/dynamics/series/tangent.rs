@@ -12,17 +12,20 @@
 //! The motion is expanded first, in plain doubles, or its powers are those of its own step; what is left for
 //! the derivatives are five products with known numbers where a recurrence on
 //! [numbers with derivatives](super::slots) has eight, and four of numbers.  Two orders are summed at once,
-//! so that a coefficient is loaded for both.  Everything new of an order is found at once, by one matrix of
+//! so that a coefficient is loaded for both.  A pair of bodies has code of its own where it is worth it, and
+//! by a [single] direction.  Everything new of an order is found at once, by one matrix of
 //! M_0 and the constraints.  Mechanisms with anything else in them are expanded on such numbers.
 
 mod known;
 mod pair;
 mod products;
+mod single;
 mod tree;
 mod values;
 
 use self::known::{Gradient, Known};
 use self::products::{Sums, minus_product};
+use self::single::SinglePair;
 use super::columns::{Begin, MotionPowers};
 use super::varied::Number;
 use super::{Series, Terms, zeros};
@@ -65,6 +68,8 @@ pub struct Tangent<S> {
     rest: [Vec<S>; 2],
     /// Sums of the next order on their way.
     ahead: Vec<Sums<S>>,
+    /// All of these of a pair by a single direction.
+    single: Option<Box<SinglePair>>,
     /// Of one order: what is left of the equations, the derivatives of z'' so far, and what is new.
     left: Vec<S>,
     bend: [Vec<S>; 2],
@@ -113,6 +118,7 @@ impl<S: Slots> Tangent<S> {
             rate: slots(n * room),
             rest: [slots(n * room), slots(n * room)],
             ahead: vec![Sums::ZERO; n],
+            single: SinglePair::new(n, r, S::COUNT, order),
             left: slots(size),
             bend: [slots(n), slots(n)],
             new: slots(size),
@@ -169,6 +175,10 @@ impl<S: Slots> Tangent<S> {
         }
         let order = self.order();
         let first = self.fitting(known).map_or(order, |known| known.order.min(order));
+        if self.single.is_some() {
+            self.find_response(terms);
+            return self.expand_single_pair(terms, (u, rate), first);
+        }
         self.turn_over(first);
         self.find_force(terms, first);
         self.find_response(terms);
@@ -183,7 +193,7 @@ impl<S: Slots> Tangent<S> {
             self.angle[first + 1] = rate;
             self.rate[first] = rate;
         }
-        if self.is_pair() {
+        if S::COUNT > 1 && self.is_pair() {
             for m in 0..self.order() {
                 self.advance_pair(m);
             }

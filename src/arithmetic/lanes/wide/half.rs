@@ -74,6 +74,8 @@ impl<L: Lanes> Signed for FirstHalf<L> {
 }
 
 impl<L: Lanes> Slots for FirstHalf<L> {
+    type Half = L;
+
     const COUNT: usize = 4;
     const UNROLLED: bool = L::UNROLLED;
 
@@ -95,8 +97,6 @@ impl<L: Lanes> Slots for FirstHalf<L> {
 }
 
 impl<L: Lanes> EightLanes for FirstHalf<L> {
-    type Half = L;
-
     const VECTORS: usize = 1;
 
     #[inline(always)]
