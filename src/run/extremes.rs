@@ -224,13 +224,16 @@ impl ExtremesDetector {
         );
     }
 
+    /// The outputs at a motion.
+    fn values_at(&mut self, motion: &Motion) -> Vec<f64> {
+        let mut values = Vec::new();
+        self.values(motion, &mut values);
+        values
+    }
+
     /// What the outputs change by where one coordinate or rate moves by a unit, at most.
     pub fn changes(&mut self, motion: &Motion) -> Vec<f64> {
-        changes(&Arc::clone(&self.mechanism), motion, |motion| {
-            let mut values = Vec::new();
-            self.values(motion, &mut values);
-            values
-        })
+        changes(&Arc::clone(&self.mechanism), motion, |motion| self.values_at(motion))
     }
 
     /// True where no output comes near a new extreme, as the interpolants of a low degree tell, of which the
@@ -267,11 +270,7 @@ impl ExtremesDetector {
     /// Looks for what is rounding where no interpolant resolves the outputs; true where there is much more
     /// than was known.
     fn has_more_rounding(&mut self, inside: &mut dyn Inside, t: Time) -> bool {
-        let found = last_digits(inside.at(t), |motion| {
-            let mut values = Vec::new();
-            self.values(motion, &mut values);
-            values
-        });
+        let found = last_digits(inside.at(t), |motion| self.values_at(motion));
         let mut is_more = false;
         for (rounding, found) in self.memory.rounding.iter_mut().zip(found) {
             let found = DIGITS * found;
@@ -285,8 +284,7 @@ impl ExtremesDetector {
     /// Takes the outputs at the end of a run, where a jump has made the event that ends it happen: no step
     /// follows.
     pub fn end(&mut self, motion: &Motion) {
-        let mut values = Vec::new();
-        self.values(motion, &mut values);
+        let values = self.values_at(motion);
         for (found, value) in self.memory.found.iter_mut().zip(values) {
             found.see(value, motion.time.hi);
         }

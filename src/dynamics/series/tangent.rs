@@ -175,9 +175,11 @@ impl<S: Slots> Tangent<S> {
         }
         let order = self.order();
         let first = self.fitting(known).map_or(order, |known| known.order.min(order));
-        if self.single.is_some() {
+        if let Some(mut pair) = self.single.take() {
             self.find_response(terms);
-            return self.expand_single_pair(terms, (u, rate), first);
+            self.expand_single(&mut pair, terms, (u, rate), first);
+            self.single = Some(pair);
+            return;
         }
         self.turn_over(first);
         self.find_force(terms, first);

@@ -9,7 +9,7 @@
 use super::ensemble::Ensemble;
 use super::point::Ready;
 use super::watching::Watching;
-use crate::dynamics::{Motion, Time};
+use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::plan::Plan;
 use crate::run::trust::{CAUTION, DistanceMetric, HORIZON, LEAST, Trust, crossing};
 use crate::stepping::Tolerance;
@@ -44,8 +44,8 @@ impl From<&Trust> for PointTrust {
 }
 
 /// What is known of a lane.
-#[derive(Clone, Default)]
 struct Known {
+    metric: DistanceMetric,
     /// The time looked at last \[s\], and the largest difference so far \[rad, or positions over the size\].
     last: [f64; 2],
     horizon: Option<f64>,
@@ -75,7 +75,7 @@ impl<'a> Judge<'a> {
                 ready.iter().map(|_| Watching::default()).collect(),
             ),
             members: ready.iter().map(|ready| ready.member(2)).collect(),
-            known: vec![Known::default(); ready.len()],
+            known: ready.iter().map(|ready| Known::new(&ready.mechanism)).collect(),
             motions: Default::default(),
         }
     }
@@ -102,7 +102,7 @@ impl<'a> Judge<'a> {
     pub(super) fn remove(&mut self, number: usize) -> PointTrust {
         self.members.swap_remove(number);
         self.ensemble.swap_remove(number);
-        let Known { last: [_, error], horizon, is_lost } = self.known.swap_remove(number);
+        let Known { last: [_, error], horizon, is_lost, .. } = self.known.swap_remove(number);
         let printed = |error: f64| (CAUTION * error).max(LEAST);
         match horizon {
             Some(horizon) => PointTrust { error: Some(printed(HORIZON)), horizon: Some(horizon) },
@@ -112,11 +112,15 @@ impl<'a> Judge<'a> {
 }
 
 impl Known {
+    fn new(mechanism: &Mechanism) -> Self {
+        Self { metric: DistanceMetric::new(mechanism), last: [0.0; 2], horizon: None, is_lost: false }
+    }
+
     fn take(&mut self, point: &BatchMember, finer: &BatchMember, motions: &mut [Motion; 2]) {
         for (motion, member) in motions.iter_mut().zip([point, finer]) {
             read(member.mechanism, &member.state, motion);
         }
-        let apart = DistanceMetric::new(point.mechanism).apart(&motions[0], &motions[1]);
+        let apart = self.metric.apart(&motions[0], &motions[1]);
         let [t, error] = self.last;
         if finer.stopped.is_some() || !apart.is_finite() {
             self.is_lost = true;

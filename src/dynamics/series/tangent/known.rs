@@ -116,11 +116,6 @@ impl<S: Slots> Couplings<S> {
         (re, im): (&mut [S], &mut [S]),
     ) {
         let entries = self.row(row);
-        if entries.is_empty() {
-            re.fill(S::ZERO);
-            im.fill(S::ZERO);
-            return;
-        }
         let mut m = 0;
         // Four powers at a time, up to three of them beyond the last.
         while m < order {

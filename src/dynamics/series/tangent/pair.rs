@@ -9,10 +9,10 @@ impl<S: Slots> Tangent<S> {
     pub fn advance_pair(&mut self, m: usize) {
         let ((bend_re, bend_im, left), (other_re, other_im, other_left)) =
             (self.products(0, m), self.products(1, m));
-        let (room, Known { coupling, diagonal, .. }) = (self.room, &self.known);
+        let (room, Known { matrix, diagonal, .. }) = (self.room, &self.known);
         let (mut re, mut im) = (self.rest[0][m], self.rest[1][m]);
         let (mut next_re, mut next_im) = (self.rest[0][room + m], self.rest[1][room + m]);
-        let h = S::splat(if let [entry, _] = coupling.entries[..] { entry.value } else { 0.0 });
+        let h = S::splat(matrix[1]);
         (re, im) = (other_re.mul_add(h, re), other_im.mul_add(h, im));
         (next_re, next_im) = (bend_re.mul_add(h, next_re), bend_im.mul_add(h, next_im));
         let (z, other) = (self.values.z[0], self.values.z[1]);

@@ -14,8 +14,8 @@
 use super::Tangent;
 use crate::arithmetic::lanes::wide::Slots;
 use crate::arithmetic::lanes::{Arithmetic, Lanes};
-use crate::dynamics::series::Terms;
 use crate::dynamics::series::varied::Number;
+use crate::dynamics::series::{Series, Terms};
 
 /// Powers there is room for.
 const ROOM: usize = 28;
@@ -169,6 +169,68 @@ impl SinglePair {
             pull: L::of(self.rest[m]).mul_add(L::of(self.conjugate[1]), sums.pull),
         }
     }
+
+    /// Takes powers of the motion up to `first`, as they are known, and finds those after it.
+    #[inline(always)]
+    fn take_motion<L: Lanes>(
+        &mut self,
+        (values, constants, times): (&Series<f64>, &Constants<L>, &[f64]),
+        weight: [f64; 4],
+        [first, order]: [usize; 2],
+    ) {
+        let mut m = 0;
+        while m < first + 2 {
+            let (z, other) = (values.z[2 * m], values.z[2 * m + 1]);
+            self.push(m, L::of([z.re, z.im, other.re, other.im]));
+            if m <= first {
+                let (rate, other) = (values.omega[2 * m], values.omega[2 * m + 1]);
+                self.omega[m] = [rate, rate, other, other];
+            }
+            m += 1;
+        }
+        m = 0;
+        while m < first {
+            self.find_force(constants.coupling, times[m], m);
+            m += 1;
+        }
+        self.force[0] = L::of(self.force[0]).sub(L::of(weight)).array();
+        while m < order {
+            self.extend(constants, times[m], m);
+            m += 1;
+        }
+        m = 0;
+        while m < order {
+            self.find_along::<L>(m);
+            m += 1;
+        }
+    }
+
+    /// Order m from its sums: the next power of the rates' derivatives.
+    #[inline(always)]
+    fn advance<L: Lanes>(
+        &mut self,
+        constants: &Constants<L>,
+        sums: Sums<L>,
+        (m, times, fractions): (usize, &[f64], &[f64]),
+    ) -> [f64; 2] {
+        let times = L::splat(times[m]);
+        let curve = L::of(self.z[m + 2]).mul(times).swap_halves();
+        let mut rest = curve.mul(constants.coupling_slope);
+        if m == 0 {
+            rest = rest.sub(constants.weight);
+        }
+        rest = left(sums.turn.mul(times)).swap_halves().mul_add(constants.coupling, rest);
+        let acceleration = L::of(self.omega[m + 1]).mul(L::splat((m + 1) as f64));
+        let mut pull = rest.swap_pairs().mul_add(constants.conjugate, sums.pull);
+        pull = acceleration.mul_add(constants.diagonal, pull);
+        let new = constants.answer(pull);
+        let next = new.mul(L::splat(-fractions[m + 1]));
+        self.angle[m + 2] = next.mul(L::splat(fractions[m + 2])).array();
+        rest = new.mul(constants.left).swap_halves().neg_mul_add(constants.coupling, rest);
+        self.rest[m] = rest.swap_pairs().array();
+        let [own, _, other, _] = next.array();
+        [own, other]
+    }
 }
 
 impl<S: Slots> Tangent<S> {
@@ -176,13 +238,12 @@ impl<S: Slots> Tangent<S> {
     #[inline(always)]
     fn constants(&self) -> Constants<S::Half> {
         let (known, [z, other]) = (&self.known, [self.values.z[0], self.values.z[1]]);
-        let value = if let [entry, _] = known.coupling.entries[..] { entry.value } else { 0.0 };
         let slope = if let [entry, _] = known.varied.entries[..] { entry.slope.array()[0] } else { 0.0 };
         let [a, b, c, d] = [self.response[0], self.response[1], self.response[2], self.response[3]];
         let [first, second] = [0, 1].map(|k| known.weight[k].map(|part| part.array()[0]));
         let diagonal = [known.diagonal[0].array()[0], known.diagonal[1].array()[0]];
         Constants {
-            coupling: Arithmetic::splat(value),
+            coupling: Arithmetic::splat(known.matrix[1]),
             coupling_slope: Arithmetic::splat(slope),
             response: [Lanes::of([a, a, d, d]), Lanes::of([b, b, c, c])],
             diagonal: Lanes::of([diagonal[0], 0.0, diagonal[1], 0.0]),
@@ -192,92 +253,39 @@ impl<S: Slots> Tangent<S> {
         }
     }
 
-    /// Powers of the motion up to `first`, as they are known, and those after it.
-    #[inline(always)]
-    fn take_motion(&mut self, constants: &Constants<S::Half>, weight: [f64; 4], first: usize) {
-        let order = self.order();
-        let Self { single: Some(pair), values, times, .. } = self else { return };
-        let mut m = 0;
-        while m < first + 2 {
-            let (z, other) = (values.z[2 * m], values.z[2 * m + 1]);
-            pair.push(m, S::Half::of([z.re, z.im, other.re, other.im]));
-            if m <= first {
-                let (rate, other) = (values.omega[2 * m], values.omega[2 * m + 1]);
-                pair.omega[m] = [rate, rate, other, other];
-            }
-            m += 1;
-        }
-        let mut m = 0;
-        while m < first {
-            pair.find_force(constants.coupling, times[m], m);
-            m += 1;
-        }
-        pair.force[0] = S::Half::of(pair.force[0]).sub(S::Half::of(weight)).array();
-        while m < order {
-            pair.extend(constants, times[m], m);
-            m += 1;
-        }
-        m = 0;
-        while m < order {
-            pair.find_along::<S::Half>(m);
-            m += 1;
-        }
-    }
-
     /// Expands the derivatives of a pair by a single direction, about a motion whose powers are known up to
     /// `first`.
     #[inline(always)]
-    pub(super) fn expand_single_pair(
+    pub(super) fn expand_single(
         &mut self,
+        pair: &mut SinglePair,
         terms: &Terms<Number>,
         (u, rate): (&[Number], &[Number]),
         first: usize,
     ) {
-        let constants = self.constants();
+        let (constants, order, room) = (self.constants(), self.order(), self.room);
+        let Self { values, times, fractions, rate: found, .. } = self;
         let [own, other] = [terms.structure.tree.weight[0], terms.structure.tree.weight[1]];
-        self.take_motion(&constants, [own.re, own.im, other.re, other.im], first);
-        let (order, room) = (self.order(), self.room);
-        let Self { single: Some(pair), rate: found, .. } = self else { return };
+        let weight = [own.re, own.im, other.re, other.im];
+        pair.take_motion((values, &constants, times), weight, [first, order]);
         for (to, from) in [(0, u), (1, rate)] {
             let [own, other] = [from[0].slope[0], from[1].slope[0]];
             pair.angle[to] = [own, own, other, other];
         }
-        (found[0], found[room]) = (S::splat(rate[0].slope[0]), S::splat(rate[1].slope[0]));
+        let (found, other) = found.split_at_mut(room);
+        (found[0], other[0]) = (S::splat(rate[0].slope[0]), S::splat(rate[1].slope[0]));
         let mut m = 0;
         while m < order {
-            let Self { single: Some(pair), .. } = self else { return };
-            let [this, next] = pair.two_orders::<S::Half>(m);
-            self.advance_single_pair(&constants, this, m);
-            if m + 1 < order {
-                let Self { single: Some(pair), .. } = self else { return };
-                let next = pair.completed(next, m);
-                self.advance_single_pair(&constants, next, m + 1);
+            let [this, mut next] = pair.two_orders::<S::Half>(m);
+            let new = pair.advance(&constants, this, (m, times, fractions));
+            m += 1;
+            (found[m], other[m]) = (S::splat(new[0]), S::splat(new[1]));
+            if m < order {
+                next = pair.completed(next, m - 1);
+                let new = pair.advance(&constants, next, (m, times, fractions));
+                m += 1;
+                (found[m], other[m]) = (S::splat(new[0]), S::splat(new[1]));
             }
-            m += 2;
         }
-    }
-
-    /// Order m from its sums.
-    #[inline(always)]
-    fn advance_single_pair(&mut self, constants: &Constants<S::Half>, sums: Sums<S::Half>, m: usize) {
-        let Self { single: Some(pair), times, fractions, rate, room, .. } = self else { return };
-        let of = S::Half::of;
-        let times = S::Half::splat(times[m]);
-        let curve = of(pair.z[m + 2]).mul(times).swap_halves();
-        let mut rest = curve.mul(constants.coupling_slope);
-        if m == 0 {
-            rest = rest.sub(constants.weight);
-        }
-        rest = left(sums.turn.mul(times)).swap_halves().mul_add(constants.coupling, rest);
-        let acceleration = of(pair.omega[m + 1]).mul(S::Half::splat((m + 1) as f64));
-        let mut pull = rest.swap_pairs().mul_add(constants.conjugate, sums.pull);
-        pull = acceleration.mul_add(constants.diagonal, pull);
-        let new = constants.answer(pull);
-        let next = new.mul(S::Half::splat(-fractions[m + 1]));
-        pair.angle[m + 2] = next.mul(S::Half::splat(fractions[m + 2])).array();
-        rest = new.mul(constants.left).swap_halves().neg_mul_add(constants.coupling, rest);
-        pair.rest[m] = rest.swap_pairs().array();
-        let [own, _, other, _] = next.array();
-        (rate[m + 1], rate[*room + m + 1]) = (S::splat(own), S::splat(other));
     }
 }
