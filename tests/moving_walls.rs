@@ -272,3 +272,35 @@ fn a_wall_that_rises_takes_an_arm_off_its_stop() {
         assert!(outcome.last.phi[0] > 0.1, "{:?}", outcome.last.phi);
     }
 }
+
+/// Where its force passes zero a point leaves a wall with the third power of time: for a while it is nearer than
+/// the dense output of a long step is right, which is no impact, however coarse the method.
+#[test]
+fn a_point_that_leaves_a_turning_wall_slowly_is_let_go_once() {
+    let scene = scene(
+        r#"{"name": "leaving", "gravity": [0, -9.81],
+        "bars": [{"name": "b", "mass": 1.4039, "centre": [0.1475, -0.003], "inertia": 0.00838, "length": 0.2486},
+                 {"name": "d", "mass": 0.1937, "centre": [0, 0], "inertia": 0.0015, "length": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "motors": [{"name": "m", "body": "b", "law": {"start": 0.9079, "rate": 5.4079}}],
+        "springs": [{"name": "s", "between": [{"body": "b", "point": [0.05, 0.3]}, {"body": "d", "point": [0.1718, -0.25]}],
+                     "potential": "3.7816*(length-0.3)^2/2"}],
+        "walls": [{"name": "w", "body": "d", "point": [0.0107, -0.05], "restitution": 0, "friction": {"kinetic": 0.2909},
+                   "line": {"body": "b", "through": [0, 0.05], "normal": [0, 1]}}],
+        "start": {"d": {"phi": 0.0423, "omega": 1.066, "origin": [-0.1205587709721936, 0.25182548072360383],
+                        "velocity": [-0.2431, -0.8663]}},
+        "until": 0.8, "every": 0.1}"#,
+    );
+    let exact = finished(&scene, &adaptive(MethodId::Taylor, 1e-13));
+    let times = |outcome: &Outcome| outcome.frictions.iter().map(|one| one.t).collect::<Vec<_>>();
+    assert_eq!((exact.impact_count, exact.frictions.len()), (2, 4));
+    for method in [MethodId::Radau(3), MethodId::Dp5, MethodId::Dp8, MethodId::Radau(5)] {
+        for tolerance in [1e-4, 1e-5, 1e-6, 1e-8] {
+            let found = finished(&scene, &adaptive(method, tolerance));
+            assert_eq!((found.impact_count, found.frictions.len()), (2, 4), "{method:?} {tolerance}");
+            for (one, exact) in times(&found).iter().zip(times(&exact)) {
+                assert!((one - exact).abs() < 50.0 * tolerance, "{method:?} {tolerance}: {one} {exact}");
+            }
+        }
+    }
+}

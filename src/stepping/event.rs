@@ -155,6 +155,16 @@ pub(super) enum Met {
     AtRest,
 }
 
+/// What became of a step that was to end on an event.
+enum Landing {
+    /// It could not be made.
+    Failed,
+    /// It ends with the event, after so long \[s\].
+    At(f64),
+    /// It is as long as was asked for, and the function is positive there and grows.
+    Opens,
+}
+
 /// Scratch space of the search.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
@@ -216,10 +226,11 @@ impl Search {
             let shorter = found.end(1.0) * h;
             match found {
                 Found::Nothing => break,
-                Found::At(event, _) => {
-                    let landed = self.land(field, step, state, shorter, event, statistics);
-                    return landed.map_or(Met::Failed, |h| Met::Event(h, event));
-                }
+                Found::At(event, _) => match self.land(field, step, state, shorter, event, statistics) {
+                    Landing::Failed => return Met::Failed,
+                    Landing::At(h) => return Met::Event(h, event),
+                    Landing::Opens => h = shorter,
+                },
                 Found::Inside(_) if shorter <= finest(state, field.time_unit()) => return Met::AtRest,
                 Found::Inside(_) | Found::Near(_) => {
                     if !step.repeat(field, state, shorter, statistics) {
@@ -315,8 +326,9 @@ impl Search {
         found
     }
 
-    /// Repeats the step so that it ends where the event function is zero to rounding; returns its length,
-    /// `None` where it cannot be made.
+    /// Repeats the step so that it ends where the event function is zero to rounding.  Where the function
+    /// opens at the end of the step first made, the passage lies before, or is one of the longer step's dense
+    /// output alone: that step is left, whose own dense output knows more.
     fn land<F: OdeSystem + ?Sized, S: Stride<F>>(
         &mut self,
         field: &mut F,
@@ -325,13 +337,13 @@ impl Search {
         h: f64,
         event: usize,
         statistics: &mut Statistics,
-    ) -> Option<f64> {
+    ) -> Landing {
         self.gaps.resize(field.events(), 0.0);
         let (mut best, mut low, mut high) = (h, 0.0, 1.1 * h);
         let (mut before, mut gap_before) = (0.0, f64::NAN);
         for attempt in 1..=LANDINGS {
             if !step.repeat(field, state, best, statistics) {
-                return None;
+                return Landing::Failed;
             }
             let (y, slope) = step.end();
             let known = field.gap(event, Along { time: state.time + best, step_size: 1.0, y, slope });
@@ -352,6 +364,9 @@ impl Search {
                 None if gap_before.is_nan() => self.closing_speed(field, step, state, best, event, gap),
                 None => (gap - gap_before) / (best - before),
             };
+            if attempt == 1 && gap > 0.0 && slope > 0.0 {
+                return Landing::Opens;
+            }
             (before, gap_before) = (best, gap);
             // Where it opens again the passage lies behind.
             *(if gap > 0.0 && (known.is_none() || slope < 0.0) { &mut low } else { &mut high }) = best;
@@ -362,7 +377,7 @@ impl Search {
             }
             best = moved;
         }
-        Some(best)
+        Landing::At(best)
     }
 
     /// Rate of an event function at the end of the step just made.
