@@ -386,3 +386,63 @@ fn the_noise_of_columns_of_unlike_length_is_what_the_fit_was_weighted_with() {
     println!("mean square of what numbers are off, over their errors: {mean}");
     assert!((0.6..2.0).contains(&mean), "{mean}");
 }
+
+/// Pieces are tied together where constraints move with time, and where they are curved: the numbers and their
+/// standard errors are those of the data in one piece.
+#[test]
+fn pieces_of_a_motion_on_constraints_give_the_fit_of_the_whole() {
+    let driven = r#"{"name": "driven", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.1, 0], "inertia": 0.01, "length": 0.2},
+                 {"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.04, "length": 0.6}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                   {"name": "B", "between": [{"body": "a", "point": [0.2, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "motors": [{"name": "M", "body": "a", "law": {"start": 0, "rate": 2.5}}],
+        "torsion_springs": [{"name": "T", "body": "b", "stiffness": 2.2, "free_angle": 0, "damping": 0.05}],
+        "start": {"b": {"phi": -1, "omega": 0}}, "until": 4, "every": 0.05}"#;
+    let curved = r#"{"name": "curved", "gravity": [0, 0],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1},
+                 {"name": "a", "mass": 1, "centre": [0, 0], "inertia": 3, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                   {"name": "B", "between": [{"body": "ground", "point": [2, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "motors": [{"name": "G", "body": "a", "law": "0.5*b.phi^2"}],
+        "torsion_springs": [{"name": "T", "body": "b", "stiffness": 4, "free_angle": 0, "damping": 0.2}],
+        "torques": [{"name": "M", "body": "b", "torque": 3, "law": {"start": 0, "sines": [{"amplitude": 1, "frequency": 3}]}}],
+        "start": {"b": {"phi": 0.8, "omega": 1.5}}, "until": 6, "every": 0.05}"#;
+    for (text, third) in [(driven, "M.rate"), (curved, "M.torque")] {
+        let template = Template::new(text.into(), "scene.json".into(), &[]);
+        let (mut noise, mut table) = (Noise(11), String::from("t [s],b.phi [rad]\n"));
+        let scene = template.scene().expect("a scene");
+        let b = usize::from(scene.bars[1].name == "b");
+        Simulation::new(&scene)
+            .expect("a simulation")
+            .method(MethodId::Taylor)
+            .tolerance(1e-13, 1e-13)
+            .run_with(|sample| {
+                writeln!(table, "{},{}", sample.t, sample.phi[b] + 0.03 * noise.normal()).expect("a string");
+                Ok(())
+            })
+            .expect("a run");
+        let data = Data::parse(&table, "data.csv").expect("a table");
+        let of = |segments: usize| {
+            let request = FitRequest {
+                vary: ["T.stiffness", "T.damping", third].map(str::to_owned).to_vec(),
+                sigmas: vec![("b.phi".to_owned(), 0.03)],
+                segments,
+                ..FitRequest::default()
+            };
+            fit(&template, &data, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"))
+        };
+        let whole = of(1);
+        for segments in [2, 5] {
+            let found = of(segments);
+            for (one, whole) in found.numbers.iter().zip(&whole.numbers) {
+                println!(
+                    "{} {segments}: {} {}, whole {} {}",
+                    scene.name, one.value, one.error, whole.value, whole.error
+                );
+                assert!((one.value - whole.value).abs() < 1e-3 * whole.error, "{segments} {one:?} {whole:?}");
+                assert!((one.error / whole.error - 1.0).abs() < 1e-3, "{segments} {one:?} {whole:?}");
+            }
+        }
+    }
+}

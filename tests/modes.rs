@@ -562,3 +562,36 @@ fn equilibria_are_found_on_every_branch_of_a_law() {
     let at = |phi: f64| found.iter().any(|one| (one.phi[0] - phi).abs() < 1e-9);
     assert!(at(1.5 * PI) && at((1.0_f64 / 4.905).acos()) && at(-(1.0_f64 / 4.905).acos()), "{found:?}");
 }
+
+/// A platform on three equal parallel cranks moves by its redundance; in other assemblies nothing can.
+#[test]
+fn assemblies_that_nothing_moves_are_left() {
+    let crank = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.15, 0], "inertia": 0.01, "length": 0.3}}"#)
+    };
+    let [c0, c1, c2] = ["c0", "c1", "c2"].map(crank);
+    let hinges: Vec<String> = [("c0", "0, 0"), ("c1", "1, 0"), ("c2", "0.5, 0.1")]
+        .iter()
+        .flat_map(|(name, at)| {
+            [
+                format!(r#"{{"name": "A{name}", "between": [{{"body": "ground", "point": [{at}]}}, {{"body": "{name}", "point": [0, 0]}}]}}"#),
+                format!(r#"{{"name": "B{name}", "between": [{{"body": "{name}", "point": [0.3, 0]}}, {{"body": "cp", "point": [{at}]}}]}}"#),
+            ]
+        })
+        .collect();
+    let scene = parsed(&format!(
+        r#"{{"name": "cranks", "gravity": [0, -10],
+        "bars": [{{"name": "cp", "mass": 1, "centre": [0.4, 0], "inertia": 0.05, "length": 1}}, {c0}, {c1}, {c2}],
+        "hinges": [{}],
+        "start": {{"cp": {{"phi": 0}}, "c0": {{"phi": 1.2}}, "c1": {{"phi": 1.2}}, "c2": {{"phi": 1.2}}}},
+        "until": 1, "every": 0.1}}"#,
+        hinges.join(", ")
+    ));
+    let found = found(&scene, 64);
+    assert_eq!(found.degrees_of_freedom, 1);
+    // Down and up, as one pendulum: (J3 + m3 c² + m l²) w² = (3 m c + m l) g.
+    let [m, c, l] = [1.0, 0.15, 0.3];
+    let square = (3.0 * m * c + m * l) * 10.0 / (3.0 * (0.01 + m * c * c) + m * l * l);
+    let down = lowest(&found);
+    assert!((down.modes[0].frequency / f64::sqrt(square) - 1.0).abs() < 1e-9, "{down:?} {square}");
+}

@@ -272,3 +272,58 @@ fn a_forced_oscillator_has_the_motion_of_its_closed_form_whatever_events_do() {
         assert_eq!(found.left_out.contains(&"events"), !events.is_empty());
     }
 }
+
+/// A body that a law holds to half the square of another's angle, so that neighbours' rates differ with the
+/// angle: (1 + 3 x²) x'' + 3 x x'² = 6 sin 3t - 2.2 x - 0.02 x', beside the equation of small differences.
+#[test]
+fn motions_held_to_one_another_by_a_curve_have_the_multipliers_of_their_equation() {
+    let scene = parsed(
+        r#"{"name": "curve", "gravity": [0, 0],
+        "bars": [{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1},
+                 {"name": "b", "mass": 1, "centre": [0, 0], "inertia": 3, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                   {"name": "B", "between": [{"body": "ground", "point": [2, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "motors": [{"name": "G", "body": "b", "law": "0.5*a.phi^2"}],
+        "torsion_springs": [{"name": "T", "body": "a", "stiffness": 2.2, "free_angle": 0, "damping": 0.02}],
+        "torques": [{"name": "drive", "body": "a", "torque": 6, "law": {"start": 0, "sines": [{"amplitude": 1, "frequency": 3}]}}],
+        "start": {"a": {"phi": 0.3, "omega": 0}}, "until": 10, "every": 0.1}"#,
+    );
+    // Angle, rate, and small differences of both from two starts.
+    let rates = |t: f64, y: [f64; 6]| {
+        let [x, w, ..] = y;
+        let mass = 1.0 + 3.0 * x * x;
+        let a = (6.0 * libm::sin(3.0 * t) - 2.2 * x - 0.02 * w - 3.0 * x * w * w) / mass;
+        let by_x = (-2.2 - 3.0 * w * w - 6.0 * x * a) / mass;
+        let by_w = (-0.02 - 6.0 * x * w) / mass;
+        let of = |dx: f64, dw: f64| [dw, by_x * dx + by_w * dw];
+        let ([p, q], [r, s]) = (of(y[2], y[3]), of(y[4], y[5]));
+        [w, a, p, q, r, s]
+    };
+    let found = found(&scene, 6, None).expect("a search");
+    assert!(!found.motions.is_empty());
+    for one in &found.motions {
+        let (steps, mut y) = (4000, [one.phi[0], one.omega[0], 1.0, 0.0, 0.0, 1.0]);
+        let h = found.period / f64::from(steps);
+        for k in 0..steps {
+            let t = h * f64::from(k);
+            let moved = |by: [f64; 6], h: f64| std::array::from_fn(|i| y[i] + h * by[i]);
+            let k1 = rates(t, y);
+            let k2 = rates(t + 0.5 * h, moved(k1, 0.5 * h));
+            let k3 = rates(t + 0.5 * h, moved(k2, 0.5 * h));
+            let k4 = rates(t + h, moved(k3, h));
+            y = std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
+        }
+        assert!((y[0] - one.phi[0]).abs().max((y[1] - one.omega[0]).abs()) < 1e-8, "{one:?}");
+        let (mean, determinant) = (0.5 * (y[2] + y[5]), y[2] * y[5] - y[3] * y[4]);
+        let square = mean * mean - determinant;
+        let root = square.abs().sqrt();
+        let expected = match square > 0.0 {
+            true => [[mean + root, 0.0], [mean - root, 0.0]],
+            false => [[mean, root], [mean, -root]],
+        };
+        let off = off(one, &expected);
+        println!("{:?}: {off:.1e} off", one.multipliers);
+        assert!(off < 1e-6, "{expected:?} {one:?}");
+    }
+    assert!(found.motions.iter().any(|one| one.stability == Stability::Unstable));
+}

@@ -9,7 +9,8 @@ use super::super::modes::Local;
 use super::super::sensitivity::{SensitivityRequest, Study};
 use super::FittedColumn;
 use super::data::Data;
-use super::segment::{Lost, Passed, Place, pass};
+use super::segment::{Frame, Lost, Passed, Place, pass};
+use crate::dynamics::Time;
 use crate::run::driver::Pause;
 use crate::scene::{Template, Variable};
 use nalgebra::{DMatrix, DVector};
@@ -152,14 +153,15 @@ impl<'a> Problem<'a> {
         self.unit = local.unit.clone();
         let mut at = self.pass(&study, 0, None)?.end;
         for k in 1..self.parts.len() {
+            local.time = Time::from(self.parts[k].span[0]);
+            at = local
+                .projected_moving(&at)
+                .ok_or("the state between two parts does not fit the constraints")?;
             for _ in 0..TURNS {
-                at = local
-                    .projected_moving(&at)
-                    .ok_or("the state between two parts does not fit the constraints")?;
                 let tangent = local.tangent(&at[0]);
                 (self.parts[k].state, self.parts[k].tangent) = (Some(at.clone()), tangent);
-                let Some(step) = self.state_step(&study, k) else { break };
-                at = self.moved(k, step.as_slice());
+                let Some((step, better)) = self.state_step(&study, &mut local, k) else { break };
+                at = better;
                 if step.amax() < 1e-9 {
                     break;
                 }
@@ -173,9 +175,9 @@ impl<'a> Problem<'a> {
         Ok(())
     }
 
-    /// A step of Gauss and Newton for the state of a part, from its own rows and what was guessed, halved
-    /// until it helps; none where it does not.
-    fn state_step(&mut self, study: &Study, k: usize) -> Option<DVector<f64>> {
+    /// A step of Gauss and Newton for the state of a part, from its own rows and what was guessed, shortened
+    /// until it helps, and the state it leads to; none where it does not help.
+    fn state_step(&mut self, study: &Study, local: &mut Local, k: usize) -> Option<(DVector<f64>, Place)> {
         let state = self.parts[k].state.clone()?;
         let passed = self.pass(study, k, Some(&state)).ok()?;
         let (count, f) = (self.variables.len(), self.parts[k].tangent.ncols());
@@ -188,46 +190,39 @@ impl<'a> Problem<'a> {
         let mut share = 1.0;
         for _ in 0..8 {
             let tried = &step * share;
-            let moved = self.moved(k, tried.as_slice());
-            if let Ok(passed) = self.pass(study, k, Some(&moved))
+            if let Some(moved) = self.state(local, k, tried.as_slice())
+                && let Ok(passed) = self.pass(study, k, Some(&moved))
                 && self.rows(k, &passed).0.norm() < residuals.norm()
             {
-                return Some(tried);
+                return Some((tried, moved));
             }
             share *= 0.25;
         }
         None
     }
 
-    /// The state of a part moved along its tangent.
-    fn moved(&self, k: usize, y: &[f64]) -> Place {
-        let Part { state: Some([phi, omega]), tangent, .. } = &self.parts[k] else { return Place::default() };
-        let f = tangent.ncols();
-        let shift = |from: &[f64], y: &[f64]| -> Vec<f64> {
-            let by = tangent * DVector::from_column_slice(y);
-            from.iter().zip(by.iter()).zip(&self.unit).map(|((x, by), unit)| x + by * unit).collect()
-        };
-        [shift(phi, &y[..f]), shift(omega, &y[f..2 * f])]
+    /// The state of a part with these local coordinates about its base; `None` where none of them is on the
+    /// constraints.
+    fn state(&self, local: &mut Local, k: usize, x: &[f64]) -> Option<Place> {
+        let Part { state: Some(base), tangent, span, .. } = &self.parts[k] else { return None };
+        local.time = Time::from(span[0]);
+        let [y, v] = [0, 1].map(|half| {
+            let f = tangent.ncols();
+            DVector::from_column_slice(&x[half * f..(half + 1) * f])
+        });
+        local.beside(base, tangent, [&y, &v])
     }
 
     /// A part of the motion, from a state or as the scene starts.
     fn pass(&mut self, study: &Study, k: usize, state: Option<&Place>) -> Result<Passed, Lost> {
         self.runs += 1;
         let part = &self.parts[k];
-        let n = study.mechanism.coordinates();
-        let f = if state.is_some() { part.tangent.ncols() } else { 0 };
-        let direction = |j: usize| {
-            let mut column = vec![0.0; 2 * n];
-            let from = if j < f { 0 } else { n };
-            (0..n).for_each(|i| column[from + i] = part.tangent[(i, j % f)] * self.unit[i]);
-            column
-        };
-        let directions: Vec<Vec<f64>> = (0..2 * f).map(direction).collect();
-        let from = state.map(|state| (part.span[0], state));
+        let frame = Frame { tangent: &part.tangent, unit: &self.unit };
+        let from = state.map(|state| (part.span[0], state, frame));
         let times = &self.times[part.rows.clone()];
         let mut pause = self.pause.borrow_mut();
         let is_one_of_several = self.parts.len() > 1;
-        pass(study, from, &directions, (times, part.span[1]), is_one_of_several, &mut **pause)
+        pass(study, from, (times, part.span[1]), is_one_of_several, &mut **pause)
     }
 
     /// Residuals of the rows of a part, with their slopes by the numbers and by its state.
@@ -266,9 +261,8 @@ impl<'a> Problem<'a> {
             let state = match k {
                 0 => None,
                 _ => {
-                    let y: Vec<f64> = self.x.rows(first, 2 * f).iter().copied().collect();
-                    let moved = self.moved(k, &y);
-                    Some(local.projected_moving(&moved).ok_or("a state does not fit the constraints")?)
+                    let state = self.state(&mut local, k, self.x.rows(first, 2 * f).as_slice());
+                    Some(state.ok_or("a state does not fit the constraints")?)
                 }
             };
             if let (Some(state), Some((passed, at))) = (&state, &before) {
@@ -344,9 +338,8 @@ impl<'a> Problem<'a> {
         let mut first = self.variables.len();
         for k in 1..self.parts.len() {
             let f = self.parts[k].tangent.ncols();
-            let y: Vec<f64> = self.x.rows(first, 2 * f).iter().copied().collect();
-            let state =
-                local.projected_moving(&self.moved(k, &y)).ok_or("a state does not fit the constraints")?;
+            let state = self.state(&mut local, k, self.x.rows(first, 2 * f).as_slice());
+            let state = state.ok_or("a state does not fit the constraints")?;
             let tangent = local.tangent(&state[0]);
             if tangent.ncols() != f {
                 return Err("a part begins at a singular position".into());

@@ -8,6 +8,7 @@ use super::super::sensitivity::{Derived, Look, Study, Variation, outputs};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::{Motion, Time};
 use crate::run::driver::Pause;
+use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// A state: coordinates and rates.
@@ -40,16 +41,55 @@ pub(super) struct Passed {
     pub columns: Vec<Vec<f64>>,
 }
 
-/// Integrates from `from` (time and state; from the scene's start where there is none) to `until` \[s\],
-/// looking at `times`, with columns for the numbers of a study and then for these directions of the start;
-/// one of several parts is to leave nothing but a state.
+/// The local coordinates of a start: directions that the constraints leave at the base of these, orthonormal
+/// in the units of the coordinates.
+#[derive(Clone, Copy)]
+pub(super) struct Frame<'a> {
+    pub tangent: &'a DMatrix<f64>,
+    pub unit: &'a [f64],
+}
+
+impl Frame<'_> {
+    /// One for each local coordinate: of positions, then of rates.
+    fn directions(&self) -> Vec<Vec<f64>> {
+        let (n, f) = self.tangent.shape();
+        let direction = |j: usize| {
+            let mut column = vec![0.0; 2 * n];
+            let from = if j < f { 0 } else { n };
+            (0..n).for_each(|i| column[from + i] = self.tangent[(i, j % f)] * self.unit[i]);
+            column
+        };
+        (0..2 * f).map(direction).collect()
+    }
+
+    /// Makes of columns on the constraints, the last of which are their directions, the derivatives of the
+    /// start by the numbers with all local coordinates kept, then by these.
+    fn turn(&self, columns: &mut [Vec<f64>]) -> Option<()> {
+        let (n, f) = self.tangent.shape();
+        let count = columns.len() - 2 * f;
+        let all = DMatrix::from_fn(2 * n, columns.len(), |i, c| columns[c][i]);
+        let local = DMatrix::from_fn(2 * f, columns.len(), |j, c| {
+            let half = (j / f) * n;
+            (0..n).map(|i| self.tangent[(i, j % f)] * all[(half + i, c)] / self.unit[i]).sum::<f64>()
+        });
+        let own = all.columns(count, 2 * f) * local.columns(count, 2 * f).into_owned().try_inverse()?;
+        let kept = all.columns(0, count) - &own * local.columns(0, count);
+        for (column, found) in columns.iter_mut().zip(kept.column_iter().chain(own.column_iter())) {
+            column.copy_from_slice(found.as_slice());
+        }
+        Some(())
+    }
+}
+
+/// Integrates from `from` (time, state and its local coordinates; from the scene's start where there is none)
+/// to `until` \[s\], looking at `times`, with columns for the numbers of a study and then for the local
+/// coordinates; one of several parts is to leave nothing but a state.
 ///
 /// # Errors
 /// Why there is no such motion, or no derivatives.
 pub(super) fn pass(
     study: &Study,
-    from: Option<(f64, &Place)>,
-    directions: &[Vec<f64>],
+    from: Option<(f64, &Place, Frame)>,
     (times, until): (&[f64], f64),
     is_one_of_several: bool,
     pause: &mut Pause,
@@ -57,7 +97,7 @@ pub(super) fn pass(
     let mut plan = study.plan.clone();
     (plan.until, plan.every) = (until, until);
     let start = match from {
-        Some((t, [phi, omega])) => {
+        Some((t, [phi, omega], _)) => {
             let all = |from: &[f64]| from.iter().map(|&x| DoubleDouble::from(x)).collect::<Vec<_>>();
             let turns = vec![0; phi.len()];
             Motion { time: Time::from(t), phi: all(phi), omega: all(omega), turns, ..Motion::default() }
@@ -67,17 +107,21 @@ pub(super) fn pass(
     let mut outcome = Outcome::begun(&study.mechanism, plan.clone());
     let driver = build(&study.mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(&study.mechanism), driver);
+    let directions = from.map_or_else(Vec::new, |(_, _, frame)| frame.directions());
     let mut variation = study.variation(directions.len()).map_err(|error| error.to_string())?;
     driver.jumps = Some(variation.jumps.clone());
     driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     if from.is_some() {
         variation.columns.iter_mut().for_each(|column| column.fill(0.0));
     }
-    variation.add(directions);
+    variation.add(&directions);
     let begin = driver.motion();
     variation.begin(&begin);
+    if let Some((_, _, frame)) = from {
+        frame.turn(&mut variation.columns).ok_or("a part begins at a singular position")?;
+    }
     let mut sampler = Sampler { times, next: 0, until, rows: Vec::new(), end: None };
-    if from.map_or(0.0, |(t, _)| t) == until {
+    if from.map_or(0.0, |(t, ..)| t) == until {
         sampler.end = Some(begin.clone());
     }
     if sampler.next() == Some(begin.time.hi) {

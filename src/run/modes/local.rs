@@ -1,4 +1,10 @@
 //! Local coordinates of a mechanism's motions: along the directions that the constraints leave.
+//!
+//! ```text
+//! (q, w) beside (q0, w0):   Tᵀ (q - q0) = y,   Tᵀ (w - w0) = v,   both on the constraints
+//! ```
+//!
+//! T: directions that the constraints leave at q0, orthonormal in the units of the coordinates.
 
 use super::{DEPENDENT, DISTINCT, KEPT};
 use crate::arithmetic::Scalar;
@@ -9,10 +15,16 @@ use crate::stabilization::projection::{project, unit as row_unit};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
+/// Projections at most, and how near its local coordinates a position is to come by them.
+const ROUNDS: usize = 8;
+const CLOSE: f64 = 1e-15;
+
 /// Scratch space for positions on the constraints.
 pub(in crate::run) struct Local<'a> {
     pub(super) mechanism: &'a Mechanism,
     pub(super) kernel: Kernel<f64>,
+    /// The time of the constraints.
+    pub(in crate::run) time: Time,
     /// Units of the coordinates \[rad, m\].
     pub(in crate::run) unit: Vec<f64>,
     /// Whole turns that nothing feels.
@@ -29,6 +41,7 @@ impl<'a> Local<'a> {
         Self {
             mechanism,
             kernel: Kernel::new(mechanism),
+            time: Time::default(),
             unit: (0..mechanism.coordinates()).map(unit).collect(),
             turns: WholeTurns::of(mechanism),
             conditioning: 1.0,
@@ -62,7 +75,7 @@ impl<'a> Local<'a> {
     pub(in crate::run) fn tangent(&mut self, phi: &[f64]) -> DMatrix<f64> {
         let n = phi.len();
         let rows = self.mechanism.constraints.len();
-        self.pull(phi, 0.0);
+        self.pull(phi, self.time.hi);
         let mut jacobian = DMatrix::<f64>::zeros(rows.max(n), n);
         for r in 0..rows {
             // Not by its own length: a row that vanishes leaves a direction more.
@@ -79,13 +92,13 @@ impl<'a> Local<'a> {
         DMatrix::from_fn(n, free.len(), |i, j| right[(free[j], i)])
     }
 
-    /// Coordinates on the constraints next to these, at t = 0.
+    /// Coordinates on the constraints next to these.
     pub(in crate::run) fn projected(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
         let [phi, _] = self.projected_moving(&[phi.to_vec(), vec![0.0; phi.len()]])?;
         Some(phi)
     }
 
-    /// Coordinates and rates on the constraints next to these, at t = 0.
+    /// Coordinates and rates on the constraints next to these.
     pub(in crate::run) fn projected_moving(&mut self, [phi, omega]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
         let n = phi.len();
         if self.mechanism.constraints.is_empty() {
@@ -94,11 +107,44 @@ impl<'a> Local<'a> {
         let mut unknowns: Vec<Time> = phi.iter().chain(omega).map(|&x| Time::of(x)).collect();
         unknowns.resize(2 * n + 3, Time::default());
         let turns = vec![0; self.mechanism.bodies.len()];
-        let mut state = self.mechanism.state(Time::default(), &unknowns, &turns);
+        let mut state = self.mechanism.state(self.time, &unknowns, &turns);
         project(self.mechanism, &mut self.kernel, &mut state, KEPT).ok()?;
         let turned = |k: usize| state.turns.get(k).map_or(0.0, |&turns| TAU * turns as f64);
         let phi = (0..n).map(|k| state.unknown(k).hi + turned(k)).collect();
         Some([phi, (n..2 * n).map(|k| state.unknown(k).hi).collect()])
+    }
+
+    /// The state on the constraints with these local coordinates about another, of which `tangent` has the
+    /// directions; `None` where there is none near it.
+    pub(in crate::run) fn beside(
+        &mut self,
+        [phi, omega]: &[Vec<f64>; 2],
+        tangent: &DMatrix<f64>,
+        [y, v]: [&DVector<f64>; 2],
+    ) -> Option<[Vec<f64>; 2]> {
+        let mut state = [self.moved(phi, tangent, y), self.moved(omega, tangent, v)];
+        for _ in 0..ROUNDS {
+            state = self.projected_moving(&state)?;
+            let off = y - self.along(tangent, phi, &state[0]);
+            if off.amax() <= CLOSE * (1.0 + y.amax()) {
+                break;
+            }
+            state[0] = self.moved(&state[0], tangent, &off);
+        }
+        let own = self.tangent(&state[0]);
+        if own.ncols() != tangent.ncols() {
+            return None;
+        }
+        let off = v - self.along(tangent, omega, &state[1]);
+        let by = (tangent.transpose() * &own).lu().solve(&off)?;
+        state[1] = self.moved(&state[1], &own, &by);
+        Some(state)
+    }
+
+    /// What the difference of two positions, or rates, has along the directions of `tangent`.
+    fn along(&self, tangent: &DMatrix<f64>, from: &[f64], to: &[f64]) -> DVector<f64> {
+        let apart = from.iter().zip(to).zip(&self.unit).map(|((from, to), unit)| (to - from) / unit);
+        tangent.transpose() * DVector::from_iterator(from.len(), apart)
     }
 
     /// A position moved along the constraints.

@@ -238,8 +238,7 @@ impl Shooting<'_> {
     fn beside(&mut self, base: &Base, x: &DVector<f64>) -> Option<[Vec<f64>; 2]> {
         let f = base.tangent.ncols();
         let [y, v] = [x.rows(0, f).into_owned(), x.rows(f, f) * self.unit_rate];
-        let state = [(0, y), (1, v)].map(|(k, part)| self.local.moved(&base.state[k], &base.tangent, &part));
-        self.local.projected_moving(&state)
+        self.local.beside(&base.state, &base.tangent, [&y, &v])
     }
 
     /// Where a state is after a period.

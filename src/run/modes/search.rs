@@ -99,6 +99,10 @@ impl<'a> Search<'a> {
     pub(super) fn settle(&mut self, phi: &[f64]) -> Option<Vec<f64>> {
         let mut phi = self.local.projected(phi)?;
         let mut tangent = self.local.tangent(&phi);
+        // Nothing can move in this assembly, whatever acts on it.
+        if tangent.ncols() == 0 {
+            return None;
+        }
         let mut left = tangent.transpose() * self.local.pull(&phi, 0.0);
         let mut damping = 0.0;
         for _ in 0..ITERATIONS {
