@@ -2,7 +2,7 @@
 //! the bar that hangs on them, and tables from files.
 
 use crate::formulas::{adaptive, methods, run, scene};
-use driftless::run::{MethodId, Request, Stabilization};
+use driftless::run::{MethodId, Request, Stabilization, simulate};
 use driftless::scene::{parse_scene, read_scene};
 use driftless::stepping::Cause;
 use driftless::stepping::composition::Composition;
@@ -214,4 +214,41 @@ fn tables_come_from_files_beside_the_scene() {
         assert!(error.contains(part) && error.contains("tables.ramp"), "{said}: {error}");
     }
     std::fs::remove_dir_all(&folder).expect("removed");
+}
+
+/// A corner at the very start: the first row has what comes after it, as rows at corners later on.
+#[test]
+fn the_first_row_is_on_the_side_of_a_corner_that_the_motion_goes_to() {
+    let turning = |motor: &str, torque: &str, start: &str, output: &str| {
+        format!(
+            r#"{{"name": "turning", "gravity": [0, 0],
+            "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            {motor} {torque} "start": {{{start}}}, "outputs": {{"seen": "{output}"}}, "until": 1, "every": 0.25}}"#
+        )
+    };
+    let motor = |law: &str| format!(r#""motors": [{{"name": "M", "body": "b", "law": "{law}"}}],"#);
+    let torque = |law: &str| format!(r#""torques": [{{"name": "T", "body": "b", "torque": "{law}"}}],"#);
+    let moving = |omega: f64| format!(r#""b": {{"phi": 0, "omega": {omega}}}"#);
+    let at_rest = moving(0.0);
+    for (text, first) in [
+        (turning(&motor("max(t/(1 s), 0)^2"), "", "", "M.torque"), 1.0),
+        (turning(&motor("3*max(t/(1 s), 0)"), "", "", "b.omega"), 3.0),
+        (turning("", &torque("if(t > 0, 3, 1)"), &at_rest, "b.alpha"), 6.0),
+        (turning("", &torque("if(t < 0, 3, 1)"), &at_rest, "b.alpha"), 2.0),
+        (turning("", &torque("if(b.phi > 0, 3, 1)"), &moving(1.0), "b.alpha"), 6.0),
+        (turning("", &torque("if(b.phi > 0, 3, 1)"), &moving(-1.0), "b.alpha"), 2.0),
+    ] {
+        for method in [MethodId::Taylor, MethodId::Dp8] {
+            let mut seen = Vec::new();
+            let scene = scene(&text);
+            let outcome = simulate(&scene, &adaptive(method, 1e-11), &mut |sample| {
+                seen.push(sample.outputs[0]);
+                Ok(())
+            })
+            .expect("a plan");
+            assert!(outcome.stop.is_none(), "{:?}", outcome.stop);
+            assert!((seen[0] - first).abs() < 1e-12, "{text}: {seen:?}");
+        }
+    }
 }

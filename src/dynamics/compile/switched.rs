@@ -1,12 +1,16 @@
 //! Parts that events let act or rest: motors, locks and joints are released and put back.
 
 use super::{CompileError, Laws, Mechanism, Switches};
+use crate::arithmetic::DoubleDouble;
 use crate::dynamics::Motion;
+use crate::dynamics::configuration::Configuration;
 use crate::scene::Scene;
 use std::sync::Arc;
 
 /// Branches of laws that are tried at the start.
 const BRANCHES: usize = 8;
+/// How far after the start it is looked which way conditions change, at rates up to 1 \[s\].
+const A_MOMENT: f64 = 1e-7;
 
 impl Mechanism {
     /// The mechanism without some of its springs, torsion springs, applied forces, torques, motors, locks and
@@ -102,10 +106,10 @@ impl Mechanism {
             return self.assembled(scene, kept);
         }
         let given = self.start_as_given(scene);
-        let mut next = self.on_branches_of(&given)?.unwrap_or(self);
+        let mut next = self.on_branches_after(&given)?.unwrap_or(self);
         for _ in 0..BRANCHES {
             let found = next.clone().assembled(scene, kept)?;
-            match next.on_branches_of(&found.start(scene))? {
+            match next.on_branches_after(&found.start(scene))? {
                 Some(other) => next = other,
                 None => return Ok(found),
             }
@@ -118,11 +122,46 @@ impl Mechanism {
     /// # Errors
     /// See [`Self::on_branch`].
     pub(crate) fn on_branches_of(&self, motion: &Motion) -> Result<Option<Self>, CompileError> {
-        let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Ok(None) };
-        if modes.is_empty() {
-            return Ok(None);
+        let there = self.laws_at(motion, |laws, at| laws.formulas.modes(at, &laws.parameters));
+        there.map_or(Ok(None), |there| self.on(there))
+    }
+
+    /// The same for what comes after a motion, where conditions are zero at it and change at first order.
+    ///
+    /// # Errors
+    /// See [`Self::on_branch`].
+    pub(super) fn on_branches_after(&self, motion: &Motion) -> Result<Option<Self>, CompileError> {
+        let of = |motion: &Motion| {
+            self.laws_at(motion, |laws, at| {
+                let modes = laws.formulas.modes(at, &laws.parameters);
+                (laws.formulas.zeros(at, &laws.parameters, &modes), modes)
+            })
+        };
+        let Some((zeros, mut there)) = of(motion) else { return Ok(None) };
+        if zeros.contains(&true) {
+            let fastest = motion.omega.iter().fold(1.0, |most: f64, omega| most.max(omega.hi.abs()));
+            let (later, moment) = (&mut motion.clone(), A_MOMENT / fastest);
+            later.time = later.time + moment;
+            for (phi, omega) in later.phi.iter_mut().zip(&motion.omega) {
+                *phi += *omega * DoubleDouble::from(moment);
+            }
+            let next = of(later).map_or_else(Vec::new, |(_, modes)| modes);
+            for ((mode, next), _) in there.iter_mut().zip(next).zip(&zeros).filter(|(_, is_zero)| **is_zero) {
+                *mode = next;
+            }
         }
-        let there = self.seen(motion, |at| formulas.modes(at, parameters));
+        self.on(there)
+    }
+
+    /// What is found of the laws at a motion; nothing where no condition chooses branches.
+    fn laws_at<R>(&self, motion: &Motion, find: impl FnOnce(&Laws, &Configuration<f64>) -> R) -> Option<R> {
+        let laws = self.laws.as_ref().filter(|laws| !laws.modes.is_empty())?;
+        Some(self.seen(motion, |at| find(laws, at)))
+    }
+
+    /// The mechanism with its laws on these branches; `None` where they are on them.
+    fn on(&self, there: Vec<bool>) -> Result<Option<Self>, CompileError> {
+        let Some(Laws { parameters, modes, .. }) = &self.laws else { return Ok(None) };
         match &self.whole {
             _ if there == *modes => Ok(None),
             Some((whole, inactive)) => whole.on_branch(parameters.clone(), there)?.acting(inactive).map(Some),

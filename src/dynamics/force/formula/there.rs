@@ -27,6 +27,21 @@ impl Formulas {
         modes
     }
 
+    /// Which conditions are zero at a configuration, on these branches.
+    pub fn zeros(&self, at: &Configuration<f64>, parameters: &[f64], modes: &[bool]) -> Vec<bool> {
+        let (mut values, mut modes) = (Vec::with_capacity(modes.len()), modes);
+        self.with_signals_there(at, parameters, |signals| {
+            for expression in self.switched().filter(|expression| expression.formula.conditions() > 0) {
+                let (own, rest) = modes.split_at(expression.formula.conditions().min(modes.len()));
+                modes = rest;
+                expression.with_values(at, parameters, signals, |sources| {
+                    expression.formula.condition_values(sources, own, &mut values);
+                });
+            }
+        });
+        values.into_iter().map(|value: f64| value == 0.0).collect()
+    }
+
     /// Calls `then` with the signals on the branches that hold at a configuration.
     fn with_signals_there<R>(
         &self,
