@@ -291,3 +291,33 @@ fn a_driven_slider_has_the_force_that_moves_it() {
         );
     }
 }
+
+/// A platform on two equal cranks and locked beside them: the loop holds its angle already.  Column, output and
+/// `inspect` tell the same torque, which balances the platform with the forces of its hinges.
+#[test]
+fn the_column_of_a_redundant_lock_balances_the_forces_of_the_hinges() {
+    let crank =
+        |name: &str| json!({"name": name, "mass": 1, "centre": [0.15, 0], "inertia": 0.01, "length": 0.3});
+    let at = |body: &str, x: f64| json!({"body": body, "point": [x, 0]});
+    let hinge = |name: &str, first: Value, second: Value| json!({"name": name, "between": [first, second]});
+    let scene = json!({
+        "name": "platform", "gravity": [0, -10],
+        "bars": [{"name": "cp", "mass": 1, "centre": [0.3, 0], "inertia": 0.05, "length": 1}, crank("c0"), crank("c1")],
+        "hinges": [hinge("A0", at("ground", 0.0), at("c0", 0.0)), hinge("B0", at("c0", 0.3), at("cp", 0.0)),
+                   hinge("A1", at("ground", 1.0), at("c1", 0.0)), hinge("B1", at("c1", 0.3), at("cp", 1.0))],
+        "locks": [{"name": "lock", "body": "cp"}],
+        "outputs": {"torque": "lock.torque", "y0": "B0.fy", "y1": "B1.fy"},
+        "start": {"cp": {"phi": 0}, "c0": {"phi": 1.2, "omega": 2}, "c1": {"phi": 1.2}}, "until": 0.4, "every": 0.1,
+    });
+    let program = Program::new();
+    program.write("platform.json", &scene.to_string());
+    let (head, rows) = table(&program, "platform", "dp8-1e-9-projection");
+    let column = |title: &str| head.iter().position(|one| one == title).unwrap_or_else(|| panic!("{head:?}"));
+    let columns = ["lock.torque [N m]", "torque [N·m]", "y0 [N]", "y1 [N]"].map(column);
+    for row in &rows {
+        let [torque, output, y0, y1] = columns.map(|column| row[column]);
+        assert!((torque - output).abs() < 1e-12 && torque.abs() > 0.1, "{torque} {output}");
+        assert!((torque + 0.7 * y1 - 0.3 * y0).abs() < 1e-9, "{torque} {y0} {y1}");
+    }
+    is_near(&inspected(&scene)["constraints"]["lock"]["torque"], rows[0][columns[0]]);
+}

@@ -662,3 +662,62 @@ fn torsion_springs_by_formulas_have_angle_rate_and_torque() {
         assert_eq!(rows, 21);
     }
 }
+
+/// A body that turns evenly: shares of a turn, areas and jumps of less than a thousandth of a step are known in
+/// closed form, by methods whose steps differ.
+#[test]
+fn corners_and_jumps_between_rows_count_to_the_last_digits() {
+    let (rate, until) = (3.0, 20.0);
+    let text = format!(
+        r#"{{"name": "turning", "gravity": [0, 0],
+        "bars": [{{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}}],
+        "points": [{{"name": "tip", "body": "a", "point": [1, 0]}}],
+        "signals": {{"up": "max(tip.y, 0)"}},
+        "outputs": {{"near": "if(tip.x > 0.99999, 1, 0)", "blink": "if(t > 0.5001, if(t < 0.5003, 1, 0), 0)",
+            "up": "up", "size": "abs(tip.y)", "more": "if(tip.x > 0.5, 1 + tip.x, 0)", "clock": "min(t, 7.3)^2"}},
+        "start": {{"a": {{"phi": 0, "omega": {rate}}}}}, "until": {until}, "every": 5}}"#
+    );
+    let end = rate * until;
+    // Angles from 0 to the end at which |sin| or the cosine lies above something.
+    let within = |angle: f64| {
+        let (turns, left) = ((end / TAU).floor(), end % TAU);
+        2.0 * angle * turns + left.min(angle) + (left - (TAU - angle)).max(0.0)
+    };
+    let sine_up_to = |left: f64| if left < PI { 1.0 - left.cos() } else { 2.0 };
+    let (turns, left) = ((end / TAU).floor(), end % TAU);
+    let up = 2.0 * turns + sine_up_to(left);
+    let size = 4.0 * turns + sine_up_to(left) + if left > PI { 1.0 + left.cos() } else { 0.0 };
+    let cone = f64::acos(0.5);
+    let sines = |from: f64, to: f64| if to > from { to.sin() - from.sin() } else { 0.0 };
+    let more = within(cone) + 2.0 * cone.sin() * turns + sines(0.0, left.min(cone)) + sines(TAU - cone, left);
+    let squares = 7.3_f64.powi(3) / 3.0 + 7.3_f64.powi(2) * (until - 7.3);
+    let expected = [
+        ("near", within(f64::acos(0.99999)) / end, [0.0, 1.0]),
+        ("blink", 2e-4 / until, [0.0, 1.0]),
+        ("up", up / end, [0.0, 1.0]),
+        ("size", size / end, [0.0, 1.0]),
+        ("more", more / end, [0.0, 2.0]),
+        ("clock", squares / until, [0.0, 7.3_f64.powi(2)]),
+    ];
+    for request in [
+        adaptive(MethodId::Taylor, 1e-13),
+        adaptive(MethodId::Dp8, 1e-12),
+        adaptive(MethodId::Dp5, 1e-11),
+        adaptive(MethodId::Radau(5), 1e-12),
+    ] {
+        let outcome = run(&scene(&text), &request);
+        for (name, mean, [min, max]) in expected {
+            let one = found(&outcome.extremes, name);
+            println!("{:?} {name}: {} {mean} {:?} {:?}", request.method, one.mean, one.min, one.max);
+            assert!(
+                (one.mean - mean).abs() < 1e-9 * mean,
+                "{:?} {name}: {} {mean}",
+                request.method,
+                one.mean
+            );
+            assert!((one.min[0] - min).abs() < 1e-9 && (one.max[0] - max).abs() < 1e-9, "{name}: {one:?}");
+        }
+        assert_eq!(found(&outcome.extremes, "up").min[0], 0.0);
+    }
+}

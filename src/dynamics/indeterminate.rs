@@ -18,6 +18,9 @@ use crate::arithmetic::Complex;
 
 /// Rows up to which redundancy is taken apart.
 const MOST: usize = 300;
+/// Singular values of the rows' Jacobian below this share of the largest count as zero: rows that are
+/// singular at the start alone are not so later.
+const ZERO: f64 = 1e-9;
 /// Share of a unit of mu below which it leaves a force alone.
 const ALONE: f64 = 1e-7;
 
@@ -46,6 +49,13 @@ impl Mechanism {
     /// True where equilibrium leaves joint forces open.
     pub(super) fn leaves_forces_open(&self) -> bool {
         self.open_forces() > 0
+    }
+
+    /// Makes the multipliers of an evaluation those of its [joint forces](Self::joint_forces).
+    pub(crate) fn share_multipliers(&self, t: Time, kernel: &mut Kernel<f64>, phi: &[f64], omega: &[f64]) {
+        if self.leaves_forces_open() {
+            kernel.multiplier = self.joint_forces(t, kernel, phi, omega).multipliers;
+        }
     }
 
     /// The joint forces of an evaluation of the equations at these angles \[rad\] and rates \[rad/s\]: its
@@ -116,7 +126,7 @@ impl Mechanism {
         if self.constraints[row].is_angle() { multiplier / self.size_of_parts() } else { multiplier }
     }
 
-    /// So many independent mu with Gᵀ mu = 0, or nearest to that.
+    /// Up to so many independent mu with Gᵀ mu = 0.
     fn idle(&self, t: Time, kernel: &Kernel<f64>, phi: &[f64], omega: &[f64], count: usize) -> Vec<Vec<f64>> {
         let (rows, n, size, angles) =
             (self.constraints.len(), self.coordinates(), self.size_of_parts(), self.bodies.len());
@@ -130,7 +140,7 @@ impl Mechanism {
                 .enumerate()
                 .for_each(|(k, entry)| *entry *= unit(r) * if k < angles { 1.0 } else { size });
         }
-        let range = jacobian.svd().left(rows - count);
+        let range = jacobian.svd().left(rows - count, ZERO);
         let mut found: Vec<Vec<f64>> = Vec::new();
         // What the range leaves of each unit vector, the longest first.
         let mut rests: Vec<Vec<f64>> = (0..rows)
@@ -143,7 +153,7 @@ impl Mechanism {
         for rest in &mut rests {
             (0..2).for_each(|_| range.iter().for_each(|unit| take_off(rest, unit)));
         }
-        while found.len() < count {
+        while found.len() + range.len() < rows {
             let Some(mut longest) = rests.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b))).cloned()
             else {
                 break;

@@ -62,8 +62,8 @@ pub(crate) struct Moment<'a> {
     pub winding: &'a [f64],
     /// Rates \[rad/s, m/s\].
     pub omega: &'a [f64],
-    /// After [`Kernel::accelerate`] and [`Mechanism::spread_multipliers`], or [`Kernel::place`] where no
-    /// output [needs](Outputs::needs_equations) more.
+    /// After [`Kernel::accelerate`], or [`Kernel::place`] where no output [needs](Outputs::needs_equations)
+    /// more.
     pub kernel: &'a Kernel<f64>,
 }
 
@@ -140,8 +140,56 @@ impl Outputs {
         self.list.iter().map(|output| (output.name.as_str(), output.unit.as_str()))
     }
 
-    /// Appends their values at a moment.
-    pub fn evaluate(&self, at: &Moment, scratch: &mut OutputScratch, values: &mut Vec<f64>) {
+    /// How many conditions choose the branches of their formulas and of the signals'.
+    pub fn condition_count(&self) -> usize {
+        let all = self.list.iter().map(|output| &output.expression).chain(&self.signals);
+        all.map(|expression| expression.formula.conditions()).sum()
+    }
+
+    /// Appends their values at a moment on these branches; on those that hold there if none are given.
+    pub fn evaluate(
+        &self,
+        at: &Moment,
+        scratch: &mut OutputScratch,
+        branches: &[bool],
+        values: &mut Vec<f64>,
+    ) {
+        let mut branches = branches;
+        self.visit(at, scratch, values, |formula, sources| match branches.is_empty() {
+            true => formula.value(sources),
+            false => formula.evaluate(sources, next(&mut branches, formula)),
+        });
+    }
+
+    /// The branches that hold at a moment.
+    pub fn branches(&self, at: &Moment, scratch: &mut OutputScratch) -> Vec<bool> {
+        let mut found = Vec::new();
+        self.visit(at, scratch, &mut Vec::new(), |formula, sources| {
+            found.extend(formula.modes(sources));
+            formula.value(sources)
+        });
+        found
+    }
+
+    /// The conditions at a moment on these branches.
+    pub fn conditions(&self, at: &Moment, scratch: &mut OutputScratch, branches: &[bool]) -> Vec<f64> {
+        let (mut branches, mut found) = (branches, Vec::new());
+        self.visit(at, scratch, &mut Vec::new(), |formula, sources| {
+            let own = next(&mut branches, formula);
+            formula.condition_values(sources, own, &mut found);
+            formula.evaluate(sources, own)
+        });
+        found
+    }
+
+    /// Appends what comes of their formulas at a moment, signals first, which is what these have.
+    fn visit(
+        &self,
+        at: &Moment,
+        scratch: &mut OutputScratch,
+        values: &mut Vec<f64>,
+        mut of: impl FnMut(&Formula, &[f64]) -> f64,
+    ) {
         let Moment { mechanism, time, omega, kernel, .. } = *at;
         let OutputScratch { centres, forces, needed, signals, sources } = scratch;
         if self.needs_forces || self.needs_accelerations {
@@ -168,13 +216,20 @@ impl Outputs {
             sources.clear();
             sources.extend(expression.sources.iter().map(source));
             // The zero of an absolute value has no sign: -0.0 + 0.0 is 0.0.
-            expression.formula.value(sources) + 0.0
+            of(&expression.formula, sources) + 0.0
         };
         for signal in &self.signals {
             signals.push(value(signal, signals));
         }
         values.extend(self.list.iter().map(|output| value(&output.expression, signals)));
     }
+}
+
+/// The branches of a formula, taken off those of it and of all that come after it.
+fn next<'a>(branches: &mut &'a [bool], formula: &Formula) -> &'a [bool] {
+    let (own, rest) = branches.split_at(formula.conditions().min(branches.len()));
+    *branches = rest;
+    own
 }
 
 impl Forces {
@@ -220,7 +275,7 @@ impl Quantity<Site> {
             let number = mechanism.constraints[..mechanism.standing_rows()].iter().position(is_it)?;
             Some((&mechanism.constraints[number], forces.multipliers[number]))
         };
-        let given = |name: &str| row(&|row| row.name == name && (row.law.is_some() || row.aim.is_some()));
+        let given = |name: &str| row(&|row| row.name == name && row.moves());
         match self {
             Self::AngularAcceleration(body) => alpha[*body],
             Self::Acceleration(body, [x, y], component) => {

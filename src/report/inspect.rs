@@ -137,7 +137,6 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
     let [phi, omega] = start.rounded();
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
-    mechanism.spread_multipliers(&mut kernel);
     let (t, energy_scale) = (start.time.hi, mechanism.energy_scale);
     let mut found = Inspection { t, energy_scale, ..Inspection::default() };
     let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);
@@ -197,6 +196,7 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
         outputs.evaluate(
             &Moment { mechanism, time, phi, winding, omega, kernel: &kernel },
             &mut OutputScratch::default(),
+            &[],
             &mut values,
         );
         let named = outputs.heads().zip(values);

@@ -4,13 +4,15 @@
 //! The outputs are interpolated at Chebyshev points of every step, by as high a degree as they ask for; the
 //! zeros of the interpolants' slopes are the extremes, their integrals the means.  Where all of them lie well
 //! between the extremes known so far, as in most steps of a long run, one low degree serves, and the cheapest
-//! interpolation of the motion.
+//! interpolation of the motion.  Steps in which an output has a corner or jumps are taken apart there.
+
+mod parts;
 
 use super::inside::{Inside, StepWatcher};
 use super::magnitude::{changes, last_digits};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::{Moment, OutputScratch};
+use crate::dynamics::output::{Moment, OutputScratch, Outputs};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, golden_sections, interpolated};
 use serde::{Deserialize, Serialize};
@@ -140,6 +142,8 @@ pub(super) struct ExtremesMemory {
     is_short: bool,
     /// Magnitudes of the outputs that are rounding.
     rounding: Vec<f64>,
+    /// The same of the conditions that choose their branches.
+    still: Vec<f64>,
 }
 
 /// Looks at the outputs of every step.
@@ -148,6 +152,8 @@ pub(super) struct ExtremesDetector {
     kernel: Kernel<f64>,
     coordinates: [Vec<f64>; 3],
     scratch: OutputScratch,
+    /// The branches their formulas are evaluated on; none: those that hold at each place.
+    branches: Vec<bool>,
     pub memory: ExtremesMemory,
 }
 
@@ -160,6 +166,7 @@ impl ExtremesDetector {
             mechanism: Arc::clone(mechanism),
             coordinates: Default::default(),
             scratch: OutputScratch::default(),
+            branches: Vec::new(),
             memory: ExtremesMemory { found: vec![Found::default(); count], ..ExtremesMemory::default() },
         })
     }
@@ -176,7 +183,10 @@ impl ExtremesDetector {
     /// Takes what a run before remembered; false where it is of other outputs.
     pub fn restore(&mut self, memory: ExtremesMemory) -> bool {
         let count = self.memory.found.len();
-        let fits = memory.found.len() == count && [0, count].contains(&memory.rounding.len());
+        let conditions = self.condition_count();
+        let fits = memory.found.len() == count
+            && [0, count].contains(&memory.rounding.len())
+            && [0, conditions].contains(&memory.still.len());
         if fits {
             self.memory = memory;
         }
@@ -203,6 +213,19 @@ impl ExtremesDetector {
 
     /// Appends the outputs at a motion.
     fn values(&mut self, motion: &Motion, values: &mut Vec<f64>) {
+        let branches = std::mem::take(&mut self.branches);
+        self.with_outputs(motion, |outputs, moment, scratch| {
+            outputs.evaluate(moment, scratch, &branches, values)
+        });
+        self.branches = branches;
+    }
+
+    /// Shows the outputs a motion.
+    fn with_outputs<R: Default>(
+        &mut self,
+        motion: &Motion,
+        what: impl FnOnce(&Outputs, &Moment, &mut OutputScratch) -> R,
+    ) -> R {
         let Self { mechanism, kernel, coordinates: [phi, winding, omega], scratch, .. } = self;
         for (to, from) in [(&mut *phi, &motion.phi), (&mut *omega, &motion.omega)] {
             to.clear();
@@ -210,18 +233,13 @@ impl ExtremesDetector {
         }
         winding.clear();
         winding.extend((0..phi.len()).map(|k| motion.unwrapped(k)));
-        let Some(outputs) = &mechanism.outputs else { return };
+        let Some(outputs) = &mechanism.outputs else { return R::default() };
         if outputs.needs_equations() {
             kernel.accelerate::<0>(mechanism, motion.time, phi, omega, Bias::default());
-            mechanism.spread_multipliers(kernel);
         } else {
             kernel.place(mechanism, phi);
         }
-        outputs.evaluate(
-            &Moment { mechanism, time: motion.time, phi, winding, omega, kernel },
-            scratch,
-            values,
-        );
+        what(outputs, &Moment { mechanism, time: motion.time, phi, winding, omega, kernel }, scratch)
     }
 
     /// The outputs at a motion.
@@ -284,6 +302,7 @@ impl ExtremesDetector {
     /// Takes the outputs at the end of a run, where a jump has made the event that ends it happen: no step
     /// follows.
     pub fn end(&mut self, motion: &Motion) {
+        self.branches.clear();
         let values = self.values_at(motion);
         for (found, value) in self.memory.found.iter_mut().zip(values) {
             found.see(value, motion.time.hi);
@@ -307,12 +326,18 @@ impl ExtremesDetector {
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
         }
         self.memory.span += DoubleDouble::from(span);
+        let ends = self.true_ends(inside, begin, span);
         let mut row = Vec::new();
         for (k, (curve, values)) in curves.iter().zip(&values).enumerate() {
             let found = &mut self.memory.found[k];
             found.sum_up(curve, nodes, values, span);
-            for (value, node) in values.iter().zip(&nodes.places) {
-                found.see(*value, (begin + node * span).hi);
+            for (i, (value, node)) in values.iter().zip(&nodes.places).enumerate() {
+                let is_end = i == 0 || i + 1 == values.len();
+                let seen =
+                    ends.as_ref().filter(|_| is_end).map(|[to, from]| if i == 0 { to[k] } else { from[k] });
+                // Beside a jump the limit counts.
+                let seen = seen.filter(|seen| (seen - value).abs() <= MARGIN * curve.most());
+                found.see(seen.unwrap_or(*value), (begin + node * span).hi);
             }
             if found.holds(curve, rounding[k]) {
                 continue;
@@ -404,8 +429,9 @@ impl StepWatcher for ExtremesDetector {
             self.memory.rounding =
                 changes.map(|change| if change.is_finite() { ROUNDING * change } else { 0.0 }).collect();
         }
-        if span > 0.0 && !self.passes(inside, begin, span) {
-            self.look(inside, begin, span, 0);
+        match self.condition_count() {
+            0 => self.look_at(inside, begin, span),
+            _ => self.look_at_parts(inside, begin, span),
         }
         None
     }

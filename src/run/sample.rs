@@ -4,7 +4,7 @@
 //! not the rounding of its measurement.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::{ConstraintEquation, Posture};
 use crate::dynamics::energy::Energy;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
@@ -189,7 +189,9 @@ impl Sampler {
             self.plain.unit_vectors::<0>(mechanism, &self.phi);
         } else {
             self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
-            self.holding.spread_multipliers(&mut self.plain);
+        }
+        if mechanism.constraints.iter().any(ConstraintEquation::moves) {
+            self.holding.share_multipliers(motion.time, &mut self.plain, &self.phi, &self.omega);
         }
         let is_watched = self.plain.weakest.share < WATCHED && self.holding.has_closed_loops();
         let sample = &mut self.sample;
@@ -218,11 +220,7 @@ impl Sampler {
             let rate = self.jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
             sample.constraints[r] = [here.position.hi, rate.hi];
             let force = -self.plain.multiplier[r];
-            sample.motors[r] = if row.law.is_some() || row.aim.is_some() {
-                [force, -force * here.drive.hi]
-            } else {
-                [0.0, 0.0]
-            };
+            sample.motors[r] = if row.moves() { [force, -force * here.drive.hi] } else { [0.0, 0.0] };
         }
         if let Some(outputs) = &mechanism.outputs {
             let moment = Moment {
@@ -234,7 +232,7 @@ impl Sampler {
                 kernel: &self.plain,
             };
             sample.outputs.clear();
-            outputs.evaluate(&moment, &mut self.scratch, &mut sample.outputs);
+            outputs.evaluate(&moment, &mut self.scratch, &[], &mut sample.outputs);
         }
         sample
     }

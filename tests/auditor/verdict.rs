@@ -50,9 +50,8 @@ pub fn run(text: &str, request: &Request) -> Result<Ran, String> {
     let mut kernel = Kernel::<f64>::new(&mechanism);
     let forces = samples.iter().map(|sample| {
         kernel.accelerate::<0>(&mechanism, Time::from(sample.t), &sample.phi, &sample.omega, Bias::default());
-        mechanism.spread_multipliers(&mut kernel);
-        let forces = mechanism.hinge_forces(Time::from(sample.t), &kernel, &sample.phi, &sample.omega);
-        (forces.iter().map(|force| [force.re, force.im]).collect(), kernel.multiplier.clone())
+        let found = mechanism.joint_forces(Time::from(sample.t), &kernel, &sample.phi, &sample.omega);
+        (found.hinges.iter().map(|force| [force.re, force.im]).collect(), found.multipliers)
     });
     let forces = forces.collect();
     Ok(Ran { samples, forces, outcome, mechanism })

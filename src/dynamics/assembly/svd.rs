@@ -200,21 +200,12 @@ impl Svd {
         self.triples.iter().fold(0.0, |most, triple| triple.0.max(most))
     }
 
-    /// The left vectors of the largest singular values, so many at most.
-    pub fn left(mut self, count: usize) -> Vec<Vec<f64>> {
+    /// The left vectors of the largest singular values: `least` of them, and all above a share of the first.
+    pub fn left(mut self, least: usize, share: f64) -> Vec<Vec<f64>> {
         self.triples.sort_by(|a, b| b.0.total_cmp(&a.0));
-        self.triples.into_iter().take(count).map(|(_, u, _)| u).collect()
-    }
-
-    /// The part of `b` that A x can be, singular values below a share of the largest counting as zero.
-    pub fn in_range(&self, b: &[f64], share: f64) -> Vec<f64> {
-        let least = share * self.largest();
-        let mut sum = vec![0.0; b.len()];
-        for (_, u, _) in self.triples.iter().filter(|triple| triple.0 > least) {
-            let part = dot(u, b);
-            sum.iter_mut().zip(u).for_each(|(sum, u)| *sum += part * u);
-        }
-        sum
+        let zero = share * self.largest();
+        let counts = |(k, triple): &(usize, (f64, Vec<f64>, Vec<f64>))| *k < least || triple.0 > zero;
+        self.triples.into_iter().enumerate().take_while(counts).map(|(_, (_, u, _))| u).collect()
     }
 
     /// The shortest x for which A x is nearest to `b`; singular values below `share` of the largest count as

@@ -1,5 +1,4 @@
-//! What there is to watch of the rows while a mechanism moves: how near to a singular position it is, and
-//! multipliers where rows depend on one another.
+//! What there is to watch of the rows while a mechanism moves: how near to a singular position it is.
 
 use super::svd::Matrix;
 use crate::dynamics::Mechanism;
@@ -7,8 +6,6 @@ use crate::dynamics::kernel::Kernel;
 
 /// Rows up to which this is formed.
 const MOST: usize = 64;
-/// Singular values below this share of the largest count as zero.
-const ZERO: f64 = 1e-9;
 
 impl Mechanism {
     /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of
@@ -24,24 +21,6 @@ impl Mechanism {
             Some(least) => least / values.last().unwrap_or(&f64::NAN),
             // Those that are exactly zero are not listed.
             None => 0.0,
-        }
-    }
-
-    /// Makes the multipliers of an evaluation those of least norm: where rows depend on one another, others
-    /// have the same effect.
-    pub fn spread_multipliers(&self, kernel: &mut Kernel<f64>) {
-        if self.assembly.redundant.is_empty() {
-            return;
-        }
-        let Some(jacobian) = self.measured(kernel) else { return };
-        let size = self.size_of_parts();
-        let unit: Vec<f64> =
-            self.constraints.iter().map(|row| if row.is_angle() { 1.0 } else { size }).collect();
-        let measured: Vec<f64> =
-            kernel.multiplier.iter().zip(&unit).map(|(multiplier, unit)| multiplier * unit).collect();
-        let least = jacobian.svd().in_range(&measured, ZERO);
-        for (multiplier, (least, unit)) in kernel.multiplier.iter_mut().zip(least.iter().zip(&unit)) {
-            *multiplier = least / unit;
         }
     }
 
@@ -106,24 +85,6 @@ mod tests {
         let mut kernel = Kernel::new(mechanism);
         kernel.accelerate::<0>(mechanism, Time::default(), &[phi, phi, phi, 0.0], &[0.0; 4], Bias::default());
         kernel
-    }
-
-    #[test]
-    fn redundant_rows_share_the_load_and_have_the_same_effect() {
-        let phi = 1.3;
-        let mechanism = three_cranks(phi);
-        assert_eq!((mechanism.assembly.redundant.len(), mechanism.assembly.degrees_of_freedom), (1, 1));
-        let mut kernel = evaluated(&mechanism, phi);
-        let (before, jacobian) = (kernel.multiplier.clone(), kernel.jacobian.clone());
-        mechanism.spread_multipliers(&mut kernel);
-        let effect = |multiplier: &[f64], k: usize| -> f64 {
-            multiplier.iter().enumerate().map(|(r, m)| jacobian[r * 4 + k] * m).sum()
-        };
-        let norm = |multiplier: &[f64]| multiplier.iter().map(|m| m * m).sum::<f64>();
-        for k in 0..4 {
-            assert!((effect(&before, k) - effect(&kernel.multiplier, k)).abs() < 1e-12);
-        }
-        assert!(norm(&kernel.multiplier) < 0.99 * norm(&before), "{before:?} {:?}", kernel.multiplier);
     }
 
     #[test]

@@ -137,7 +137,7 @@ impl Walk {
         let (mechanism, n) = (&*self.mechanism, self.alpha.len());
         let (phi, omega) = (&self.state.y[..n], &self.state.y[n..2 * n]);
         self.kernel.accelerate::<0>(mechanism, self.state.time, phi, omega, Bias::default());
-        mechanism.spread_multipliers(&mut self.kernel);
+        mechanism.share_multipliers(self.state.time, &mut self.kernel, phi, omega);
         self.alpha.copy_from_slice(&self.kernel.load);
     }
 
@@ -370,7 +370,7 @@ impl Walk {
                 omega: &self.state.y[n..2 * n],
                 kernel: &self.kernel,
             };
-            outputs.evaluate(&moment, &mut OutputScratch::default(), &mut values);
+            outputs.evaluate(&moment, &mut OutputScratch::default(), &[], &mut values);
         }
         values
     }

@@ -94,12 +94,12 @@ fn outputs_at(
     let mut values = Vec::new();
     let Some(outputs) = &mechanism.outputs else { return values };
     kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
-    mechanism.spread_multipliers(kernel);
     let turned = |k: usize| motion.unwrapped(k) - motion.phi[k].hi;
     let winding: Vec<f64> = (0..phi.len()).map(|k| phi[k] + turned(k)).collect();
     outputs.evaluate(
         &Moment { mechanism, time: t, phi, winding: &winding, omega, kernel },
         &mut OutputScratch::default(),
+        &[],
         &mut values,
     );
     values

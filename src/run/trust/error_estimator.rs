@@ -105,7 +105,7 @@ impl Torques {
         for (torques, motion) in of.iter_mut().zip(motions) {
             let [phi, omega] = motion.rounded();
             kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
-            mechanism.spread_multipliers(kernel);
+            mechanism.share_multipliers(motion.time, kernel, &phi, &omega);
             torques.clear();
             let motors =
                 mechanism.constraints.iter().zip(&kernel.multiplier).filter(|(row, _)| row.law.is_some());
