@@ -225,6 +225,7 @@ impl Lanes for Portable {
         code.run::<Self>()
     }
 
+    #[inline(never)]
     fn perform<T: wide::Task>(task: T) -> T::Output {
         task.perform()
     }

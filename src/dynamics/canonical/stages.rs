@@ -121,13 +121,13 @@ impl<L: Lanes> Both<L> {
     }
 }
 
-struct Rates<'a, const N: usize, const WORK: bool, const EXACT: bool>(
-    &'a mut Both<Vector>,
+struct Rates<'a, V, const N: usize, const WORK: bool, const EXACT: bool>(
+    &'a mut Both<V>,
     &'a Mechanism,
     &'a mut Points,
 );
 
-impl<const N: usize, const WORK: bool, const EXACT: bool> Code for Rates<'_, N, WORK, EXACT> {
+impl<V: Lanes, const N: usize, const WORK: bool, const EXACT: bool> Code for Rates<'_, V, N, WORK, EXACT> {
     type Output = ();
 
     #[inline(always)]
@@ -143,7 +143,7 @@ fn in_hardware<const N: usize, const WORK: bool, const EXACT: bool>(
     mechanism: &Mechanism,
     points: &mut Points,
 ) {
-    hardware.run(Rates::<N, WORK, EXACT>(both, mechanism, points));
+    hardware.run(Rates::<_, N, WORK, EXACT>(both, mechanism, points));
 }
 
 impl Stages {
@@ -172,10 +172,10 @@ impl Stages {
         // The sizes worth unrolling; any other count of the same operations has the same bits.
         match &mut self.room {
             Room::Portable(both) => match (work_integral, exact) {
-                (false, false) => both.rates::<0, false, false>(mechanism, points),
-                (false, true) => both.rates::<0, false, true>(mechanism, points),
-                (true, false) => both.rates::<0, true, false>(mechanism, points),
-                (true, true) => both.rates::<0, true, true>(mechanism, points),
+                (false, false) => Portable::apart(Rates::<_, 0, false, false>(both, mechanism, points)),
+                (false, true) => Portable::apart(Rates::<_, 0, false, true>(both, mechanism, points)),
+                (true, false) => Portable::apart(Rates::<_, 0, true, false>(both, mechanism, points)),
+                (true, true) => Portable::apart(Rates::<_, 0, true, true>(both, mechanism, points)),
             },
             Room::Hardware(hardware, both) => {
                 let code = match (mechanism.size(), work_integral, exact) {

@@ -10,6 +10,7 @@ use super::swinging::{self, Swinging};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::dynamics::natural::Reduced;
 use crate::dynamics::{Mechanism, MotionPowers, State};
+use std::fmt::Debug;
 
 /// The least order mechanisms with loops are expanded to: each costs little beside the matrices of the step.
 const LOOPED: usize = 20;
@@ -20,9 +21,7 @@ const EXTENDED: usize = 24;
 #[derive(Clone, Debug)]
 pub struct Fast {
     settings: Settings,
-    form: Form,
-    step: Step,
-    go: Go,
+    kernel: Box<dyn Kernel>,
 }
 
 /// What it was made for.
@@ -35,168 +34,190 @@ struct Settings {
     is_extended: bool,
 }
 
-/// What it runs on; the first three do not know their pace.
+/// A mechanism's own series, with its scratch space.
+trait Series: Clone + Debug + Send + Sync + 'static {
+    /// One step of a state by at most `left` \[s\]: the step wanted and the step taken, or `None` where the
+    /// series of any mechanism must take over.
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)>;
+
+    /// Takes a state that stands where the last step began on by `h` \[s\].
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64);
+
+    /// Writes the powers of the last step; false where it keeps none of unit vectors and rates alone.
+    fn powers(&self, _powers: &mut MotionPowers) -> bool {
+        false
+    }
+}
+
+/// The same in code of its own for the processor's vectors, or without them; each series by itself, as
+/// compilers take much longer for all of them in one function.
+trait Kernel: Debug + Send + Sync {
+    fn step(&mut self, state: &mut State, left: f64, is_portable: bool) -> Option<(f64, f64)>;
+    fn go(&mut self, state: &mut State, h: f64, is_portable: bool);
+    fn powers(&self, powers: &mut MotionPowers) -> bool;
+    fn boxed(&self) -> Box<dyn Kernel>;
+}
+
+impl<S: Series> Kernel for S {
+    fn step(&mut self, state: &mut State, left: f64, is_portable: bool) -> Option<(f64, f64)> {
+        lanes::run(Stepping(self, state, left), is_portable)
+    }
+
+    fn go(&mut self, state: &mut State, h: f64, is_portable: bool) {
+        lanes::run(Going(self, state, h), is_portable);
+    }
+
+    fn powers(&self, powers: &mut MotionPowers) -> bool {
+        Series::powers(self, powers)
+    }
+
+    fn boxed(&self) -> Box<dyn Kernel> {
+        Box::new(self.clone())
+    }
+}
+
+impl Clone for Box<dyn Kernel> {
+    fn clone(&self) -> Self {
+        self.boxed()
+    }
+}
+
+/// A step.
+struct Stepping<'a, S>(&'a mut S, &'a mut State, f64);
+
+impl<S: Series> Code for Stepping<'_, S> {
+    type Output = Option<(f64, f64)>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Option<(f64, f64)> {
+        self.0.step::<L>(self.1, self.2)
+    }
+}
+
+/// A way on.
+struct Going<'a, S>(&'a mut S, &'a mut State, f64);
+
+impl<S: Series> Code for Going<'_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        self.0.go::<L>(self.1, self.2);
+    }
+}
+
+/// Two bodies, by a series of order `P`.
 #[derive(Clone, Debug)]
-enum Form {
-    Pair(Pair, StepSize, Box<pair::Scratch>),
-    Extended(Pair, StepSize, Box<extended::Scratch>),
-    Driven(Box<Driven>, StepSize, Box<driven::Scratch>),
-    Swinging(Box<Swinging>),
-    Few(Box<Bodies<1, 0>>),
-    Several(Box<Bodies<2, 0>>),
-    FewSprung(Box<Bodies<1, 1>>),
-    SeveralSprung(Box<Bodies<2, 1>>),
-    FewLooped(Box<Looped<1>>),
-    SeveralLooped(Box<Looped<2>>),
-    ManyLooped(Box<Looped<4>>),
-}
+struct OfPair<const P: usize>(Pair, StepSize, Box<pair::Scratch>);
 
-/// One step of a state by at most so many seconds, without the processor's vectors where the last is true:
-/// the step wanted and the step taken, or `None` where the series of any mechanism must take over.
-type Step = fn(&mut Form, &mut State, f64, bool) -> Option<(f64, f64)>;
-
-/// From the last step's start on by so many seconds, likewise.
-type Go = fn(&mut Form, &mut State, f64, bool);
-
-/// A step of order `P`.
-struct Stepping<'a, const P: usize>(&'a mut Form, &'a mut State, f64);
-
-impl<const P: usize> Code for Stepping<'_, P> {
-    type Output = Option<(f64, f64)>;
+impl<const P: usize> Series for OfPair<P> {
+    #[inline(always)]
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
+        let Self(pair, step_size, scratch) = self;
+        let mut flow = pair::Flow::of(pair, state);
+        let steps = pair::step::<L, P>(pair, step_size, scratch, &mut flow, left);
+        flow.write(pair, state);
+        Some(steps)
+    }
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<(f64, f64)> {
-        step::<L, P>(self.0, self.1, self.2)
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
+        let mut flow = pair::Flow::of(&self.0, state);
+        pair::go::<L, P>(&self.2, &mut flow, h);
+        flow.write(&self.0, state);
+    }
+
+    fn powers(&self, powers: &mut MotionPowers) -> bool {
+        self.0.powers(&self.2, P, powers);
+        true
     }
 }
 
-/// A way on by a series of order `P`.
-struct Going<'a, const P: usize>(&'a mut Form, &'a mut State, f64);
+/// The same with the first orders in double-double.
+#[derive(Clone, Debug)]
+struct OfExtended(Pair, StepSize, Box<extended::Scratch>);
 
-impl<const P: usize> Code for Going<'_, P> {
-    type Output = ();
+impl Series for OfExtended {
+    #[inline(always)]
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
+        let Self(pair, step_size, scratch) = self;
+        let mut flow = pair::Flow::of(pair, state);
+        let steps = extended::step::<L, EXTENDED>(pair, step_size, scratch, &mut flow, left);
+        flow.write(pair, state);
+        Some(steps)
+    }
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        go::<L, P>(self.0, self.1, self.2);
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
+        let mut flow = pair::Flow::of(&self.0, state);
+        extended::go::<L, EXTENDED>(&self.2, &mut flow, h);
+        flow.write(&self.0, state);
     }
 }
 
-/// The code of one order.
-fn of_order<const P: usize>() -> (Step, Go) {
-    (
-        |form, state, left, is_portable| lanes::run(Stepping::<P>(form, state, left), is_portable),
-        |form, state, h, is_portable| lanes::run(Going::<P>(form, state, h), is_portable),
-    )
-}
+/// A bar on one that a motor turns evenly, by a series of order `P`.
+#[derive(Clone, Debug)]
+struct OfDriven<const P: usize>(Box<Driven>, StepSize, Box<driven::Scratch>);
 
-#[inline(always)]
-fn step<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
-    Some(match form {
-        Form::Pair(pair, step_size, scratch) => {
-            let mut flow = pair::Flow::of(pair, state);
-            let steps = pair::step::<L, P>(pair, step_size, scratch, &mut flow, left);
-            flow.write(pair, state);
-            steps
-        }
-        Form::Extended(pair, step_size, scratch) if P == EXTENDED => {
-            let mut flow = pair::Flow::of(pair, state);
-            let steps = extended::step::<L, P>(pair, step_size, scratch, &mut flow, left);
-            flow.write(pair, state);
-            steps
-        }
-        Form::Driven(driven, step_size, scratch) => {
-            let mut flow = driven::Flow::of(state);
-            let steps = driven::step::<L, P>(driven, step_size, scratch, &mut flow, state.time, left);
-            flow.write(state);
-            steps
-        }
-        _ => (f64::NAN, 0.0),
-    })
-}
-
-/// Takes a state from the last step's start on by `h` \[s\].
-#[inline(always)]
-fn go<L: Lanes, const P: usize>(form: &mut Form, state: &mut State, h: f64) {
-    match form {
-        Form::Pair(pair, _, scratch) => {
-            let mut flow = pair::Flow::of(pair, state);
-            pair::go::<L, P>(scratch, &mut flow, h);
-            flow.write(pair, state);
-        }
-        Form::Extended(pair, _, scratch) => {
-            let mut flow = pair::Flow::of(pair, state);
-            extended::go::<L, P>(scratch, &mut flow, h);
-            flow.write(pair, state);
-        }
-        Form::Driven(driven, _, scratch) => {
-            let mut flow = driven::Flow::of(state);
-            driven::go::<L, P>(driven, scratch, &mut flow, h);
-            flow.write(state);
-        }
-        _ => {}
+impl<const P: usize> Series for OfDriven<P> {
+    #[inline(always)]
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
+        let Self(driven, step_size, scratch) = self;
+        let mut flow = driven::Flow::of(state);
+        let steps = driven::step::<L, P>(driven, step_size, scratch, &mut flow, state.time, left);
+        flow.write(state);
+        Some(steps)
     }
-}
-
-/// A step of any order, by the forms that know theirs.
-struct AnyStepping<'a>(&'a mut Form, &'a mut State, f64);
-
-impl Code for AnyStepping<'_> {
-    type Output = Option<(f64, f64)>;
 
     #[inline(always)]
-    fn run<L: Lanes>(self) -> Option<(f64, f64)> {
-        any_step::<L>(self.0, self.1, self.2)
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
+        let mut flow = driven::Flow::of(state);
+        driven::go::<L, P>(&self.0, &self.2, &mut flow, h);
+        flow.write(state);
     }
 }
 
-/// A way on by such a series.
-struct AnyGoing<'a>(&'a mut Form, &'a mut State, f64);
-
-impl Code for AnyGoing<'_> {
-    type Output = ();
+impl Series for Swinging {
+    #[inline(always)]
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
+        Some(swinging::step::<L>(self, state, left))
+    }
 
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        any_go::<L>(self.0, self.1, self.2);
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
+        swinging::go::<L>(self, state, h);
     }
 }
 
-/// The code of all orders.
-fn of_any() -> (Step, Go) {
-    (
-        |form, state, left, is_portable| lanes::run(AnyStepping(form, state, left), is_portable),
-        |form, state, h, is_portable| lanes::run(AnyGoing(form, state, h), is_portable),
-    )
-}
+impl<const B: usize, const S: usize> Series for Bodies<B, S> {
+    #[inline(always)]
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
+        Some(bodies::step::<L, B, S>(self, state, left))
+    }
 
-#[inline(always)]
-fn any_step<L: Lanes>(form: &mut Form, state: &mut State, left: f64) -> Option<(f64, f64)> {
-    match form {
-        Form::Swinging(swinging) => Some(swinging::step::<L>(swinging, state, left)),
-        Form::Few(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
-        Form::Several(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
-        Form::FewSprung(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
-        Form::SeveralSprung(bodies) => Some(bodies::step::<L, _, _>(bodies, state, left)),
-        Form::FewLooped(looped) => looped::step::<L, 1>(looped, state, left),
-        Form::SeveralLooped(looped) => looped::step::<L, 2>(looped, state, left),
-        Form::ManyLooped(looped) => looped::step::<L, 4>(looped, state, left),
-        _ => None,
+    #[inline(always)]
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
+        bodies::go::<L, B, S>(self, state, h);
+    }
+
+    fn powers(&self, powers: &mut MotionPowers) -> bool {
+        // Springs have unknowns of their own.
+        if S == 0 {
+            self.powers(powers);
+        }
+        S == 0
     }
 }
 
-#[inline(always)]
-fn any_go<L: Lanes>(form: &mut Form, state: &mut State, h: f64) {
-    match form {
-        Form::Swinging(swinging) => swinging::go::<L>(swinging, state, h),
-        Form::Few(bodies) => bodies::go::<L, _, _>(bodies, state, h),
-        Form::Several(bodies) => bodies::go::<L, _, _>(bodies, state, h),
-        Form::FewSprung(bodies) => bodies::go::<L, _, _>(bodies, state, h),
-        Form::SeveralSprung(bodies) => bodies::go::<L, _, _>(bodies, state, h),
-        Form::FewLooped(looped) => looped::go::<L, 1>(looped, state, h),
-        Form::SeveralLooped(looped) => looped::go::<L, 2>(looped, state, h),
-        Form::ManyLooped(looped) => looped::go::<L, 4>(looped, state, h),
-        _ => {}
+impl<const B: usize> Series for Looped<B> {
+    #[inline(always)]
+    fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
+        looped::step::<L, B>(self, state, left)
+    }
+
+    #[inline(always)]
+    fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
+        looped::go::<L, B>(self, state, h);
     }
 }
 
@@ -209,43 +230,46 @@ impl Fast {
         is_portable: bool,
         is_extended: bool,
     ) -> Option<Self> {
-        let settings =
-            || Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
         let step_size = |longest| StepSize::new(tolerance, order, longest).over(mechanism.units.time);
-        let form = if is_extended {
+        let kernel: Box<dyn Kernel> = if is_extended {
             let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
             let step_size = step_size(pair.longest(order));
-            Form::Extended(pair, step_size, Box::default())
+            Box::new(OfExtended(pair, step_size, Box::default()))
         } else if let Some(pair) = Pair::new(mechanism) {
             let step_size = step_size(pair.longest(order));
-            Form::Pair(pair, step_size, Box::default())
-        } else if let Some(driven) = Driven::new(mechanism) {
+            match order {
+                16 => Box::new(OfPair::<16>(pair, step_size, Box::default())),
+                20 => Box::new(OfPair::<20>(pair, step_size, Box::default())),
+                24 => Box::new(OfPair::<24>(pair, step_size, Box::default())),
+                _ => return None,
+            }
+        } else if let Some(driven) = Driven::new(mechanism).map(Box::new) {
             let step_size = step_size(driven.longest(order));
-            Form::Driven(Box::new(driven), step_size, Box::default())
+            match order {
+                16 => Box::new(OfDriven::<16>(driven, step_size, Box::default())),
+                20 => Box::new(OfDriven::<20>(driven, step_size, Box::default())),
+                24 => Box::new(OfDriven::<24>(driven, step_size, Box::default())),
+                _ => return None,
+            }
+        } else if let Some(swinging) = Swinging::new(mechanism, tolerance, order) {
+            Box::new(swinging)
         } else {
-            let swinging = Swinging::new(mechanism, tolerance, order).map(Box::new).map(Form::Swinging);
-            let form = swinging.or_else(|| Self::bodies(mechanism, tolerance, order))?;
-            return Some(Self::of_any(settings(), form));
+            Self::bodies(mechanism, tolerance, order)?
         };
-        let (step, go) = match order {
-            16 => of_order::<16>(),
-            20 => of_order::<20>(),
-            24 => of_order::<24>(),
-            _ => return None,
-        };
-        Some(Self { settings: settings(), form, step, go })
+        let settings = Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended };
+        Some(Self { settings, kernel })
     }
 
-    /// The smallest form that has room for all bodies and springs.
-    fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Form> {
+    /// The smallest series that has room for all bodies and springs.
+    fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Box<dyn Kernel>> {
         fn of<const B: usize, const S: usize>(
             (mechanism, tolerance, order): (&Mechanism, f64, usize),
-        ) -> Option<Box<Bodies<B, S>>> {
-            Bodies::new(mechanism, tolerance, order).map(Box::new)
+        ) -> Option<Box<dyn Kernel>> {
+            Bodies::<B, S>::new(mechanism, tolerance, order).map(|bodies| Box::new(bodies) as Box<dyn Kernel>)
         }
         let wanted = (mechanism, tolerance, order);
-        let free = of(wanted).map(Form::Few).or_else(|| of(wanted).map(Form::Several));
-        free.or_else(|| of(wanted).map(Form::FewSprung)).or_else(|| of(wanted).map(Form::SeveralSprung))
+        let free = of::<1, 0>(wanted).or_else(|| of::<2, 0>(wanted));
+        free.or_else(|| of::<1, 1>(wanted)).or_else(|| of::<2, 1>(wanted))
     }
 
     /// The kernel of a mechanism with loops, where there is one: it sums the best of all orders up to the one
@@ -257,21 +281,23 @@ impl Fast {
         order: usize,
         is_portable: bool,
     ) -> Option<Self> {
-        let highest = order.max(LOOPED);
-        let form = match mechanism.bodies.len() {
-            0..=4 => Form::FewLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
-            5..=8 => Form::SeveralLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
-            _ => Form::ManyLooped(Box::new(Looped::new(mechanism, reduced, tolerance, highest)?)),
+        fn of<const B: usize>(
+            (mechanism, reduced): (&Mechanism, &Reduced),
+            tolerance: f64,
+            order: usize,
+        ) -> Option<Box<dyn Kernel>> {
+            let looped = Looped::<B>::new(mechanism, reduced, tolerance, order)?;
+            Some(Box::new(looped))
+        }
+        let (wanted, highest) = ((mechanism, reduced), order.max(LOOPED));
+        let kernel = match mechanism.bodies.len() {
+            0..=4 => of::<1>(wanted, tolerance, highest)?,
+            5..=8 => of::<2>(wanted, tolerance, highest)?,
+            _ => of::<4>(wanted, tolerance, highest)?,
         };
         let settings =
             Settings { mechanism: mechanism.clone(), tolerance, order, is_portable, is_extended: false };
-        Some(Self::of_any(settings, form))
-    }
-
-    /// With a form that knows its order and its pace.
-    fn of_any(settings: Settings, form: Form) -> Self {
-        let (step, go) = of_any();
-        Self { settings, form, step, go }
+        Some(Self { settings, kernel })
     }
 
     /// True where it was made for all these.
@@ -293,22 +319,16 @@ impl Fast {
     /// step wanted and the step taken.
     #[inline]
     pub fn step(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
-        (self.step)(&mut self.form, state, left, self.settings.is_portable)
+        self.kernel.step(state, left, self.settings.is_portable)
     }
 
     /// Takes a state that stands where the last step began on by `h` \[s\], as the step would have.
     pub fn go(&mut self, state: &mut State, h: f64) {
-        (self.go)(&mut self.form, state, h, self.settings.is_portable);
+        self.kernel.go(state, h, self.settings.is_portable);
     }
 
-    /// Writes the powers of the last step; false where the form keeps none of unit vectors and rates alone.
+    /// Writes the powers of the last step; false where the series keeps none of unit vectors and rates alone.
     pub fn powers(&self, powers: &mut MotionPowers) -> bool {
-        match &self.form {
-            Form::Pair(pair, _, scratch) => pair.powers(scratch, self.settings.order, powers),
-            Form::Few(bodies) => bodies.powers(powers),
-            Form::Several(bodies) => bodies.powers(powers),
-            _ => return false,
-        }
-        true
+        self.kernel.powers(powers)
     }
 }

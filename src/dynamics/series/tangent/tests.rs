@@ -14,23 +14,31 @@ use std::sync::Arc;
 /// Orders are found two at a time, so both kinds of a last one are looked at.
 const ORDERS: [usize; 2] = [16, 15];
 
-/// The reference is made in these alone: in all vectors it is half of the code of these tests.
-type Plain = InSlots<[Portable; 2]>;
+/// The reference is made of these, one derivative at a time: in vectors it is most of these tests' code.
+type Plain = InSlots<Single<Portable>>;
 
-/// A mechanism whose constants have derivatives, and where it starts.
-fn mechanism(name: &str, numbers: &[&'static str]) -> (ExactMechanism<Number>, Vec<Number>, Vec<Number>) {
+/// A mechanism whose constants have derivatives, of which number `front` stands first, and where it starts.
+fn mechanism(
+    name: &str,
+    numbers: &[&'static str],
+    front: usize,
+) -> (ExactMechanism<Number>, Vec<Number>, Vec<Number>) {
     let path = format!("examples/scenes/{name}.json");
     let template = Template::read(path.as_ref(), &[]).expect("a shipped scene");
     let plain = template.scene().expect("a valid scene");
     let structure = Arc::new(Mechanism::new(&plain).expect("a valid scene"));
     let value = |path: &str| template.value(&template.variable(path).expect("a number")).expect("a scene");
-    let seed =
-        |(lane, &path): (usize, &&'static str)| (path, Number::unknown(value(path).expect("a value"), lane));
+    let seed = |(lane, &path): (usize, &&'static str)| {
+        (path, Number::unknown(value(path).expect("a value"), (lane + 8 - front) % 8))
+    };
     let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
     let (scene, _) = template.exact_with(&[], &known, Watched::Beside).expect("known numbers");
     let start = structure.start(&plain);
     let varied = |k: usize, value: f64| {
-        Number::new(value, std::array::from_fn(|lane| libm::sin(1.0 + k as f64 + 1.7 * lane as f64)))
+        Number::new(
+            value,
+            std::array::from_fn(|lane| libm::sin(1.0 + k as f64 + 1.7 * ((lane + front) % 8) as f64)),
+        )
     };
     let n = structure.coordinates();
     let phi = (0..n).map(|k| varied(k, start.unwrapped(k) + 0.02 * k as f64)).collect();
@@ -104,14 +112,17 @@ impl Both<'_> {
         found.collect()
     }
 
-    /// The reference; compiled once, not into the code for each kind of vector.
+    /// The reference of the first derivative; compiled once, not into the code for each kind of vector.
     #[inline(never)]
-    fn expected(&self) -> Vec<Number> {
+    fn expected(&self) -> Vec<f64> {
         let mut whole = Series::<Plain>::of_terms(&self.terms, self.coordinates, self.order);
         let (t, u, rest, rate) = self.begin;
         let [u, rest, rate] = [u, rest, rate].map(|all| all.iter().map(Plain::load).collect::<Vec<_>>());
         whole.expand_terms(&self.terms, t, &u, &rest, &rate);
-        whole.rate[..(self.order + 1) * whole.coordinates()].iter().map(|rate| rate.store()).collect()
+        whole.rate[..(self.order + 1) * whole.coordinates()]
+            .iter()
+            .map(|rate| rate.store().slope[0])
+            .collect()
     }
 }
 
@@ -132,36 +143,29 @@ fn derivatives_are_those_of_numbers_that_have_them() {
         ("chain8", chain, Coordinates::Independent),
         ("four_bars", loops, Coordinates::All),
     ] {
-        let (mechanism, phi, omega) = mechanism(name, &numbers);
-        let rest = vec![Number::ZERO; phi.len()];
+        let all: Vec<_> = (0..8).map(|front| mechanism(name, &numbers, front)).collect();
+        let rest = vec![Number::ZERO; all[0].1.len()];
         let kinds = [(false, false), (true, false), (false, true), (true, true)];
-        for (order, (is_single, is_known)) in ORDERS.iter().flat_map(|&order| kinds.map(|kind| (order, kind)))
-        {
-            if is_known && coordinates == Coordinates::All {
-                continue;
-            }
-            let both = Both {
-                terms: mechanism.terms(),
-                coordinates,
-                begin: (Time::default(), &phi, &rest, &omega),
-                is_single,
-                is_known,
-                order,
+        for order in ORDERS {
+            let both = |front: usize, is_single: bool, is_known: bool| {
+                let (mechanism, phi, omega) = &all[front];
+                let (terms, begin) = (mechanism.terms(), (Time::default(), &phi[..], &rest[..], &omega[..]));
+                Both { terms, coordinates, begin, is_single, is_known, order }
             };
-            let expected = both.expected();
-            let found = Vectors::default().run(both);
-            let f = phi.len();
-            for m in 0..=order {
-                let (from, to) = (m * f, (m + 1) * f);
-                for lane in 0..if is_single { 1 } else { 8 } {
-                    let of = |numbers: &[Number]| {
-                        numbers[from..to].iter().map(|number| number.slope[lane]).collect::<Vec<_>>()
-                    };
-                    let (found, expected) = (of(&found), of(&expected));
-                    let size = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-                    let apart =
-                        (found.iter().zip(&expected)).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
-                    assert!(apart <= 1e-11 * size, "{name}, power {m}, lane {lane}: {apart} of {size}");
+            let expected: Vec<_> = (0..8).map(|lane| both(lane, false, false).expected()).collect();
+            for (is_single, is_known) in kinds {
+                if is_known && coordinates == Coordinates::All {
+                    continue;
+                }
+                let found = Vectors::default().run(both(0, is_single, is_known));
+                for (m, found) in found.chunks(rest.len()).enumerate() {
+                    for (lane, expected) in expected.iter().enumerate().take(if is_single { 1 } else { 8 }) {
+                        let expected = &expected[m * rest.len()..];
+                        let size = expected[..rest.len()].iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+                        let off = |(found, expected): (&Number, &f64)| (found.slope[lane] - expected).abs();
+                        let apart = found.iter().zip(expected).map(off).fold(0.0, f64::max);
+                        assert!(apart <= 1e-11 * size, "{name}, power {m}, lane {lane}: {apart} of {size}");
+                    }
                 }
             }
         }
