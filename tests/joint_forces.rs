@@ -313,7 +313,7 @@ fn the_column_of_a_redundant_lock_balances_the_forces_of_the_hinges() {
     program.write("platform.json", &scene.to_string());
     let (head, rows) = table(&program, "platform", "dp8-1e-9-projection");
     let column = |title: &str| head.iter().position(|one| one == title).unwrap_or_else(|| panic!("{head:?}"));
-    let columns = ["lock.torque [N m]", "torque [N·m]", "y0 [N]", "y1 [N]"].map(column);
+    let columns = ["lock.torque [N m]", "torque [N m]", "y0 [N]", "y1 [N]"].map(column);
     for row in &rows {
         let [torque, output, y0, y1] = columns.map(|column| row[column]);
         assert!((torque - output).abs() < 1e-12 && torque.abs() > 0.1, "{torque} {output}");
