@@ -721,3 +721,43 @@ fn corners_and_jumps_between_rows_count_to_the_last_digits() {
         assert_eq!(found(&outcome.extremes, "up").min[0], 0.0);
     }
 }
+
+/// A ball thrown up: roots that have no value beyond a corner, and conditions that have none on the other branch,
+/// against midpoints of the parabola.
+#[test]
+fn roots_that_end_at_a_corner_have_their_means() {
+    let text = r#"{"name": "thrown", "gravity": [0, -9.81],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "points": [{"name": "p", "body": "b", "point": [0, 0]}],
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [1, 4]}},
+        "outputs": {"nested": "if(p.y > 0.1, if(sqrt(p.y - 0.1) > 0.4, 1, 2), 3)",
+            "larger": "if(p.y > 0.1, max(sqrt(p.y - 0.1), 0.4), 3)", "root": "if(p.y > 0.1, sqrt(p.y - 0.1), 0.3)",
+            "kept": "sqrt(max(p.y - 0.1, 0))", "sized": "sqrt(abs(p.y - 0.1))"},
+        "until": 1, "every": 1}"#;
+    let over = |t: f64| t * (4.0 - 0.5 * 9.81 * t) - 0.1;
+    let nested = |y: f64| if y <= 0.0 { 3.0 } else { 2.0 - f64::from(y.sqrt() > 0.4) };
+    let larger = |y: f64| if y <= 0.0 { 3.0 } else { y.sqrt().max(0.4) };
+    let root = |y: f64| if y > 0.0 { y.sqrt() } else { 0.3 };
+    let expected: [(&str, &dyn Fn(f64) -> f64); 5] = [
+        ("nested", &nested),
+        ("larger", &larger),
+        ("root", &root),
+        ("kept", &|y| y.max(0.0).sqrt()),
+        ("sized", &|y| y.abs().sqrt()),
+    ];
+    let count = 1_000_000;
+    let places: Vec<f64> = (0..count).map(|k| over((f64::from(k) + 0.5) / f64::from(count))).collect();
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Dp5, MethodId::Radau(5)] {
+        let outcome = run(&scene(text), &adaptive(method, 1e-11));
+        for (name, of) in &expected {
+            let one = found(&outcome.extremes, name);
+            let values = places.iter().map(|&y| of(y));
+            let mean = values.clone().sum::<f64>() / f64::from(count);
+            let [min, max] =
+                values.fold([f64::INFINITY, 0.0], |[min, max]: [f64; 2], x| [min.min(x), max.max(x)]);
+            println!("{method:?} {name}: {} {mean}", one.mean);
+            assert!((one.mean - mean).abs() < 5e-6, "{method:?} {name}: {} {mean}", one.mean);
+            assert!((one.min[0] - min).abs() < 2e-3 && (one.max[0] - max).abs() < 1e-5, "{name}: {one:?}");
+        }
+    }
+}

@@ -238,6 +238,10 @@ fn the_first_row_is_on_the_side_of_a_corner_that_the_motion_goes_to() {
         (turning("", &torque("if(t < 0, 3, 1)"), &at_rest, "b.alpha"), 2.0),
         (turning("", &torque("if(b.phi > 0, 3, 1)"), &moving(1.0), "b.alpha"), 6.0),
         (turning("", &torque("if(b.phi > 0, 3, 1)"), &moving(-1.0), "b.alpha"), 2.0),
+        // At rest, by its accelerations.
+        (turning("", &torque("if(b.phi > 0, 3, 1)"), &at_rest, "b.alpha"), 6.0),
+        (turning("", &torque("if(b.omega > 0, 3, 1)"), &at_rest, "b.alpha"), 6.0),
+        (turning("", &torque("if(b.phi > 0, -3, -1)"), &at_rest, "b.alpha"), -2.0),
     ] {
         for method in [MethodId::Taylor, MethodId::Dp8] {
             let mut seen = Vec::new();

@@ -193,7 +193,7 @@ impl Mechanism {
         }
         mechanism.check_mass(scene)?;
         let start = mechanism.start(scene);
-        if let Some(next) = mechanism.on_branches_after(&start)? {
+        if let Some(next) = mechanism.on_branches_after(&start, true)? {
             mechanism = next;
         }
         mechanism.energy_scale = mechanism.scale_of_energy(&start);

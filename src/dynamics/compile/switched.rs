@@ -4,13 +4,28 @@ use super::{CompileError, Laws, Mechanism, Switches};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::Motion;
 use crate::dynamics::configuration::Configuration;
+use crate::dynamics::kernel::{Bias, Kernel};
 use crate::scene::Scene;
 use std::sync::Arc;
 
 /// Branches of laws that are tried at the start.
 const BRANCHES: usize = 8;
-/// How far after the start it is looked which way conditions change, at rates up to 1 \[s\].
+/// How far after the start it is looked which way conditions change by rates, and by accelerations, at rates
+/// up to 1 \[s\].
 const A_MOMENT: f64 = 1e-7;
+const A_WHILE: f64 = 1e-5;
+
+/// A motion so much later \[s\], at these accelerations; those that are not given are zero.
+fn later(motion: &Motion, h: f64, accelerations: &[f64]) -> Motion {
+    let mut later = motion.clone();
+    later.time = later.time + h;
+    for (k, (phi, omega)) in later.phi.iter_mut().zip(&mut later.omega).enumerate() {
+        let acceleration = accelerations.get(k).copied().filter(|a| a.is_finite()).unwrap_or(0.0);
+        *phi += *omega * DoubleDouble::from(h) + DoubleDouble::from(0.5 * h * h * acceleration);
+        *omega += DoubleDouble::from(h * acceleration);
+    }
+    later
+}
 
 impl Mechanism {
     /// The mechanism without some of its springs, torsion springs, applied forces, torques, motors, locks and
@@ -106,10 +121,10 @@ impl Mechanism {
             return self.assembled(scene, kept);
         }
         let given = self.start_as_given(scene);
-        let mut next = self.on_branches_after(&given)?.unwrap_or(self);
+        let mut next = self.on_branches_after(&given, false)?.unwrap_or(self);
         for _ in 0..BRANCHES {
             let found = next.clone().assembled(scene, kept)?;
-            match next.on_branches_after(&found.start(scene))? {
+            match next.on_branches_after(&found.start(scene), false)? {
                 Some(other) => next = other,
                 None => return Ok(found),
             }
@@ -126,31 +141,35 @@ impl Mechanism {
         there.map_or(Ok(None), |there| self.on(there))
     }
 
-    /// The same for what comes after a motion, where conditions are zero at it and change at first order.
+    /// The same for what comes after a motion, where conditions are zero at it: by its rates, and where
+    /// `with_forces` by its accelerations on the branches at the motion as well.
     ///
     /// # Errors
     /// See [`Self::on_branch`].
-    pub(super) fn on_branches_after(&self, motion: &Motion) -> Result<Option<Self>, CompileError> {
-        let of = |motion: &Motion| {
-            self.laws_at(motion, |laws, at| {
-                let modes = laws.formulas.modes(at, &laws.parameters);
-                (laws.formulas.zeros(at, &laws.parameters, &modes), modes)
-            })
+    pub(super) fn on_branches_after(
+        &self,
+        motion: &Motion,
+        with_forces: bool,
+    ) -> Result<Option<Self>, CompileError> {
+        let modes = |motion: &Motion| {
+            self.laws_at(motion, |laws, at| laws.formulas.modes(at, &laws.parameters)).unwrap_or_default()
         };
-        let Some((zeros, mut there)) = of(motion) else { return Ok(None) };
-        if zeros.contains(&true) {
-            let fastest = motion.omega.iter().fold(1.0, |most: f64, omega| most.max(omega.hi.abs()));
-            let (later, moment) = (&mut motion.clone(), A_MOMENT / fastest);
-            later.time = later.time + moment;
-            for (phi, omega) in later.phi.iter_mut().zip(&motion.omega) {
-                *phi += *omega * DoubleDouble::from(moment);
-            }
-            let next = of(later).map_or_else(Vec::new, |(_, modes)| modes);
-            for ((mode, next), _) in there.iter_mut().zip(next).zip(&zeros).filter(|(_, is_zero)| **is_zero) {
-                *mode = next;
-            }
+        let here = modes(motion);
+        let zeros = self.laws_at(motion, |laws, at| laws.formulas.zeros(at, &laws.parameters, &here));
+        let zeros = zeros.unwrap_or_default();
+        if !zeros.contains(&true) {
+            return self.on(here);
         }
-        self.on(there)
+        let [phi, omega] = motion.rounded();
+        let fastest = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
+        let mut after = vec![modes(&later(motion, A_MOMENT / fastest, &[]))];
+        if with_forces {
+            let mut kernel = Kernel::<f64>::new(self);
+            kernel.accelerate::<0>(self, motion.time, &phi, &omega, Bias::default());
+            after.push(modes(&later(motion, A_WHILE / fastest, &kernel.load[..phi.len()])));
+        }
+        let changes = |k: usize| zeros[k] && after.iter().any(|after| after[k] != here[k]);
+        self.on((0..here.len()).map(|k| here[k] ^ changes(k)).collect())
     }
 
     /// What is found of the laws at a motion; nothing where no condition chooses branches.

@@ -6,16 +6,21 @@
 //! branches up to both ends.
 
 use super::super::inside::Inside;
-use super::super::magnitude::changes;
-use super::{DEGREES, ExtremesDetector, RESOLVED, ROUNDING};
+use super::super::magnitude::{changes, last_digits};
+use super::{DEGREES, DIGITS, DOUBTS, ExtremesDetector, RESOLVED, ROUNDING};
 use crate::dynamics::{Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use std::sync::Arc;
 
-/// Parts of a step looked at; what is left then is looked at with the branches that hold at each place.
-const PARTS: usize = 1000;
+/// Parts of a step looked at, and changes in it of conditions that no interpolant resolves; what is left then
+/// is looked at with the branches that hold at each place.
+const PARTS: usize = 10_000;
+const UNRESOLVED: usize = 32;
 /// Share of a step after its beginning, or a change, at which the branches of a part are taken.
 const LATER: f64 = 1e-6;
+/// Shares of a part by which its ends are moved inwards, until all outputs are finite there: beyond a change
+/// a root may have no value.
+const INWARDS: [f64; 5] = [0.0, 1e-11, 1e-9, 1e-7, 1e-5];
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: it has no zero.
 const CERTAIN: f64 = 1e-3;
 /// What a condition must be over what its interpolant may be off by for its sign to be known, and the share
@@ -23,8 +28,35 @@ const CERTAIN: f64 = 1e-3;
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
 /// Halvings of a part in which no interpolant resolves a condition, and of the bracket of its zero.
-const HALVINGS: u32 = 6;
+const HALVINGS: u32 = 10;
 const ROUNDS: usize = 48;
+/// Changes that are looked for before one beyond which conditions have no value.
+const BEFORE: usize = 8;
+
+/// A step, and what of it is still to be searched: shares from and to, and halvings, the next one last.
+struct Ahead {
+    begin: Time,
+    span: f64,
+    parts: Vec<(f64, f64, u32)>,
+    /// Changes left of conditions that no interpolant resolves.
+    unresolved: usize,
+}
+
+impl Ahead {
+    fn time(&self, share: f64) -> Time {
+        self.begin + share * self.span
+    }
+}
+
+/// What a part of a step has.
+enum Seen {
+    /// Conditions that ask for halves.
+    TooMuch,
+    /// Conditions that were taken for positive, and are zero.
+    Still,
+    /// The first change, if there is any; true where conditions have no values somewhere.
+    Change(Option<f64>, bool),
+}
 
 impl ExtremesDetector {
     /// How many conditions choose the branches of the formulas.
@@ -41,28 +73,38 @@ impl ExtremesDetector {
 
     /// Looks at a step, part by part.
     pub(super) fn look_at_parts(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) {
+        let mut ahead = Ahead { begin, span, parts: vec![(0.0, 1.0, 0)], unresolved: UNRESOLVED };
         let mut from = if span > 0.0 { 0.0 } else { 1.0 };
         for _ in 0..PARTS {
-            if from >= 1.0 {
+            if from >= 1.0 || ahead.unresolved == 0 {
                 break;
             }
             let first = f64::min(from + LATER, 1.0);
-            self.take_branches(inside.at(begin + first * span));
+            self.branches = self.with_outputs(inside.at(ahead.time(first)), |outputs, moment, scratch| {
+                outputs.branches(moment, scratch)
+            });
             if self.memory.still.is_empty() {
                 self.memory.still = self.rounding_of_conditions(inside.at(begin));
             }
-            let to = self.change(inside, (begin, span), first).unwrap_or(1.0);
-            self.look_at(inside, begin + from * span, (to - from) * span);
+            let to = self.change(inside, &mut ahead, first);
+            self.look_at_part(inside, &ahead, [from, to]);
             from = to;
         }
         self.branches.clear();
-        self.look_at(inside, begin + from * span, (1.0 - from) * span);
+        self.look_at(inside, ahead.time(from), (1.0 - from) * span);
     }
 
-    /// Takes the branches that hold at a motion.
-    fn take_branches(&mut self, motion: &Motion) {
-        self.branches =
-            self.with_outputs(motion, |outputs, moment, scratch| outputs.branches(moment, scratch));
+    /// Looks at a part, up to as near its ends as all outputs are finite.
+    fn look_at_part(&mut self, inside: &mut dyn Inside, ahead: &Ahead, [from, to]: [f64; 2]) {
+        let mut finite = |share: f64| {
+            let values = self.values_at(inside.at(ahead.time(share)));
+            values.iter().filter(|value| value.is_finite()).count()
+        };
+        let (width, most) = (to - from, finite(0.5 * (from + to)));
+        let ends = INWARDS.map(|by| [from + by * width, to - by * width]);
+        let ends = ends.into_iter().find(|ends| ends.iter().all(|&end| finite(end) >= most));
+        let [from, to] = ends.unwrap_or([from, to]);
+        self.look_at(inside, ahead.time(from), (to - from) * ahead.span);
     }
 
     /// The outputs at the end and at the beginning of a part, where it is on given branches, on those that
@@ -93,43 +135,102 @@ impl ExtremesDetector {
         changes.into_iter().map(|x| if x.is_finite() { ROUNDING * x } else { 0.0 }).collect()
     }
 
-    /// The share of a step, from `first` on, at which a condition changes sign first.
-    fn change(&mut self, inside: &mut dyn Inside, (begin, span): (Time, f64), first: f64) -> Option<f64> {
-        let mut parts = vec![(first, 1.0, 0)];
-        while let Some((low, high, depth)) = parts.pop() {
-            let place = |share: f64| low + share * (high - low);
-            let still = self.memory.still.clone();
-            let mut at = |share: f64| self.conditions(inside.at(begin + place(share) * span));
-            let is_known = |k: usize, curve: &Chebyshev| {
-                let (off, most) = (curve.tail(), curve.most());
-                off <= (RESOLVED * most).max(still[k]) || off <= CERTAIN * curve.least() || !most.is_finite()
-            };
-            let Interpolants { curves, nodes, values, is_resolved } =
-                interpolated(&DEGREES, |share, row| row.extend(at(share)), |k, curve, _| is_known(k, curve));
-            if !is_resolved && depth < HALVINGS {
-                let middle = 0.5 * (low + high);
-                parts.extend([(middle, high, depth + 1), (low, middle, depth + 1)]);
-                continue;
-            }
-            let mut earliest: Option<f64> = None;
-            for (k, curve) in curves.iter().enumerate() {
-                let most = curve.most();
-                if !most.is_finite() || most <= still[k] {
-                    continue;
-                }
-                let sign = if self.branches[k] { 1.0 } else { -1.0 };
-                let mut at = |share: f64| self.conditions(inside.at(begin + place(share) * span))[k];
-                let found = match is_known(k, curve) {
-                    true => passage(curve, sign).map(|share| polished(curve, share, at(share))),
-                    false => between(&mut |share| sign * at(share), &values[k], &nodes.places, sign),
-                };
-                earliest = earliest.into_iter().chain(found).reduce(f64::min);
-            }
-            if let Some(share) = earliest {
-                return Some(place(share));
+    /// Looks for what is rounding where no interpolant resolves the conditions; true where there is much more
+    /// than was known.
+    fn have_more_rounding(&mut self, motion: &Motion) -> bool {
+        let found = last_digits(motion, |motion| self.conditions(motion));
+        let mut is_more = false;
+        for (still, found) in self.memory.still.iter_mut().zip(found) {
+            let found = DIGITS * found;
+            if found.is_finite() && found > 2.0 * *still {
+                (*still, is_more) = (found, true);
             }
         }
-        None
+        is_more
+    }
+
+    /// The share of a step, from `first` on, at which a condition changes sign first; 1 where none does.
+    fn change(&mut self, inside: &mut dyn Inside, ahead: &mut Ahead, first: f64) -> f64 {
+        while let Some((low, high, depth)) = ahead.parts.pop() {
+            let low = low.max(first);
+            if low >= high {
+                continue;
+            }
+            match self.search(inside, ahead, [low, high], depth) {
+                Seen::TooMuch => {
+                    let middle = 0.5 * (low + high);
+                    ahead.parts.extend([(middle, high, depth + 1), (low, middle, depth + 1)]);
+                }
+                Seen::Still => ahead.parts.push((low, high, depth)),
+                Seen::Change(None, _) => {}
+                Seen::Change(Some(mut share), mut is_blind) => {
+                    for _ in 0..BEFORE {
+                        let end = low + (share - low) * (1.0 - CERTAIN * LATER);
+                        if !is_blind || end <= low {
+                            break;
+                        }
+                        match self.search(inside, ahead, [low, end], HALVINGS) {
+                            Seen::Change(Some(earlier), blind) => (share, is_blind) = (earlier, blind),
+                            _ => break,
+                        }
+                    }
+                    ahead.parts.push((share, high, depth));
+                    return share;
+                }
+            }
+        }
+        1.0
+    }
+
+    /// Looks for the first change in a part.
+    fn search(
+        &mut self,
+        inside: &mut dyn Inside,
+        ahead: &mut Ahead,
+        [low, high]: [f64; 2],
+        depth: u32,
+    ) -> Seen {
+        let place = |share: f64| low + share * (high - low);
+        let still = self.memory.still.clone();
+        let is_known = |k: usize, curve: &Chebyshev| {
+            let (off, most) = (curve.tail(), curve.most());
+            off <= (RESOLVED * most).max(still[k]) || off <= CERTAIN * curve.least() || !most.is_finite()
+        };
+        let mut at = |share: f64| self.conditions(inside.at(ahead.time(place(share))));
+        let Interpolants { curves, nodes, values, is_resolved } =
+            interpolated(&DEGREES, |share, row| row.extend(at(share)), |k, curve, _| is_known(k, curve));
+        if !is_resolved && depth <= DOUBTS && self.have_more_rounding(inside.at(ahead.time(place(0.5)))) {
+            return self.search(inside, ahead, [low, high], depth);
+        }
+        if !is_resolved && depth < HALVINGS {
+            return Seen::TooMuch;
+        }
+        let is_zero = |k: usize| curves[k].most() <= still[k];
+        if (0..curves.len()).any(|k| is_zero(k) && self.branches[k]) {
+            (0..curves.len()).filter(|&k| is_zero(k)).for_each(|k| self.branches[k] = false);
+            return Seen::Still;
+        }
+        let (mut earliest, mut is_blind) = (None::<(f64, bool)>, false);
+        for (k, curve) in curves.iter().enumerate().filter(|(k, _)| !is_zero(*k)) {
+            if !curve.most().is_finite() {
+                is_blind = true;
+                continue;
+            }
+            let sign = if self.branches[k] { 1.0 } else { -1.0 };
+            let mut at = |share: f64| self.conditions(inside.at(ahead.time(place(share))))[k];
+            let known = is_known(k, curve);
+            let found = match known {
+                true => passage(curve, sign).map(|share| polished(curve, share, at(share))),
+                false => between(&mut |share| sign * at(share), &values[k], &nodes.places, sign),
+            };
+            if let Some(share) = found.filter(|share| earliest.is_none_or(|(known, _)| *share < known)) {
+                earliest = Some((share, known));
+            }
+        }
+        if earliest.is_some_and(|(_, known)| !known) {
+            ahead.unresolved = ahead.unresolved.saturating_sub(1);
+        }
+        Seen::Change(earliest.map(|(share, _)| place(share)), is_blind)
     }
 }
 

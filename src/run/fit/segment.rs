@@ -104,6 +104,12 @@ pub(super) fn pass(
         }
         None => study.start.clone(),
     };
+    let drives = study.mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.drives());
+    if from.is_some() && drives && !matches!(study.mechanism.on_branches_of(&start), Ok(None)) {
+        let what = "the law of a motor or wall is on another branch, or piece of a table, than at the \
+                    start, and does not go on from a place alone: leave --segments out";
+        return Err(what.into());
+    }
     let mut outcome = Outcome::begun(&study.mechanism, plan.clone());
     let driver = build(&study.mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(&study.mechanism), driver);
