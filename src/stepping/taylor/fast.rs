@@ -49,8 +49,7 @@ trait Series: Clone + Debug + Send + Sync + 'static {
     }
 }
 
-/// The same in code of its own for the processor's vectors, or without them; each series by itself, as
-/// compilers take much longer for all of them in one function.
+/// The same in code of its own for the processor's vectors, or without them.
 trait Kernel: Debug + Send + Sync {
     fn step(&mut self, state: &mut State, left: f64, is_portable: bool) -> Option<(f64, f64)>;
     fn go(&mut self, state: &mut State, h: f64, is_portable: bool);
