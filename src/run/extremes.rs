@@ -289,14 +289,7 @@ impl ExtremesDetector {
     /// than was known.
     fn has_more_rounding(&mut self, inside: &mut dyn Inside, t: Time) -> bool {
         let found = last_digits(inside.at(t), |motion| self.values_at(motion));
-        let mut is_more = false;
-        for (rounding, found) in self.memory.rounding.iter_mut().zip(found) {
-            let found = DIGITS * found;
-            if found.is_finite() && found > 2.0 * *rounding {
-                (*rounding, is_more) = (found, true);
-            }
-        }
-        is_more
+        has_grown(&mut self.memory.rounding, &found)
     }
 
     /// Takes the outputs at the end of a run, where a jump has made the event that ends it happen: no step
@@ -390,6 +383,23 @@ impl ExtremesDetector {
     }
 }
 
+/// Magnitudes that are rounding of functions that change so much.
+fn rounding_of(changes: &[f64]) -> Vec<f64> {
+    changes.iter().map(|change| if change.is_finite() { ROUNDING * change } else { 0.0 }).collect()
+}
+
+/// Makes these magnitudes of rounding those of the last digits found where that is much more; tells if it is.
+fn has_grown(rounding: &mut [f64], last_digits: &[f64]) -> bool {
+    let mut is_more = false;
+    for (rounding, found) in rounding.iter_mut().zip(last_digits) {
+        let found = DIGITS * found;
+        if found.is_finite() && found > 2.0 * *rounding {
+            (*rounding, is_more) = (found, true);
+        }
+    }
+    is_more
+}
+
 /// Where a curve turns round next to a node that may be beside a new extreme.
 fn turns(curve: &Chebyshev, values: &[f64], nodes: &[f64], [least, most]: [f64; 2]) -> Vec<f64> {
     let mut turns = Vec::new();
@@ -425,9 +435,7 @@ impl StepWatcher for ExtremesDetector {
         let (begin, end) = inside.span();
         let span = (end - begin).hi;
         if self.memory.rounding.is_empty() {
-            let changes = self.changes(inside.at(begin)).into_iter();
-            self.memory.rounding =
-                changes.map(|change| if change.is_finite() { ROUNDING * change } else { 0.0 }).collect();
+            self.memory.rounding = rounding_of(&self.changes(inside.at(begin)));
         }
         match self.condition_count() {
             0 => self.look_at(inside, begin, span),

@@ -137,8 +137,7 @@ impl Mechanism {
     /// # Errors
     /// See [`Self::on_branch`].
     pub(crate) fn on_branches_of(&self, motion: &Motion) -> Result<Option<Self>, CompileError> {
-        let there = self.laws_at(motion, |laws, at| laws.formulas.modes(at, &laws.parameters));
-        there.map_or(Ok(None), |there| self.on(there))
+        self.on(self.law_modes(motion))
     }
 
     /// The same for what comes after a motion, where conditions are zero at it: by its rates, and where
@@ -151,10 +150,7 @@ impl Mechanism {
         motion: &Motion,
         with_forces: bool,
     ) -> Result<Option<Self>, CompileError> {
-        let modes = |motion: &Motion| {
-            self.laws_at(motion, |laws, at| laws.formulas.modes(at, &laws.parameters)).unwrap_or_default()
-        };
-        let here = modes(motion);
+        let here = self.law_modes(motion);
         let zeros = self.laws_at(motion, |laws, at| laws.formulas.zeros(at, &laws.parameters, &here));
         let zeros = zeros.unwrap_or_default();
         if !zeros.contains(&true) {
@@ -162,11 +158,11 @@ impl Mechanism {
         }
         let [phi, omega] = motion.rounded();
         let fastest = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
-        let mut after = vec![modes(&later(motion, A_MOMENT / fastest, &[]))];
+        let mut after = vec![self.law_modes(&later(motion, A_MOMENT / fastest, &[]))];
         if with_forces {
             let mut kernel = Kernel::<f64>::new(self);
             kernel.accelerate::<0>(self, motion.time, &phi, &omega, Bias::default());
-            after.push(modes(&later(motion, A_WHILE / fastest, &kernel.load[..phi.len()])));
+            after.push(self.law_modes(&later(motion, A_WHILE / fastest, &kernel.load[..phi.len()])));
         }
         let changes = |k: usize| zeros[k] && after.iter().any(|after| after[k] != here[k]);
         self.on((0..here.len()).map(|k| here[k] ^ changes(k)).collect())
@@ -176,6 +172,11 @@ impl Mechanism {
     fn laws_at<R>(&self, motion: &Motion, find: impl FnOnce(&Laws, &Configuration<f64>) -> R) -> Option<R> {
         let laws = self.laws.as_ref().filter(|laws| !laws.modes.is_empty())?;
         Some(self.seen(motion, |at| find(laws, at)))
+    }
+
+    /// The branches that hold at a motion; none where no condition chooses any.
+    fn law_modes(&self, motion: &Motion) -> Vec<bool> {
+        self.laws_at(motion, |laws, at| laws.formulas.modes(at, &laws.parameters)).unwrap_or_default()
     }
 
     /// The mechanism with its laws on these branches; `None` where they are on them.

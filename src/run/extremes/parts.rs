@@ -7,7 +7,7 @@
 
 use super::super::inside::Inside;
 use super::super::magnitude::{changes, last_digits};
-use super::{DEGREES, DIGITS, DOUBTS, ExtremesDetector, RESOLVED, ROUNDING};
+use super::{DEGREES, DOUBTS, ExtremesDetector, RESOLVED, has_grown, rounding_of};
 use crate::dynamics::{Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use std::sync::Arc;
@@ -30,8 +30,10 @@ const SOON: f64 = 1e-2;
 /// Halvings of a part in which no interpolant resolves a condition, and of the bracket of its zero.
 const HALVINGS: u32 = 10;
 const ROUNDS: usize = 48;
-/// Changes that are looked for before one beyond which conditions have no value.
+/// Changes that are looked for before one beyond which conditions have no value, and the share by which the
+/// search ends before it.
 const BEFORE: usize = 8;
+const SHORT: f64 = 1e-9;
 
 /// A step, and what of it is still to be searched: shares from and to, and halvings, the next one last.
 struct Ahead {
@@ -131,22 +133,14 @@ impl ExtremesDetector {
 
     /// Magnitudes of the conditions that are rounding.
     fn rounding_of_conditions(&mut self, motion: &Motion) -> Vec<f64> {
-        let changes = changes(&Arc::clone(&self.mechanism), motion, |motion| self.conditions(motion));
-        changes.into_iter().map(|x| if x.is_finite() { ROUNDING * x } else { 0.0 }).collect()
+        rounding_of(&changes(&Arc::clone(&self.mechanism), motion, |motion| self.conditions(motion)))
     }
 
     /// Looks for what is rounding where no interpolant resolves the conditions; true where there is much more
     /// than was known.
     fn have_more_rounding(&mut self, motion: &Motion) -> bool {
         let found = last_digits(motion, |motion| self.conditions(motion));
-        let mut is_more = false;
-        for (still, found) in self.memory.still.iter_mut().zip(found) {
-            let found = DIGITS * found;
-            if found.is_finite() && found > 2.0 * *still {
-                (*still, is_more) = (found, true);
-            }
-        }
-        is_more
+        has_grown(&mut self.memory.still, &found)
     }
 
     /// The share of a step, from `first` on, at which a condition changes sign first; 1 where none does.
@@ -165,7 +159,7 @@ impl ExtremesDetector {
                 Seen::Change(None, _) => {}
                 Seen::Change(Some(mut share), mut is_blind) => {
                     for _ in 0..BEFORE {
-                        let end = low + (share - low) * (1.0 - CERTAIN * LATER);
+                        let end = low + (share - low) * (1.0 - SHORT);
                         if !is_blind || end <= low {
                             break;
                         }
