@@ -19,6 +19,7 @@
 //! section 8, with a fused multiply-add.
 
 use super::lanes::{self, Code, Lanes, Signed};
+use super::sum::WHOLE;
 use super::{Complex, DoubleDouble, Scalar};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
@@ -28,8 +29,6 @@ pub const RANGE: f64 = 1e6;
 /// What the leading double leaves out of π/2, and what that leaves.
 const MIDDLE: f64 = 6.123_233_995_736_766e-17;
 const LEAST: f64 = -1.497_384_904_859_169_8e-33;
-/// 1.5·2⁵²: adding and taking it away rounds to the nearest integer.
-const SHIFT: f64 = 6_755_399_441_055_744.0;
 
 /// ±1/k! for k = 4, 6, … 22 and k = 3, 5, … 21; plain doubles take the first eight.
 const COS: [f64; 10] = factors(4);
@@ -68,7 +67,7 @@ struct Reduced<L> {
 
 #[inline(always)]
 fn reduce<L: Signed>(angle: L, rest: L) -> Reduced<L> {
-    let shift = L::splat(SHIFT);
+    let shift = L::splat(WHOLE);
     let q = angle.mul_add(L::splat(FRAC_2_PI), shift).sub(shift);
     let long = q.neg_mul_add(L::splat(FRAC_PI_2), angle);
     let tail = q.mul(L::splat(MIDDLE));

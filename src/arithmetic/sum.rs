@@ -57,12 +57,20 @@ fn nearly_fused(a: f64, b: f64, c: f64) -> f64 {
     if fused.is_nan() { product + c } else { fused }
 }
 
+/// The larger of two; not a number where either is not, which `f64::max` would lose.
+#[inline(always)]
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+/// 1.5 · 2⁵²: a sum near it has no bits for a fraction, and its last bits are those of the whole number, so
+/// that adding and taking it away rounds to the nearest integer, ties to even.
+pub const WHOLE: f64 = 6_755_399_441_055_744.0;
+
 /// The nearest whole number, ties to even; two additions where the size allows it, since the baseline
 /// processor has no instruction for it.
 #[inline(always)]
 pub fn nearest(value: f64) -> f64 {
-    /// 1.5 · 2⁵²: a sum near it has no bits for a fraction.
-    const WHOLE: f64 = 6_755_399_441_055_744.0;
     if value.abs() < 1e15 { (value + WHOLE) - WHOLE } else { value.round_ties_even() }
 }
 

@@ -12,7 +12,7 @@
 //! 8.
 
 use super::Time;
-use crate::arithmetic::sum::{fast_two_sum, nearest, two_sum};
+use crate::arithmetic::sum::{WHOLE, fast_two_sum, nearest, two_sum};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 pub use crate::scene::{Law, Sine};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
@@ -219,8 +219,6 @@ impl Reduced {
     fn of(angle: f64, rest: f64) -> Self {
         /// π/2 in parts of 21, 21 and 53 bits.
         const PARTS: [f64; 3] = [1.570_796_012_878_418, 3.139_164_164_167_596e-7, 6.223_372_171_896_613e-14];
-        /// 1.5 · 2⁵²: a sum near it has no bits for a fraction, and its last bits are the whole number.
-        const WHOLE: f64 = 6_755_399_441_055_744.0;
         let shifted = angle * FRAC_2_PI + WHOLE;
         let quarters = shifted - WHOLE;
         // Not a number is not within the bound either.

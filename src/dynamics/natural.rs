@@ -42,6 +42,7 @@ use super::force::action::Kind;
 use super::law::Law;
 use super::quadratic::Quadratic;
 use super::{Form, Mechanism, Motion, State, Time, schur, tree};
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
@@ -296,8 +297,6 @@ impl Natural {
         let (z, rate) = self.vectors(state);
         let mut defect = ConstraintResidual::default();
         let mut see = |position: DoubleDouble, velocity: DoubleDouble| {
-            // Unlike `max`, this does not lose a not-a-number.
-            let larger = |a: f64, b: f64| if a > b || a.is_nan() { a } else { b };
             defect.position = larger(position.hi.abs(), defect.position);
             defect.velocity = larger(velocity.hi.abs(), defect.velocity);
         };

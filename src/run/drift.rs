@@ -7,6 +7,7 @@
 use super::allowance::{Allowance, EnergyLimit, Moment};
 use super::plan::Plan;
 use super::sample::Sample;
+use crate::arithmetic::sum::larger;
 use crate::dynamics::Mechanism;
 
 /// Intervals the horizon is divided into.
@@ -174,11 +175,6 @@ pub(crate) fn kind(mechanism: &Mechanism) -> &'static str {
 pub(super) fn units(mechanism: &Mechanism) -> Vec<f64> {
     let unit = |is_in_radians: bool| if is_in_radians { 1.0 } else { mechanism.size_of_parts() };
     mechanism.with_all_parts().constraints.iter().map(|row| unit(row.is_in_radians())).collect()
-}
-
-/// The larger of two magnitudes; not a number where either is not.
-pub(super) fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }
 
 /// How near to a singular position a run came at its output times.

@@ -14,7 +14,7 @@ mod natural;
 
 use self::natural::Natural;
 use crate::arithmetic::Complex;
-use crate::arithmetic::sum::two_sum;
+use crate::arithmetic::sum::{larger, two_sum};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::{DROPPED, NEAR};
 use crate::dynamics::{Form, Mechanism, OdeSystem, State, Time, tree};
@@ -307,7 +307,7 @@ fn project_sized<const N: usize>(
     loop {
         // Rows left out have their say once they are back.
         let in_force = (0..rows).filter(|&r| !kernel.is_left_out(r));
-        let worst = in_force.map(|r| kernel.rows[r].position.abs() / unit(mechanism, r)).fold(0.0, largest);
+        let worst = in_force.map(|r| kernel.rows[r].position.abs() / unit(mechanism, r)).fold(0.0, larger);
         // At rounding, or no longer falling: another iteration would only move it about.
         if worst <= 1e-16 || worst >= 0.5 * last || worst.is_nan() {
             break;
@@ -318,7 +318,7 @@ fn project_sized<const N: usize>(
         }
         kernel.solve_rows();
         let turn = shift(mechanism, kernel, state, 0, -1.0);
-        (moved, far) = (true, largest(far, turn));
+        (moved, far) = (true, larger(far, turn));
         let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
         if turn <= SMALL {
             let angles = tree::size::<N>(mechanism.bodies.len());
@@ -339,7 +339,7 @@ fn project_sized<const N: usize>(
         let omega = &state.y[n..2 * n];
         kernel.multiplier[r] = kernel.row_rate(r, omega);
         if !kernel.is_left_out(r) {
-            fast = largest(fast, kernel.multiplier[r].abs() / step_size(mechanism, kernel, omega, r));
+            fast = larger(fast, kernel.multiplier[r].abs() / step_size(mechanism, kernel, omega, r));
         }
     }
     if fast > 2.0 * f64::EPSILON || fast.is_nan() {
@@ -349,7 +349,7 @@ fn project_sized<const N: usize>(
         let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| {
             most.max(omega.abs() / size(mechanism, k))
         });
-        (moved, far) = (true, largest(far, change / most));
+        (moved, far) = (true, larger(far, change / most));
         let omega = &state.y[n..2 * n];
         check(mechanism, kernel, tolerance, |r| {
             (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r))
@@ -390,7 +390,7 @@ pub(super) fn shift(
     for (k, &change) in kernel.load.iter().enumerate() {
         (state.y[from + k], state.low[from + k]) =
             two_sum(state.y[from + k], state.low[from + k] + sign * change);
-        largest_change = largest(largest_change, change.abs() / size(mechanism, k));
+        largest_change = larger(largest_change, change.abs() / size(mechanism, k));
     }
     largest_change
 }
@@ -442,9 +442,4 @@ fn check(
         }
     }
     Ok(())
-}
-
-/// The larger of two, and not a number if either is.
-fn largest(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

@@ -15,6 +15,7 @@
 //! E. Hairer, C. Lubich, G. Wanner, *Geometric Numerical Integration*, 2nd ed. (2006), section V.4.1.
 
 use super::projection::{self, is_kept};
+use crate::arithmetic::sum::larger;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::DROPPED;
 use crate::dynamics::{Form, Mechanism, OdeSystem, State, Time};
@@ -150,8 +151,7 @@ fn mismatch(mechanism: &Mechanism, kernel: &mut Kernel<f64>, state: &State, mu: 
         kernel.multiplier_accelerations();
         for (k, change) in kernel.load.iter().enumerate() {
             let whole = if level == 0 { size(k).max(state.y[k].abs()) } else { size(k) * fastest };
-            let share = change.abs() / whole;
-            most = if share.is_nan() { share } else { most.max(share) };
+            most = larger(change.abs() / whole, most);
         }
     }
     most
@@ -194,7 +194,7 @@ fn land(
                 kernel.multiplier[row] = left;
                 let left = left.abs() / projection::unit(mechanism, row)
                     * if level == 0 { 1.0 } else { mechanism.units.time };
-                worst = if left.is_nan() { f64::NAN } else { worst.max(left) };
+                worst = larger(left, worst);
             }
             kernel.solve_rows();
             if worst > 1e-16 && (worst < 0.5 * last || worst > TOLERANCE) {

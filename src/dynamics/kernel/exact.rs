@@ -6,6 +6,7 @@
 //! double-double they are evaluated anew, and rounded.
 
 use super::{Bias, Kernel};
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Real};
 use crate::dynamics::{Mechanism, Time, schur};
 
@@ -94,7 +95,7 @@ impl<T: Real> Kernel<T> {
         let size = mechanism.size_of_parts();
         mechanism.constraints.iter().zip(&self.rows).fold(0.0, |most, (row, here)| {
             let off = here.position.value().abs() / if row.is_angle() { 1.0 } else { size };
-            if off > most || off.is_nan() { off } else { most }
+            larger(off, most)
         })
     }
 }

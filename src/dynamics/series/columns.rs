@@ -8,6 +8,7 @@ use super::varied::Number;
 use super::{Series, Terms};
 use crate::arithmetic::eight::LANES;
 use crate::arithmetic::lanes::wide::{EightLanes, Single, Slots, Task, Vectors, WideCode};
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Coordinates, Time};
@@ -260,12 +261,6 @@ struct Shares<'a, S, E> {
     u: &'a [Number],
     h: f64,
     shares: &'a mut Vec<f64>,
-}
-
-/// The larger one, or what is not a number.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }
 
 /// The larger ones of these and of a number's derivatives times a factor.

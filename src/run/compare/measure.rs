@@ -1,9 +1,9 @@
 //! One setting of one method: how far off it is, and how long it takes.
 
 use super::truth::{Room, Truth};
+use crate::arithmetic::sum::larger;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::Limits;
-use crate::run::drift::larger;
 use crate::run::plan::Plan;
 use crate::run::running::{Run, RunError, Running};
 use crate::stepping::{Statistics, StepError};

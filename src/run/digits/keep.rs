@@ -9,6 +9,7 @@
 use super::precision::Precision;
 use super::wall::travel_rate;
 use crate::arithmetic::digits::Digits;
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::constraint::Posture;
@@ -282,7 +283,7 @@ impl<const W: usize> Keeper<W> {
 /// log2 of the largest of numbers; NaN where one of them is.
 pub(super) fn largest<const W: usize>(numbers: &[Digits<W>]) -> f64 {
     let sizes = numbers.iter().map(Digits::log2);
-    sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
+    sizes.fold(f64::NEG_INFINITY, larger)
 }
 
 fn stop(t: f64, what: String, hint: &str) -> StepError {

@@ -2,6 +2,7 @@
 
 use super::{LongError, LongEvent, LongHold, LongRun, LongTurn, Row, Saved, Source, Wide, long_run};
 use crate::arithmetic::Real;
+use crate::arithmetic::sum::larger;
 use crate::stepping::StepError;
 use std::ops::RangeInclusive;
 use std::time::{Duration, Instant};
@@ -258,7 +259,5 @@ fn agreement(a: &Row, b: &Row) -> f64 {
 /// Decimal digits to which numbers agree.
 fn agreed(a: &[Wide], b: &[Wide]) -> f64 {
     let apart = a.iter().zip(b).map(|(&a, &b)| (a - b).log2() - b.abs().log2().max(0.0));
-    let most = apart
-        .fold(f64::NEG_INFINITY, |most, apart| if apart.is_nan() || apart > most { apart } else { most });
-    -most / std::f64::consts::LOG2_10
+    -apart.fold(f64::NEG_INFINITY, larger) / std::f64::consts::LOG2_10
 }

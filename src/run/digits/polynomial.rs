@@ -3,6 +3,7 @@
 use super::motion::Motion;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::{Digits, sum_of_products};
+use crate::arithmetic::sum::larger;
 
 /// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
 const WORK: f64 = 10.0;
@@ -14,7 +15,7 @@ impl<const W: usize> Motion<W> {
     fn size(&self, k: usize) -> f64 {
         let f = self.state.u.len();
         let sizes = self.series.rate[k * f..(k + 1) * f].iter().map(Digits::log2);
-        sizes.fold(f64::NEG_INFINITY, |most, size| if size.is_nan() || size > most { size } else { most })
+        sizes.fold(f64::NEG_INFINITY, larger)
     }
 
     /// The step at which the last powers fall below the tolerance \[s\].

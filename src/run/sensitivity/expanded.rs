@@ -22,6 +22,7 @@ use super::neighbours::Neighbours;
 use super::variation::plain;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::eight::LANES;
+use crate::arithmetic::sum::larger;
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Constants;
@@ -175,12 +176,6 @@ impl Expanded {
         }
         self.each(columns, |block, columns| block.keep(ground, motion, columns));
     }
-}
-
-/// The larger one, or what is not a number.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || a > b { a } else { b }
 }
 
 /// As many columns as there are lanes, of which some may be idle.

@@ -1,8 +1,8 @@
 //! One cell of the matrix: a scene by a method at settings that are refined until its end is confirmed.
 
 use super::{Case, Cell, Expected};
+use crate::arithmetic::sum::larger;
 use crate::dynamics::Mechanism;
-use crate::run::drift::larger;
 use crate::run::methods::MethodId;
 use crate::run::plan::{Plan, Request};
 use crate::run::running::{Outcome, Run, integrate};

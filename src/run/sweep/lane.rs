@@ -1,12 +1,12 @@
 //! A point of a sweep that is integrated in a lane.
 
 use super::point::{Point, Ready, Status};
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::Posture;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{BodyAngles, Mechanism, Motion};
 use crate::run::allowance::{Allowance, EnergyLimit, Moment};
-use crate::run::drift::larger;
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip;
 use crate::run::plan::Plan;

@@ -1,8 +1,8 @@
 //! How far two motions of one mechanism are apart.
 
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion};
-use crate::run::drift::larger;
 
 /// Measures distances: angles as they are \[rad\], positions of translational coordinates over the
 /// mechanism's size.

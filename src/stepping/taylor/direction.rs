@@ -11,6 +11,7 @@
 //! and with it what the leading part leaves out of the angle.
 
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::sum::WHOLE;
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 /// π/2 less its leading double.
@@ -43,8 +44,7 @@ const SIN: [f64; 4] = [0.0, 1.0, 0.0, 1.0];
 /// `[cos, sin, cos, sin]` of angles `[a, a, b, b]` \[rad\] in [-π, π] and what they leave out.
 #[inline(always)]
 pub fn unit<L: Lanes>(angle: L, rest: L) -> L {
-    // Adding and taking away 1.5·2⁵² rounds to the nearest integer.
-    let shift = L::splat(6_755_399_441_055_744.0);
+    let shift = L::splat(WHOLE);
     let q = angle.mul_add(L::splat(FRAC_2_PI), shift).sub(shift);
     // The first product is exact where it matters: q has two bits, and the difference cancels.
     let long = q.neg_mul_add(L::splat(FRAC_PI_2), angle);

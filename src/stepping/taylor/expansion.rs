@@ -3,6 +3,7 @@
 use super::super::event::Found;
 use super::super::search::Powers;
 use super::{JUDGES, LEADING, step_size};
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::series::polynomial::{integral, tail};
 use crate::dynamics::series::{Coefficient, Series};
@@ -115,8 +116,8 @@ impl<T: Coefficient> Expansion<T> {
         };
         let largest = |k: usize| {
             let rates = &self.series.rate[k * f..(k + 1) * f];
-            let turning = rates[..angles].iter().fold(0.0, |most, rate| larger(most, rate.value()));
-            rates[angles..].iter().fold(turning, |most, rate| larger(most, rate.value() / units.length))
+            let turning = rates[..angles].iter().fold(0.0, |most, rate| larger_size(most, rate.value()));
+            rates[angles..].iter().fold(turning, |most, rate| larger_size(most, rate.value() / units.length))
                 * units.time
         };
         let last: [f64; JUDGES] = std::array::from_fn(|i| largest(order - i));
@@ -133,7 +134,9 @@ impl<T: Coefficient> Expansion<T> {
             for k in order + 2 - JUDGES..=order + 1 {
                 let vectors = &self.series.z[k * n..(k + 1) * n];
                 let of = |vectors: &[Complex<T>]| {
-                    vectors.iter().fold(0.0, |most, z| larger(larger(most, z.re.value()), z.im.value()))
+                    vectors
+                        .iter()
+                        .fold(0.0, |most, z| larger_size(larger_size(most, z.re.value()), z.im.value()))
                 };
                 let (turning, sliding) = vectors.split_at(self.mechanism.bodies.len());
                 // No wall sees the angles that stand for integrals.
@@ -185,8 +188,9 @@ impl<T: Coefficient> Expansion<T> {
     /// The largest share of power `m` in a rate at `h` \[s\].
     fn size(&self, m: usize, h: f64) -> f64 {
         let f = self.series.coordinates();
-        let largest =
-            self.series.rate[m * f..(m + 1) * f].iter().fold(0.0, |most, rate| larger(most, rate.value()));
+        let largest = self.series.rate[m * f..(m + 1) * f]
+            .iter()
+            .fold(0.0, |most, rate| larger_size(most, rate.value()));
         largest * libm::pow(h, m as f64)
     }
 
@@ -268,10 +272,9 @@ fn add(state: &mut State, i: usize, increment: DoubleDouble) {
     (state.y[i], state.low[i]) = (sum.hi, sum.lo);
 }
 
-/// The larger magnitude, and not a number if either is.
-pub(super) fn larger(most: f64, value: f64) -> f64 {
-    let size = value.abs();
-    if size.is_nan() || most.is_nan() { f64::NAN } else { most.max(size) }
+/// The larger of a magnitude and that of a value; not a number if either is not.
+pub(super) fn larger_size(most: f64, value: f64) -> f64 {
+    larger(value.abs(), most)
 }
 
 /// -log2 from the bits of a positive double, within 0.09; so large for zero that it never counts.

@@ -21,7 +21,7 @@
 mod spring;
 
 use self::spring::{Spring, pull};
-use super::expansion::{larger, minus_log2};
+use super::expansion::{larger_size, minus_log2};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::row::{Row, at, load, room, store};
@@ -316,7 +316,7 @@ fn step_size<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
         }
     }
     let last = &looped.z[looped.order + 1];
-    let is_finite = last.iter().flatten().flatten().fold(0.0, |most, &z| larger(most, z)).is_finite();
+    let is_finite = last.iter().flatten().flatten().fold(0.0, |most, &z| larger_size(most, z)).is_finite();
     if is_finite { (libm::exp2(best.min(looped.longest)), chosen) } else { (f64::NAN, chosen) }
 }
 

@@ -4,6 +4,7 @@
 //! its larger operand.
 
 use crate::arithmetic::lanes::{Arithmetic, Lanes};
+use crate::arithmetic::sum::WHOLE;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use std::sync::LazyLock;
 
@@ -150,8 +151,7 @@ const SIXTH_REST: f64 = -9.251_858_538_542_97e-18;
 /// `[cos, sin, cos, sin]` of angles `[a, a, b, b]` \[rad\] in [-π, π], to 1e-25.
 #[inline(always)]
 pub fn unit<L: Lanes>(angle: Wide<L>) -> Wide<L> {
-    // Adding and taking away 1.5·2⁵² rounds to the nearest integer.
-    let shift = L::splat(6_755_399_441_055_744.0);
+    let shift = L::splat(WHOLE);
     let k = angle.hi.mul_add(L::splat(PARTS as f64 / std::f64::consts::TAU), shift).sub(shift);
     let [a, _, b, _] = k.array();
     // Not a number lands somewhere and stays what it is in the remainder.

@@ -6,6 +6,7 @@ use super::super::{LARGEST_REST, LEAST_ANGLE};
 use super::Scratch;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Lanes;
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{State, Time};
 
@@ -82,9 +83,7 @@ impl Scratch {
 
     /// The largest change of the last iteration among the unknowns that tell; not a number where one is.
     pub(super) fn size_of_change(&self) -> f64 {
-        self.change[..self.judged].iter().fold(0.0, |size: f64, &change| {
-            if change.is_nan() || size.is_nan() { f64::NAN } else { size.max(change) }
-        })
+        self.change[..self.judged].iter().fold(0.0, |size, &change| larger(change, size))
     }
 
     /// True where the last changes are too large for the end of an iteration, which is to go on: earlier ones

@@ -8,6 +8,7 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Arithmetic;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
+use crate::arithmetic::sum::WHOLE;
 use crate::scene::Law;
 
 /// Powers of a rate: what order `MOST` of the free body asks for.
@@ -117,8 +118,7 @@ impl Laws {
 /// An angle \[rad\] less whole turns, in [-π, π].
 #[inline(always)]
 pub(super) fn reduced<L: Arithmetic>(angle: Wide<L>) -> Wide<L> {
-    // Adding and taking away 1.5·2⁵² rounds to the nearest integer.
-    let shift = L::splat(6_755_399_441_055_744.0);
+    let shift = L::splat(WHOLE);
     let turns = angle.hi.mul_add(L::splat(1.0 / std::f64::consts::TAU), shift).sub(shift);
     let (high, low) = (DoubleDouble::TAU.hi, DoubleDouble::TAU.lo);
     angle.add(Wide { hi: L::splat(high), lo: L::splat(low) }.scale(turns).minus())
