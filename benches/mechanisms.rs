@@ -18,7 +18,7 @@ use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::taylor::Kernel as Expansion;
+use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::{Dop853, Dp5, Dp8, Integrator, Seen, Statistics, Taylor, Tolerance};
 use std::path::Path;
 use std::sync::Arc;
@@ -151,7 +151,7 @@ fn main() {
         ));
         let series = move || {
             let mut series = taylor();
-            series.kernel = Expansion::Series;
+            series.kernel = ExpansionKernel::Series;
             series
         };
         candidates.push((

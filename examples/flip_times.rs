@@ -5,7 +5,7 @@
 //! picture in the README has 512) and writes `output/flip_times.png`.
 
 use driftless::chart::{Cell, FILE_RESOLUTION, Map, MapAxis, map};
-use driftless::run::{Point, Request, Status, Sweep, Vary, sweep};
+use driftless::run::{Request, Status, Sweep, SweepPoint, Vary, sweep};
 use driftless::scene::Template;
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .ending_at_flips()
         .without(is_too_low);
     let mut cells = Vec::new();
-    let totals = sweep(&plan, 0, &mut |point: &Point| {
+    let totals = sweep(&plan, 0, &mut |point: &SweepPoint| {
         cells.push(match (&point.status, point.flip) {
             (Status::Skipped, _) => Cell::Excluded,
             (_, Some(flip)) => Cell::Value(flip.t),

@@ -3,7 +3,7 @@
 use crate::dynamics::CompileError;
 #[cfg(feature = "files")]
 use crate::run::{CheckpointError, FileError};
-use crate::run::{Refusal, ResumeError, RunError, SweepError};
+use crate::run::{RequestRefusal, ResumeError, RunError, SweepError};
 use crate::scene::SceneError;
 use crate::stepping::StepError;
 
@@ -21,7 +21,7 @@ pub enum Error {
     Equations(#[from] CompileError),
     /// What was asked for makes no sense for the scene.
     #[error("{0}")]
-    Refused(#[from] Refusal),
+    Refused(#[from] RequestRefusal),
     /// The method could not begin.
     #[error("{0}")]
     Step(#[from] StepError),

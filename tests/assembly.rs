@@ -6,7 +6,7 @@ use crate::common;
 use common::shipped;
 use driftless::arithmetic::{Complex, DoubleDouble, Scalar};
 use driftless::dynamics::assembly::Assembly;
-use driftless::dynamics::constraint::Posture;
+use driftless::dynamics::constraint::ConstraintArguments;
 use driftless::dynamics::{CompileError, Mechanism};
 use driftless::scene::{Scene, parse_scene};
 use serde_json::{Value, json};
@@ -44,7 +44,7 @@ fn left(mechanism: &Mechanism, scene: &Scene) -> [f64; 2] {
     let n = mechanism.coordinates();
     let mut z = vec![Complex::ZERO; n];
     mechanism.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
-    let at = Posture { phi: &start.phi, z: &z, omega: &start.omega };
+    let at = ConstraintArguments { phi: &start.phi, z: &z, omega: &start.omega };
     mechanism.constraints.iter().fold([0.0; 2], |[position, slip], row| {
         let mut jacobian = vec![DoubleDouble::ZERO; n];
         let here = row.linearise(start.time, at, &mut jacobian);
@@ -227,7 +227,7 @@ fn impossible_starts_name_the_row() {
     assert!(closest.apart.is_some_and(|apart| apart > 1.0) && closest.guesses[1] > 0, "{closest:?}");
     let instead: Value = serde_json::from_str(&format!("{{{}}}", closest.written)).expect("JSON");
     let mechanism = compiled(&with("four_bar_motor", instead));
-    let apart = |change: &driftless::dynamics::assembly::Change| (change.used - change.given).abs();
+    let apart = |change: &driftless::dynamics::assembly::StartChange| (change.used - change.given).abs();
     assert!(mechanism.assembly.changes.iter().all(|change| apart(change) < 1e-4));
     // A motor at a dead centre of its slider: the travel cannot grow at any rate of the crank.
     let drive = json!([{"name": "push", "slider": "slider", "law": {"start": 1.5, "rate": 1}}]);

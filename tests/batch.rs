@@ -7,7 +7,7 @@ use common::{compile, shipped};
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::{Form, Mechanism, State, Time};
 use driftless::scene::{Scene, parse_scene};
-use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
 use driftless::stepping::{Cause, Integrator, Seen, Taylor, Tolerance};
 use std::sync::Arc;
@@ -108,7 +108,8 @@ fn neighbours_and_the_processor_make_no_difference_to_the_bits() {
     };
     let together = integrate(&batch, (0..13).map(member).collect());
     let backwards = integrate(&batch, (0..13).rev().map(member).collect());
-    let portable = integrate(&batch.clone().with_kernel(Kernel::Portable), (0..13).map(member).collect());
+    let portable =
+        integrate(&batch.clone().with_kernel(ExpansionKernel::Portable), (0..13).map(member).collect());
     for i in 0..13 {
         assert_eq!(integrate(&batch, vec![member(i)])[0], together[i], "{i}");
         assert_eq!(backwards[12 - i], together[i], "{i}");
@@ -179,7 +180,7 @@ fn agree_with_double_double_whoever_is_beside(all: &[(Arc<Mechanism>, State)], u
         let mut backwards = ends(&batch, members(true));
         backwards.reverse();
         assert_eq!(backwards, found);
-        assert_eq!(ends(&batch.clone().with_kernel(Kernel::Portable), members(false)), found);
+        assert_eq!(ends(&batch.clone().with_kernel(ExpansionKernel::Portable), members(false)), found);
         for (i, ((mechanism, _), (exact, found))) in all.iter().zip(exact.iter().zip(&found)).enumerate() {
             assert_eq!((found.time, &found.turns), (exact.time, &exact.turns));
             // Angles, rates, and the work of motors or dampers.

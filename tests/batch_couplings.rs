@@ -6,10 +6,10 @@ use crate::common;
 
 use common::shipped;
 use driftless::arithmetic::{Complex, DoubleDouble};
-use driftless::dynamics::constraint::Posture;
+use driftless::dynamics::constraint::ConstraintArguments;
 use driftless::dynamics::{Mechanism, State, Time};
 use driftless::scene::{Override, parse_scene};
-use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::taylor::batch::{Batch, Going};
 use std::sync::Arc;
 
@@ -91,7 +91,11 @@ fn trajectories_of_gears_and_cams_end_on_their_constraints_whoever_is_beside_the
                 members.into_iter().map(|member| member.state).collect()
             };
             let together = integrated(&at(tolerance), &all);
-            assert_eq!(integrated(&at(tolerance).with_kernel(Kernel::Portable), &all), together, "{name}");
+            assert_eq!(
+                integrated(&at(tolerance).with_kernel(ExpansionKernel::Portable), &all),
+                together,
+                "{name}"
+            );
             for (i, (mechanism, _)) in all.iter().enumerate() {
                 assert_eq!(integrated(&at(tolerance), &all[i..=i])[0], together[i], "{name} {i}");
                 let [position, rate] = violation(mechanism, &together[i]);
@@ -115,7 +119,7 @@ fn violation(mechanism: &Mechanism, state: &State) -> [f64; 2] {
     let (farthest, fastest) = (largest(phi), largest(omega));
     mechanism.constraints.iter().fold([0.0, 0.0], |[position, rate], row| {
         let mut jacobian = vec![DoubleDouble::default(); n];
-        let here = row.linearise(state.time, Posture { phi, z: &z, omega }, &mut jacobian);
+        let here = row.linearise(state.time, ConstraintArguments { phi, z: &z, omega }, &mut jacobian);
         let slip = jacobian.iter().zip(omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
         [position.max(here.position.hi.abs() / farthest), rate.max(slip.hi.abs() / fastest)]
     })

@@ -5,12 +5,12 @@ use crate::common;
 
 use common::{compile, shipped};
 use driftless::arithmetic::{Complex, DoubleDouble};
-use driftless::dynamics::constraint::{Measure, Posture};
+use driftless::dynamics::constraint::{ConstraintArguments, RowMeasure};
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, State, Time};
 use driftless::scene::{Scene, parse_scene};
-use driftless::stepping::taylor::Kernel;
-use driftless::stepping::taylor::batch::{Batch, BatchMember, Going, Passage};
+use driftless::stepping::taylor::ExpansionKernel;
+use driftless::stepping::taylor::batch::{Batch, BatchMember, Going, TakenStep};
 use driftless::stepping::{Integrator, Seen, Taylor, Tolerance};
 use std::sync::Arc;
 
@@ -145,7 +145,7 @@ pub fn agree_with_double_double(scene: &str, all: &[(Arc<Mechanism>, State)], un
         backwards.reverse();
         assert_eq!(backwards, found);
         assert_eq!(ends(&batch, members(&all[4..5]), until)[0], found[4]);
-        assert_eq!(ends(&batch.clone().with_kernel(Kernel::Portable), members(all), until), found);
+        assert_eq!(ends(&batch.clone().with_kernel(ExpansionKernel::Portable), members(all), until), found);
         for (i, ((mechanism, _), (exact, found))) in all.iter().zip(exact.iter().zip(&found)).enumerate() {
             assert_eq!((found.time, &found.turns), (exact.time, &exact.turns));
             let n = mechanism.coordinates();
@@ -217,15 +217,15 @@ fn violation(mechanism: &Mechanism, t: Time, ends: &dyn Fn(usize) -> [f64; 2]) -
     let fastest = omega.iter().fold(1.0, |most: f64, rate| most.max(rate.hi.abs()));
     mechanism.constraints.iter().fold([0.0, 0.0], |[position, rate], row| {
         let lever = match &row.measure {
-            Measure::Angle { .. } => 1.0,
-            Measure::Place(place) => {
+            RowMeasure::Angle { .. } => 1.0,
+            RowMeasure::Place(place) => {
                 let all =
                     place.linear.iter().map(|term| term.1).chain(place.bilinear.iter().map(|term| term.2));
                 all.fold(0.0, |most: f64, g| most.max(g.norm_squared().sqrt()))
             }
         };
         let mut jacobian = vec![DoubleDouble::default(); n];
-        let here = row.linearise(t, Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+        let here = row.linearise(t, ConstraintArguments { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
         let slip = jacobian.iter().zip(&omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
         [position.max(here.position.hi.abs() / lever), rate.max(slip.hi.abs() / (lever * fastest))]
     })
@@ -270,7 +270,7 @@ fn neighbours_do_not_matter_however_far_a_step_ends_from_the_constraints() {
             members.into_iter().map(|member| member.state).collect()
         };
         let together = integrated(&at(1e-3), &all);
-        assert_eq!(integrated(&at(1e-3).with_kernel(Kernel::Portable), &all), together);
+        assert_eq!(integrated(&at(1e-3).with_kernel(ExpansionKernel::Portable), &all), together);
         for i in 0..all.len() {
             assert_eq!(integrated(&at(1e-3), &all[i..=i])[0], together[i], "{scene} {i}");
         }
@@ -308,7 +308,7 @@ fn a_four_bar_is_where_trigonometry_has_it_with_the_energy_it_began_with() {
     let scene = SCENES[1];
     let all = starts(scene);
     let mut energy = [None; 11];
-    let mut see = |k: usize, passage: &Passage| {
+    let mut see = |k: usize, passage: &TakenStep| {
         let ends = [0, 1, 2].map(|body| passage.ends(body)[1]);
         let (angles, rates, total) = kite(ends[0]);
         for body in [1, 2] {

@@ -24,6 +24,9 @@ use std::collections::BTreeSet;
 const WIDTH: usize = 110;
 /// Most lines of a source.
 const LONGEST_FILE: usize = 450;
+/// The only names of two types: what a scene says of a force and the trait for one's own, and pairs of which
+/// only one is compiled, by features and by the processor.
+const SHARED_NAMES: [&str; 4] = ["Force", "Hardware", "Pages", "WideHardware"];
 /// From here on a page is written by a program, whose lines are as long as its tables.
 const GENERATED: [&str; 3] =
     ["<!-- What follows is written by", "<!-- Generated from", "Written by `TABLE=1"];
@@ -215,11 +218,10 @@ fn lines_are_short() {
     }
 }
 
-/// Of the sources as well, and no file of them is long.
-#[test]
-fn sources_have_short_lines_and_short_files() {
+/// All sources, with their paths.
+fn sources() -> Vec<(std::path::PathBuf, String)> {
     let mut folders = vec![std::path::PathBuf::from("src")];
-    let mut count = 0;
+    let mut sources = Vec::new();
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(&folder).expect("a folder of sources") {
             let path = entry.expect("an entry").path();
@@ -227,17 +229,53 @@ fn sources_have_short_lines_and_short_files() {
                 folders.push(path);
             } else if path.extension().is_some_and(|ending| ending == "rs") {
                 let text = std::fs::read_to_string(&path).expect("a source");
-                for (number, line) in (1..).zip(text.lines()) {
-                    let width = line.chars().count();
-                    assert!(width <= WIDTH, "{}:{number}: {width} characters", path.display());
-                }
-                let lines = text.lines().count();
-                assert!(lines <= LONGEST_FILE, "{}: {lines} lines", path.display());
-                count += 1;
+                sources.push((path, text));
             }
         }
     }
-    assert!(count > 400, "{count} files");
+    assert!(sources.len() > 400, "{} files", sources.len());
+    sources
+}
+
+/// Of the sources as well, and no file of them is long.
+#[test]
+fn sources_have_short_lines_and_short_files() {
+    for (path, text) in sources() {
+        for (number, line) in (1..).zip(text.lines()) {
+            let width = line.chars().count();
+            assert!(width <= WIDTH, "{}:{number}: {width} characters", path.display());
+        }
+        let lines = text.lines().count();
+        assert!(lines <= LONGEST_FILE, "{}: {lines} lines", path.display());
+    }
+}
+
+/// A type's name, where a line of a source begins one.
+fn type_begun(line: &str) -> Option<&str> {
+    let line = line.trim_start();
+    let line = match line.strip_prefix("pub") {
+        Some(rest) if rest.starts_with('(') => rest.split_once(") ")?.1,
+        Some(rest) => rest.trim_start(),
+        None => line,
+    };
+    let rest = ["struct ", "enum ", "trait "].iter().find_map(|word| line.strip_prefix(word))?;
+    rest.split(|letter: char| !letter.is_alphanumeric()).next().filter(|name| !name.is_empty())
+}
+
+#[test]
+fn no_two_types_share_a_name() {
+    let mut owners = std::collections::BTreeMap::<String, BTreeSet<String>>::new();
+    for (path, text) in sources() {
+        for name in text.lines().filter_map(type_begun) {
+            owners.entry(name.into()).or_default().insert(path.display().to_string());
+        }
+    }
+    assert!(owners.len() > 800, "{} types", owners.len());
+    let shared: Vec<_> = owners
+        .iter()
+        .filter(|(name, files)| files.len() > 1 && !SHARED_NAMES.contains(&name.as_str()))
+        .collect();
+    assert!(shared.is_empty(), "{shared:?}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::common;
 use common::{pendulum, quarter_period, run};
 use driftless::Simulation;
 use driftless::run::trust::Level;
-use driftless::run::{MethodId, Outcome, Point, Request, Stabilization, Sweep, Vary, sweep};
+use driftless::run::{MethodId, Outcome, Request, Stabilization, Sweep, SweepPoint, Vary, sweep};
 use driftless::scene::{Scene, Template, Wall, parse_scene};
 use driftless::stepping::Cause;
 use std::f64::consts::PI;
@@ -217,7 +217,7 @@ fn a_bar_on_a_torsion_spring_turns_over_when_it_does() {
             }
         };
         let mut flips = Vec::new();
-        sweep(&plan, 1, &mut |point: &Point| {
+        sweep(&plan, 1, &mut |point: &SweepPoint| {
             flips.push(point.flip.map_or(f64::NAN, |flip| flip.t));
             Ok(())
         })

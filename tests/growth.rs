@@ -8,7 +8,7 @@ use crate::mechanisms;
 
 use common::{compile, pendulum, quarter_period, shipped};
 use driftless::dynamics::{Mechanism, Motion, Time};
-use driftless::run::trust::{DistanceMetric, Flow, Level, Tangent, Trust, flow};
+use driftless::run::trust::{DistanceMetric, Flow, Level, TangentFlow, Trust, flow};
 use driftless::run::{Limits, Plan, Request, Run, Running, integrate, reference};
 use driftless::scene::{Scene, parse_scene};
 use std::f64::consts::TAU;
@@ -402,7 +402,7 @@ fn the_plain_flow_is_that_of_the_series() {
         let start = mechanism.start(&scene);
         let plan = Plan::new(&scene, &mechanism, &request(3.0, 3.0)).expect("a plan");
         let plain = flow(&mechanism, &plan, &start, &[3.0]).expect("a flow");
-        let mut whole = Tangent::whole(&mechanism, &start, 3.0).expect("a flow");
+        let mut whole = TangentFlow::whole(&mechanism, &start, 3.0).expect("a flow");
         while whole.next() < 3.0 {
             let motion =
                 motions(&scene, &mechanism, &start, whole.next(), 1).expect("a run").pop().expect("a row");
@@ -511,7 +511,7 @@ fn rounding_of_many_bodies_is_told() {
         found.push(running.motion().clone());
         let per_second = running.finish().statistics.steps as f64 / until;
         let ruler = DistanceMetric::new(&mechanism);
-        let mut tangent = Tangent::new(&mechanism, &start, until).expect("a flow");
+        let mut tangent = TangentFlow::new(&mechanism, &start, until).expect("a flow");
         let (mut seen, mut told) = (0.0_f64, 0.0_f64);
         for (exact, found) in exact.iter().zip(&found) {
             while tangent.next() <= exact.time.hi {

@@ -13,7 +13,7 @@ use common::compile;
 use driftless::dynamics::{Mechanism, Motion};
 use driftless::run::trust::{DistanceMetric, Inputs, Level};
 use driftless::run::{Limits, MethodId, Plan, Request, Run, Running, integrate};
-use driftless::scene::{Scene, Template, Variable, Written};
+use driftless::scene::{Scene, Template, Variable, WrittenNumber};
 use std::sync::Arc;
 
 const MAX_EVALUATIONS: u64 = 300_000;
@@ -27,7 +27,7 @@ fn template(text: &str) -> Template {
     Template::new(text.to_owned(), "scene.json".to_owned(), &[])
 }
 
-fn effects(template: &Template, numbers: &[Written], until: f64) -> Inputs {
+fn effects(template: &Template, numbers: &[WrittenNumber], until: f64) -> Inputs {
     Inputs::of(template, numbers, until, MAX_EVALUATIONS, None, &mut || false)
 }
 
@@ -71,7 +71,7 @@ fn apart(ruler: &DistanceMetric, one: &[Motion], other: &[Motion]) -> f64 {
 }
 
 /// The scene with a number changed.
-fn changed(template: &Template, number: &Written, value: f64) -> Option<Scene> {
+fn changed(template: &Template, number: &WrittenNumber, value: f64) -> Option<Scene> {
     template.filled(&[Variable { path: number.path.clone(), unit: number.unit, start: None }], &[value]).ok()
 }
 
@@ -88,7 +88,7 @@ enum Judged {
 /// Judges what is told of a number by runs with it changed to both sides by what should make 1e-5 rad.
 fn judged(
     template: &Template,
-    number: &Written,
+    number: &WrittenNumber,
     told: &driftless::run::trust::Input,
     base: &[Motion],
     until: f64,

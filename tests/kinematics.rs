@@ -2,7 +2,7 @@
 //! bodies as nine equations, power, limits and dead centres by the law of cosines.
 
 use driftless::dynamics::Mechanism;
-use driftless::run::kinematics::{Drive, Kinematics, KinematicsError, Position, kinematics};
+use driftless::run::kinematics::{KinematicDrive, Kinematics, KinematicsError, Position, kinematics};
 use driftless::scene::{Output, Scene, parse_scene, read_scene};
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -11,7 +11,7 @@ fn example(name: &str) -> Scene {
     read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a shipped scene")
 }
 
-fn drive(text: &str) -> Drive {
+fn drive(text: &str) -> KinematicDrive {
     text.parse().expect("a drive")
 }
 
@@ -98,8 +98,8 @@ fn limits_and_dead_centres_are_where_the_law_of_cosines_has_them() {
     assert!(swung.limits.iter().all(|limit| limit.is_fold && limit.in_line == ["A"]), "{:?}", swung.limits);
     assert!(swung.positions.iter().all(|at| at.drive > ends[0] && at.drive < ends[1]));
     // A motor at the rocker does not depend on how fast it goes, nor the limits on how many positions.
-    let slowly =
-        kinematics(&scene, &Drive { rate: Some(1e-3), ..drive("rocker=0..3") }, 7).expect("kinematics");
+    let slowly = kinematics(&scene, &KinematicDrive { rate: Some(1e-3), ..drive("rocker=0..3") }, 7)
+        .expect("kinematics");
     for (slow, limit) in slowly.limits.iter().zip(&limits) {
         assert!((slow.drive - limit).abs() < 1e-11, "{slow:?} {limit}");
     }
@@ -124,7 +124,7 @@ fn extremes_are_the_same_wherever_a_turn_begins_and_however_many_positions_it_ha
     for (count, shifts) in [(360, 40), (48, 25), (24, 13)] {
         for shift in 0..shifts {
             let from = -TAU * f64::from(shift) / f64::from(shifts);
-            let turn = Drive { range: Some([from, from + TAU]), ..drive("motor") };
+            let turn = KinematicDrive { range: Some([from, from + TAU]), ..drive("motor") };
             let found = kinematics(&scene, &turn, count).expect("kinematics");
             for (k, name) in ["rocker_omega", "rocker_alpha"].into_iter().enumerate() {
                 let range = found.ranges.iter().find(|range| range.name == name).expect("an output");
@@ -208,8 +208,8 @@ fn loads_are_those_of_nine_equations_at_speed_and_at_rest() {
     let mut scene = example("crank_rocker");
     scene.outputs.retain(|output| ["O", "A", "B", "C"].contains(&output.name.as_str()));
     for rate in [10.0 * PI, 1.0, 1e-4] {
-        let found =
-            kinematics(&scene, &Drive { rate: Some(rate), ..drive("motor") }, 180).expect("kinematics");
+        let found = kinematics(&scene, &KinematicDrive { rate: Some(rate), ..drive("motor") }, 180)
+            .expect("kinematics");
         let names: Vec<String> = found.ranges.iter().map(|range| range.name.clone()).collect();
         assert_eq!(names[..5], ["motor.torque", "O", "A", "B", "C"]);
         let mut peaks = [0.0_f64; 5];
@@ -347,12 +347,12 @@ fn what_cannot_be_driven_is_refused_by_name() {
     let of = |name: &str, text: &str| kinematics(&example(name), &drive(text), 10).expect_err("refused");
     assert!(matches!(of("free", "bar1"), KinematicsError::Free { left: 1, .. }));
     assert!(matches!(of("crank_rocker", "crnk"), KinematicsError::Unknown { .. }));
-    let none = kinematics(&example("free"), &Drive::default(), 10).expect_err("refused");
+    let none = kinematics(&example("free"), &KinematicDrive::default(), 10).expect_err("refused");
     assert!(matches!(none, KinematicsError::NoDrive(_)));
     let slider = example("slider_crank_driven").sliders[0].name.clone();
     assert!(matches!(of("slider_crank_driven", &slider), KinematicsError::NoRange(_)));
     for text in ["", "=1..2", "crank=1", "crank=2..1", "crank=a..b", "crank=0..inf"] {
-        assert!(text.parse::<Drive>().is_err(), "{text}");
+        assert!(text.parse::<KinematicDrive>().is_err(), "{text}");
     }
     assert_eq!(drive("crank.phi=-pi..pi/2"), drive("crank=-pi..0.5pi"));
     // An output that is not asked for is none.

@@ -20,7 +20,7 @@ use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time};
 use driftless::stabilization::Projected;
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
-use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::sync::Arc;
 
@@ -28,7 +28,7 @@ fn both(tolerance: f64) -> Tolerance {
     Tolerance { relative: tolerance, absolute: tolerance }
 }
 
-fn taylor(tolerance: f64, kernel: Kernel) -> Taylor<f64> {
+fn taylor(tolerance: f64, kernel: ExpansionKernel) -> Taylor<f64> {
     let mut taylor = Taylor::<f64>::new(both(tolerance));
     taylor.kernel = kernel;
     taylor
@@ -174,13 +174,13 @@ fn the_series_takes_the_squeezing_mechanism_to_its_known_end() {
     let (mechanism, start) = started("andrews");
     for (tolerance, bound) in [(1e-3, 1e-3), (1e-6, 1e-6), (1e-9, 1e-9), (1e-12, 1e-12), (1e-15, 1e-12)] {
         for projected in [false, true] {
-            let mut method = taylor(tolerance, Kernel::Fastest);
+            let mut method = taylor(tolerance, ExpansionKernel::Fastest);
             let (end, _, residual) = if projected {
                 run(&mut looped(&mechanism), &start, &mut Projected::new(method), 0.03)
             } else {
                 run(&mut looped(&mechanism), &start, &mut method, 0.03)
             };
-            let series = taylor(tolerance, Kernel::Series);
+            let series = taylor(tolerance, ExpansionKernel::Series);
             let (other, ..) = run(&mut looped(&mechanism), &start, &mut Projected::new(series), 0.03);
             assert!(error(&end) < bound, "{tolerance:e}: {:e}", error(&end));
             assert!(residual < 1e-13, "{residual:e}");
@@ -192,8 +192,9 @@ fn the_series_takes_the_squeezing_mechanism_to_its_known_end() {
 #[test]
 fn the_series_has_the_same_bits_without_the_processors_instructions() {
     let (mechanism, start) = started("andrews");
-    let end = |kernel: Kernel| run(&mut looped(&mechanism), &start, &mut taylor(1e-9, kernel), 0.01).0;
-    assert_eq!(end(Kernel::Fastest), end(Kernel::Portable));
+    let end =
+        |kernel: ExpansionKernel| run(&mut looped(&mechanism), &start, &mut taylor(1e-9, kernel), 0.01).0;
+    assert_eq!(end(ExpansionKernel::Fastest), end(ExpansionKernel::Portable));
 }
 
 /// Times inside a step, with turns: against steps that end there.

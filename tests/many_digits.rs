@@ -4,7 +4,9 @@ use crate::common;
 use driftless::arithmetic::Scalar;
 use driftless::dynamics::Mechanism;
 use driftless::run::Request;
-use driftless::run::digits::{LongRun, Pair, Precision, Progress, Row, Source, Wide, forecast, long_run};
+use driftless::run::digits::{
+    DigitsPair, DigitsSource, LongRun, PairProgress, Precision, ShownRow, Wide, forecast, long_run,
+};
 use driftless::scene::{Override, Template};
 use num_bigint::BigInt;
 use std::sync::Arc;
@@ -12,12 +14,12 @@ use std::sync::Arc;
 /// Decimals that fixed-point numbers of the checks carry.
 const PLACES: u32 = 90;
 
-pub fn source(text: &str, set: &[&str], until: &str, every: &str) -> Source {
+pub fn source(text: &str, set: &[&str], until: &str, every: &str) -> DigitsSource {
     let overrides: Vec<Override> = set.iter().map(|set| set.parse().expect("an override")).collect();
     let template = Template::new(text.to_owned(), "test".to_owned(), &overrides);
     let scene = template.scene().expect("a scene");
     let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
-    Source {
+    DigitsSource {
         template,
         typed: set.iter().map(|&set| set.to_owned()).collect(),
         until: Some(until.to_owned()),
@@ -32,21 +34,21 @@ pub fn shipped(name: &str) -> String {
     std::fs::read_to_string(path).expect("a shipped scene")
 }
 
-pub fn begun(source: &Source, digits: usize) -> Box<dyn LongRun> {
+pub fn begun(source: &DigitsSource, digits: usize) -> Box<dyn LongRun> {
     let has_loops = source.mechanism.has_closed_loops();
     long_run(source, Precision::new(digits, has_loops)).expect("a run")
 }
 
-fn rows(source: &Source, digits: usize) -> Vec<Row> {
+fn rows(source: &DigitsSource, digits: usize) -> Vec<ShownRow> {
     let mut run = begun(source, digits);
     (0..=run.last_row()).map(|k| run.row(k, &mut || false).expect("a row").expect("no pause")).collect()
 }
 
 /// A whole run; one that goes on from any of its rows comes to the same bits.
-pub fn resumed(source: &Source) -> Box<dyn LongRun> {
+pub fn resumed(source: &DigitsSource) -> Box<dyn LongRun> {
     let mut whole = begun(source, 30);
     let mut saved = vec![whole.save()];
-    let rows: Vec<Row> = (0..=whole.last_row())
+    let rows: Vec<ShownRow> = (0..=whole.last_row())
         .map(|number| {
             let row = whole.row(number, &mut || false).expect("a row").expect("there");
             saved.push(whole.save());
@@ -66,11 +68,11 @@ pub fn resumed(source: &Source) -> Box<dyn LongRun> {
 }
 
 /// Two runs with the digits forecast for agreement to 1e-15, which agree so far at every row.
-pub fn proved(source: &Source) -> Pair {
+pub fn proved(source: &DigitsSource) -> DigitsPair {
     let forecast = forecast(source, 1e-15, false, &mut || false).expect("no error").expect("a forecast");
-    let mut pair = Pair::new(source, &[forecast.run, forecast.companion]).expect("two runs");
+    let mut pair = DigitsPair::new(source, &[forecast.run, forecast.companion]).expect("two runs");
     let mut least = f64::INFINITY;
-    while let Progress::Rows(rows) = pair.go(&|| false).expect("no stop") {
+    while let PairProgress::Rows(rows) = pair.go(&|| false).expect("no stop") {
         for (_, agreement) in rows {
             least = least.min(agreement.expect("two runs"));
         }
@@ -79,7 +81,7 @@ pub fn proved(source: &Source) -> Pair {
     pair
 }
 
-pub fn last(source: &Source, digits: usize) -> Row {
+pub fn last(source: &DigitsSource, digits: usize) -> ShownRow {
     rows(source, digits).pop().expect("a row")
 }
 
@@ -213,7 +215,7 @@ fn a_ball_bounces_as_its_parabolas() {
      "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "line": {"through": [0, 0.1], "normal": [0, 1]}, "restitution": 0.5}],
      "start": {"ball": {"phi": 0.3, "omega": 1.1, "origin": [0.2, 1.1], "velocity": [0.3, 0]}}, "until": 1, "every": 1}"#;
     let mut run = begun(&source(ball, &[], "1.2", "0.3"), 60);
-    let rows: Vec<Row> =
+    let rows: Vec<ShownRow> =
         (0..=run.last_row()).map(|k| run.row(k, &mut || false).expect("a row").expect("there")).collect();
     // 0.4515… + 0.4515… + 0.2257…: between the third and the fourth impact.
     assert_eq!(run.counts()[1], 3);
@@ -234,7 +236,7 @@ fn a_ball_bounces_as_its_parabolas() {
 #[test]
 fn four_bars_pass_their_singular_positions_on_the_right_branch() {
     let rows = rows(&source(&shipped("four_bars"), &[], "3", "0.25"), 25);
-    let is_below = |row: &Row| row.bodies[0][3] < Wide::ZERO;
+    let is_below = |row: &ShownRow| row.bodies[0][3] < Wide::ZERO;
     let crossed = rows.windows(2).filter(|pair| is_below(&pair[0]) != is_below(&pair[1])).count();
     let mut energy: Option<BigInt> = None;
     for row in &rows {
@@ -329,9 +331,9 @@ fn the_digits_a_horizon_takes_are_forecast_and_proved() {
     let forecast = forecast(&source, 1e-20, false, &mut || false).expect("no error").expect("a forecast");
     assert!((2.5..9.0).contains(&forecast.growth), "{forecast:?}");
     assert!((24..40).contains(&forecast.run.digits) && forecast.companion.digits == forecast.run.digits + 10);
-    let mut pair = Pair::new(&source, &[forecast.run, forecast.companion]).expect("two runs");
+    let mut pair = DigitsPair::new(&source, &[forecast.run, forecast.companion]).expect("two runs");
     let mut least = f64::INFINITY;
-    while let Progress::Rows(rows) = pair.go(&|| false).expect("no stop") {
+    while let PairProgress::Rows(rows) = pair.go(&|| false).expect("no stop") {
         for (_, agreement) in rows {
             least = least.min(agreement.expect("two runs"));
         }

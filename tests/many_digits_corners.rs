@@ -3,7 +3,9 @@
 
 use super::many_digits::{cosine, fixed, last, near, number, one, over, pi, root, source, text, times};
 use driftless::arithmetic::Real;
-use driftless::run::digits::{LongRun, Pair, Precision, Progress, Saved, Source, long_run};
+use driftless::run::digits::{
+    DigitsPair, DigitsSource, LongRun, PairProgress, Precision, SavedDigits, long_run,
+};
 use driftless::stepping::Cause;
 use num_bigint::BigInt;
 
@@ -26,7 +28,7 @@ fn at(parts: &str, [phi, omega]: [&str; 2], until: &str) -> [BigInt; 2] {
     [number(row.bodies[0][0]), number(row.bodies[0][1])]
 }
 
-fn begun(source: &Source) -> Box<dyn LongRun> {
+fn begun(source: &DigitsSource) -> Box<dyn LongRun> {
     long_run(source, Precision::new(DIGITS, false)).expect("a run")
 }
 
@@ -314,19 +316,19 @@ fn a_pair_goes_on_from_the_middle_of_a_row() {
         r#""torques": [{"name": "spring", "body": "rotor", "torque": "-if(rotor.phi > 0, 9, 5)*rotor.phi"}]"#;
     let long = source(&rotor(parts, "0", "1"), &[], "8", "8");
     let precisions = [Precision::new(DIGITS, false), Precision::new(DIGITS + 10, false)];
-    let begun = || Pair::new(&long, &precisions).expect("two runs");
-    let rows = |pair: &mut Pair, pause: &(dyn Fn() -> bool + Sync)| {
+    let begun = || DigitsPair::new(&long, &precisions).expect("two runs");
+    let rows = |pair: &mut DigitsPair, pause: &(dyn Fn() -> bool + Sync)| {
         let mut rows = Vec::new();
         loop {
             match pair.go(pause).expect("no stop") {
-                Progress::Rows(more) => rows.extend(more.into_iter().map(|(row, _)| row.bodies)),
-                Progress::Over => return (rows, true),
-                Progress::Paused => return (rows, false),
+                PairProgress::Rows(more) => rows.extend(more.into_iter().map(|(row, _)| row.bodies)),
+                PairProgress::Over => return (rows, true),
+                PairProgress::Paused => return (rows, false),
             }
         }
     };
     let (expected, _) = rows(&mut begun(), &|| false);
-    let mut saved: Option<Vec<Saved>> = None;
+    let mut saved: Option<Vec<SavedDigits>> = None;
     let (mut next, mut found) = (0, Vec::new());
     for _ in 0..100 {
         // Each step is followed by a pause, and by a new process.

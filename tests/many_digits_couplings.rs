@@ -3,13 +3,13 @@
 use super::many_digits::{fixed, last, near, number, one, source};
 use driftless::arithmetic::Real;
 use driftless::run::Request;
-use driftless::run::digits::{Precision, Row, long_run};
+use driftless::run::digits::{Precision, ShownRow, long_run};
 use num_bigint::BigInt;
 
 const DIGITS: usize = 60;
 const PLACES: u32 = 56;
 
-fn holds(row: &Row, body: usize, expected: &[(usize, BigInt)]) {
+fn holds(row: &ShownRow, body: usize, expected: &[(usize, BigInt)]) {
     expected.iter().for_each(|(what, value)| near(&number(row.bodies[body][*what]), value, PLACES));
     assert!(row.drift.abs() < 1e-56 && row.residual[0] < 1e-56, "{:e}, {:?}", row.drift, row.residual);
 }

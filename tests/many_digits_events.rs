@@ -2,19 +2,21 @@
 
 use super::many_digits::{fixed, near, number, one, pi, shipped, source, times};
 use driftless::run::Request;
-use driftless::run::digits::{LongEvent, LongRun, Pair, Precision, Progress, Source, long_run};
+use driftless::run::digits::{
+    DigitsPair, DigitsSource, LongEvent, LongRun, PairProgress, Precision, long_run,
+};
 use driftless::{MethodId, Simulation, scene::parse_scene};
 use num_bigint::BigInt;
 
 const DIGITS: usize = 60;
 const PLACES: u32 = 56;
 
-fn begun(source: &Source) -> Box<dyn LongRun> {
+fn begun(source: &DigitsSource) -> Box<dyn LongRun> {
     long_run(source, Precision::new(DIGITS, false)).expect("a run")
 }
 
 /// A run to its end, row by row.
-fn ended(source: &Source) -> Box<dyn LongRun> {
+fn ended(source: &DigitsSource) -> Box<dyn LongRun> {
     let mut run = begun(source);
     let mut number = 0;
     while number <= run.last_row() {
@@ -174,13 +176,13 @@ fn a_pair_resumed_at_its_end_has_all_events() {
     for (action, ended_by) in [("", None), (r#", "action": "stop""#, Some("level"))] {
         let long = long(action);
         let precisions = [Precision::new(DIGITS, false), Precision::new(DIGITS + 10, false)];
-        let begun = || Pair::new(&long, &precisions).expect("two runs");
+        let begun = || DigitsPair::new(&long, &precisions).expect("two runs");
         let mut pair = begun();
-        while !matches!(pair.go(&|| false).expect("no stop"), Progress::Over) {}
+        while !matches!(pair.go(&|| false).expect("no stop"), PairProgress::Over) {}
         let (saved, next) = pair.save();
         let mut other = begun();
         assert!(other.resume(saved, next));
-        assert!(matches!(other.go(&|| false).expect("no stop"), Progress::Over));
+        assert!(matches!(other.go(&|| false).expect("no stop"), PairProgress::Over));
         for pair in [&pair, &other] {
             let events = pair.events();
             assert_eq!(events.len(), 1, "{action}");

@@ -9,7 +9,7 @@ use super::many_digits::{
 };
 use driftless::Mechanism;
 use driftless::arithmetic::Real;
-use driftless::run::digits::{LongTurn, Precision, Row, long_run};
+use driftless::run::digits::{LongTurn, Precision, ShownRow, long_run};
 use driftless::run::{MethodId, Outcome, Request};
 use driftless::scene::parse_scene;
 use driftless::stepping::StepError;
@@ -21,7 +21,7 @@ fn sine(x: &BigInt) -> BigInt {
 
 /// The last row of a run of a scene, and its transitions.
 struct Ran {
-    row: Row,
+    row: ShownRow,
     turns: Vec<LongTurn>,
     impacts: u64,
 }

@@ -7,7 +7,7 @@ use super::many_digits::{
     begun, fixed, near, number, one, over, proved, resumed, root, source, square, times,
 };
 use driftless::arithmetic::Real;
-use driftless::run::digits::{LongHold, LongTurn, Row};
+use driftless::run::digits::{LongHold, LongTurn, ShownRow};
 use driftless::run::{MethodId, Outcome, Request};
 use driftless::scene::parse_scene;
 use driftless::stepping::StepError;
@@ -23,7 +23,7 @@ const VY: usize = 5;
 
 /// A run, at its end.
 struct Ran {
-    row: Row,
+    row: ShownRow,
     /// Kinetic and potential energy at the start [J].
     begins: f64,
     turns: Vec<LongTurn>,

@@ -7,13 +7,13 @@ use super::many_digits::{
 };
 use driftless::arithmetic::Real;
 use driftless::run::Request;
-use driftless::run::digits::{LongEvent, LongHold, Row};
+use driftless::run::digits::{LongEvent, LongHold, ShownRow};
 use driftless::scene::parse_scene;
 use num_bigint::BigInt;
 
 /// The last row of a run of a scene, and the times that points stayed on walls.
 struct Ran {
-    row: Row,
+    row: ShownRow,
     holds: Vec<LongHold>,
     events: Vec<LongEvent>,
 }

@@ -3,13 +3,13 @@
 
 use super::many_digits::{cosine, fixed, last, near, number, pi, shipped, source};
 use driftless::arithmetic::Real;
-use driftless::run::digits::{Precision, Row, long_run};
+use driftless::run::digits::{Precision, ShownRow, long_run};
 use num_bigint::BigInt;
 
 const DIGITS: usize = 60;
 const PLACES: u32 = 56;
 
-fn holds(row: &Row, body: usize, expected: &[(usize, BigInt)]) {
+fn holds(row: &ShownRow, body: usize, expected: &[(usize, BigInt)]) {
     expected.iter().for_each(|(what, value)| near(&number(row.bodies[body][*what]), value, PLACES));
     assert!(row.drift.abs() < 1e-56, "{:e}", row.drift);
 }
@@ -147,7 +147,7 @@ fn a_run_goes_on_with_what_has_closed() {
     let begun = || long_run(&long, Precision::new(DIGITS, true)).expect("a run");
     let mut whole = begun();
     let mut row_of = |number: u64| whole.row(number, &mut || false).expect("no stop").expect("no pause");
-    let rows: Vec<Row> = (0..=8).map(&mut row_of).collect();
+    let rows: Vec<ShownRow> = (0..=8).map(&mut row_of).collect();
     for interrupted in [2, 3, 5, 7] {
         let mut first = begun();
         (0..=interrupted).for_each(|number| drop(first.row(number, &mut || false).expect("no stop")));

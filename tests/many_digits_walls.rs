@@ -1,7 +1,7 @@
 //! Impacts at several walls at one moment in many digits, against closed forms in integer arithmetic.
 
 use super::many_digits::{begun, fixed, last, near, number, one, over, source, times};
-use driftless::run::digits::{LongError, Pair, Precision, Progress, Row, forecast};
+use driftless::run::digits::{DigitsPair, LongError, PairProgress, Precision, ShownRow, forecast};
 use driftless::stepping::StepError;
 use num_bigint::BigInt;
 
@@ -11,7 +11,7 @@ const PLACES: u32 = 57;
 const BOX: [&str; 4] = ["1.5", "0.11", "0.3", "0.49"];
 
 /// A box that lands flat on corners at these places beside its centre of mass, with these restitutions.
-fn landed(corners: [(&str, &str); 2], until: &str) -> Row {
+fn landed(corners: [(&str, &str); 2], until: &str) -> ShownRow {
     let [mass, inertia, height, _] = BOX;
     let wall = |(name, (x, e)): (&str, (&str, &str))| {
         format!(
@@ -36,7 +36,7 @@ fn fall() -> [BigInt; 2] {
 }
 
 /// The row after a landing that gives the box this velocity upwards and this spin.
-fn leaves(row: &Row, [up, spin]: [BigInt; 2], until: &str) {
+fn leaves(row: &ShownRow, [up, spin]: [BigInt; 2], until: &str) {
     let [time, _] = fall();
     let after = fixed(until) - time;
     let drop = times(&fixed("9.81"), &times(&after, &after)) / 2;
@@ -170,11 +170,11 @@ fn a_forecast_of_a_loop_that_a_motor_drives_into_a_wall_stops() {
 fn runs_side_by_side_keep_their_rows_up_to_a_stop() {
     let text = parallelogram(r#""rate": 1"#, "-1", r#""restitution": 0.755"#);
     let precisions = [25, 40].map(|digits| Precision::new(digits, true));
-    let mut pair = Pair::new(&source(&text, &[], "1", "0.25"), &precisions).expect("two runs");
+    let mut pair = DigitsPair::new(&source(&text, &[], "1", "0.25"), &precisions).expect("two runs");
     let mut rows = Vec::new();
     let stop = loop {
         match pair.go(&|| false) {
-            Ok(Progress::Rows(more)) => rows.extend(more),
+            Ok(PairProgress::Rows(more)) => rows.extend(more),
             Ok(_) => panic!("no stop"),
             Err(stop) => break stop,
         }

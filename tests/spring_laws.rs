@@ -6,7 +6,7 @@ use super::formulas::scene;
 use super::taylor::{distance, end, on};
 use driftless::scene::Scene;
 use driftless::stepping::Taylor;
-use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::ExpansionKernel;
 
 /// The double pendulum of `spring` with its spring under this law, another law from one bar to the other,
 /// and a built-in damper beside.
@@ -44,12 +44,12 @@ fn laws_in_lanes_agree_with_the_series_and_with_double_double() {
         let scene = sprung(law, other);
         let exact = end(&scene, Taylor::reference(), 2.0);
         for order in [16, 20, 24] {
-            let series = end(&scene, on(Kernel::Series, 1e-17, order), 2.0);
-            let fast = end(&scene, on(Kernel::Fastest, 1e-17, order), 2.0);
+            let series = end(&scene, on(ExpansionKernel::Series, 1e-17, order), 2.0);
+            let fast = end(&scene, on(ExpansionKernel::Fastest, 1e-17, order), 2.0);
             assert_ne!(series, fast, "{law}: the lanes were not entered");
             let (apart, error) = (distance(&series, &fast), distance(&exact, &fast));
             assert!(apart < 1e-12 && error < 1e-12, "{law}, order {order}: {apart:e}, {error:e}");
-            let portable = end(&scene, on(Kernel::Portable, 1e-17, order), 2.0);
+            let portable = end(&scene, on(ExpansionKernel::Portable, 1e-17, order), 2.0);
             assert_eq!(fast, portable, "{law}, order {order}");
         }
     }
@@ -62,8 +62,8 @@ fn the_error_falls_with_the_tolerance() {
         let exact = end(&scene, Taylor::reference(), 2.0);
         let error = |kernel, tolerance| distance(&exact, &end(&scene, on(kernel, tolerance, 20), 2.0));
         let tolerances = [1e-6, 1e-9, 1e-12];
-        let errors = tolerances.map(|tolerance| error(Kernel::Fastest, tolerance));
-        let series = tolerances.map(|tolerance| error(Kernel::Series, tolerance));
+        let errors = tolerances.map(|tolerance| error(ExpansionKernel::Fastest, tolerance));
+        let series = tolerances.map(|tolerance| error(ExpansionKernel::Series, tolerance));
         assert!(errors[0] > 30.0 * errors[1] && errors[1] > 30.0 * errors[2], "{law}: {errors:?}");
         let is_near = errors.iter().zip(&series).all(|(error, series)| *error < 10.0 * series + 1e-12);
         assert!(is_near, "{law}: {errors:?}, by the series of any mechanism {series:?}");
@@ -86,7 +86,7 @@ fn small_oscillations_about_equilibrium_keep_their_steps() {
     let law = text(r#""tension": "1e4*(length - 1)""#);
     let exact = end(&own, Taylor::reference(), 20.0);
     for scene in [own, law] {
-        let found = distance(&exact, &end(&scene, on(Kernel::Fastest, 1e-9, 20), 20.0));
+        let found = distance(&exact, &end(&scene, on(ExpansionKernel::Fastest, 1e-9, 20), 20.0));
         // The frequency is about 169 rad/s, the rate 1.7e-5 rad/s.
         assert!(found < 1e-6, "{found:e}");
     }

@@ -5,11 +5,11 @@
 use crate::program;
 
 use driftless::dynamics::{Mechanism, Time};
-use driftless::run::sweep::table::{Layout, columns, numbers};
+use driftless::run::sweep::table::{SweepLayout, columns, numbers};
 use driftless::run::trust::Level;
 use driftless::run::{
-    Flip, Limits, MethodId, Outcome, Point, PointObserver, Request, Shard, Stabilization, Status, Sweep,
-    SweepError, SweepTable, Vary, reference, simulate, sweep,
+    Flip, Limits, MethodId, Outcome, PointObserver, Request, Shard, Stabilization, Status, Sweep, SweepError,
+    SweepPoint, SweepTable, Vary, reference, simulate, sweep,
 };
 use driftless::scene::{Output, Override, Template};
 use driftless::stepping::{Cause, taylor::batch::Batch};
@@ -26,9 +26,9 @@ fn prepared(scene: &str, vary: &[&str], request: &Request) -> Sweep {
     Sweep::new(&template(scene), vary, request).expect("a sweep")
 }
 
-pub fn points(plan: &Sweep, threads: usize) -> Vec<Point> {
+pub fn points(plan: &Sweep, threads: usize) -> Vec<SweepPoint> {
     let mut points = Vec::new();
-    sweep(plan, threads, &mut |point: &Point| {
+    sweep(plan, threads, &mut |point: &SweepPoint| {
         points.push(point.clone());
         Ok(())
     })
@@ -75,7 +75,7 @@ fn every_point_is_the_run_it_stands_for() {
 }
 
 /// The run alone of a point that is integrated over a second, with which it agrees.
-fn agreed(scene: &str, plan: &Sweep, point: &Point, request: &Request) -> Outcome {
+fn agreed(scene: &str, plan: &Sweep, point: &SweepPoint, request: &Request) -> Outcome {
     let alone = template(scene).filled(plan.variables(), &point.values).expect("a scene");
     let outcome = simulate(&alone, request, &mut |_| Ok(())).expect("a run");
     assert_eq!((&point.status, point.t), (&Status::Done, 1.0));
@@ -197,7 +197,7 @@ fn where_a_free_bar_ends_is_in_the_table() {
             bar.vy [m/s]"
         );
         for point in points(&plan, 1) {
-            let numbers = numbers(&point, Layout::of(&plan));
+            let numbers = numbers(&point, SweepLayout::of(&plan));
             assert_eq!(numbers.len(), names.len() - 3, "all but words");
             let (sin, cos) = 0.3_f64.sin_cos();
             let arm = [0.1 * cos - 0.05 * sin, 0.1 * sin + 0.05 * cos];
@@ -218,7 +218,7 @@ fn where_a_free_bar_ends_is_in_the_table() {
     // A point that never begins has as many numbers, none of which is one.
     let vary = vec!["bars.bar.mass=-1..1:2".parse().expect("a range")];
     let plan = Sweep::new(&template, vary, &request("dp8", t)).expect("a sweep");
-    let refused = numbers(&points(&plan, 1)[0], Layout::of(&plan));
+    let refused = numbers(&points(&plan, 1)[0], SweepLayout::of(&plan));
     assert!(refused.len() == columns(&plan).len() - 3 && refused[1..].iter().all(|x| x.is_nan()));
 }
 
@@ -266,7 +266,7 @@ fn integrals_are_columns_of_a_sweep() {
     for (method, trust) in [("taylor", Level::Auto), ("dp8", Level::Off)] {
         let vary = vec!["rotor.omega=-1..1:11".parse().expect("a range")];
         let plan = Sweep::new(&rotor(more), vary, &request(method, 4.0)).expect("a sweep").trusted(trust);
-        let (columns, layout) = (columns(&plan), Layout::of(&plan));
+        let (columns, layout) = (columns(&plan), SweepLayout::of(&plan));
         assert!(columns.contains(&"sum".to_owned()) && !columns.iter().any(|name| name.starts_with("sum.")));
         let at = columns.iter().position(|name| name == "sum").expect("a column");
         for point in points(&plan, 1) {
@@ -560,8 +560,7 @@ fn bad_points_say_so_and_end_nothing() {
     for method in ["dp5", "taylor"] {
         let request = Request { rtol: Some(1e-2), ..request(method, 5.0) };
         let found = points(&prepared("free", &["bar1.phi=0..2:2"], &request).with_limits(limits), 1);
-        let stopped =
-            |point: &Point| matches!(&point.status, Status::Stopped(stop) if stop.cause == Cause::DriftLimit);
+        let stopped = |point: &SweepPoint| matches!(&point.status, Status::Stopped(stop) if stop.cause == Cause::DriftLimit);
         assert!(stopped(&found[1]), "{method}: {found:?}");
     }
 }
@@ -693,7 +692,7 @@ fn points_of_floating_bodies_are_rows_of_as_many_columns() {
         Sweep::new(&template, vec!["plate.omega=1..2:2".parse().expect("a range")], &Request::default())
             .expect("a sweep");
     let mut table = SweepTable::new(&plan, Vec::new()).expect("room");
-    sweep(&plan, 1, &mut |point: &Point| Ok(table.write(point)?)).expect("all points");
+    sweep(&plan, 1, &mut |point: &SweepPoint| Ok(table.write(point)?)).expect("all points");
     let text = String::from_utf8(table.finish().expect("room")).expect("text");
     let rows: Vec<Vec<&str>> = text.lines().map(|row| row.split(',').collect()).collect();
     assert!(rows.len() == 3 && rows.iter().all(|row| row.len() == rows[0].len()), "{text}");
@@ -734,7 +733,7 @@ struct Fussy {
 }
 
 impl PointObserver for Fussy {
-    fn see(&mut self, _: &Point) -> std::io::Result<()> {
+    fn see(&mut self, _: &SweepPoint) -> std::io::Result<()> {
         self.seen += 1;
         if self.seen == 5 { Err(std::io::Error::other("enough")) } else { Ok(()) }
     }
@@ -772,7 +771,7 @@ fn one_flag_ends_all_sweeps_that_are_given_it() {
     let ended = || {
         let request = Request { every: Some(1e5), ..request("gauss8", 1e5) };
         let plan = prepared("free", &["bar1.phi=-3..3:1000"], &request).stopped_by(Arc::clone(&flag));
-        sweep(&plan, 2, &mut |_: &Point| Ok(()))
+        sweep(&plan, 2, &mut |_: &SweepPoint| Ok(()))
     };
     std::thread::scope(|scope| {
         let sweeps = [scope.spawn(ended), scope.spawn(ended)];
@@ -971,7 +970,7 @@ fn estimates_of_points_in_lanes_count_positions() {
         let vary = vec!["bars.b.mass=1..4:8".parse().expect("a range")];
         let plan = Sweep::new(&template, vary, &request).expect("a sweep").trusted(Level::Auto);
         let mut count = 0;
-        sweep(&plan, 1, &mut |point: &Point| {
+        sweep(&plan, 1, &mut |point: &SweepPoint| {
             let w = f64::sqrt(36.0 / point.values[0]);
             let (s, c) = (w * 20.0).sin_cos();
             let off = (point.phi[1] - c).abs().max((point.phi[2] - 3.0 / w * s).abs()) / 2.0;

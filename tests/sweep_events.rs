@@ -8,7 +8,7 @@ use crate::sweep_outputs::off;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::{Form, Mechanism, Time};
 use driftless::run::trust::Level;
-use driftless::run::{Outcome, Point, Request, Status, Sweep, simulate};
+use driftless::run::{Outcome, Request, Status, Sweep, SweepPoint, simulate};
 use driftless::scene::Template;
 use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
 use driftless::stepping::{Cause, Tolerance};
@@ -35,7 +35,7 @@ fn with(text: &str, parts: Value) -> Template {
 }
 
 /// The single run of a point, from which it differs by so much at most \[rad, rad/s over the fastest, m\].
-fn alone(template: &Template, plan: &Sweep, point: &Point, request: &Request) -> (Outcome, f64) {
+fn alone(template: &Template, plan: &Sweep, point: &SweepPoint, request: &Request) -> (Outcome, f64) {
     let alone = template.filled(plan.variables(), &point.values).expect("a scene");
     let outcome = simulate(&alone, request, &mut |_| Ok(())).expect("a run");
     let fastest = outcome.last.omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
@@ -46,7 +46,7 @@ fn alone(template: &Template, plan: &Sweep, point: &Point, request: &Request) ->
 }
 
 /// Points that run one by one have the bits and the steps of the single run.
-fn is_in_lanes(point: &Point, outcome: &Outcome) -> bool {
+fn is_in_lanes(point: &SweepPoint, outcome: &Outcome) -> bool {
     (&point.phi, &point.omega, point.steps)
         != (&outcome.last.phi, &outcome.last.omega, outcome.statistics.steps)
 }

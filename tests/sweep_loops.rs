@@ -3,7 +3,7 @@
 
 use crate::sweep::points;
 use driftless::run::trust::Level;
-use driftless::run::{Point, Request, Shard, Status, Sweep, Vary, simulate};
+use driftless::run::{Request, Shard, Status, Sweep, SweepPoint, Vary, simulate};
 use driftless::scene::Template;
 use driftless::stepping::taylor::batch::Batch;
 
@@ -90,7 +90,7 @@ fn points_of_loops_agree_with_single_runs() {
 }
 
 /// The points of a sweep, which are the same alone, with others beside, in another order, in parts and on threads.
-pub fn same_whoever_is_beside(template: &Template, vary: &str, request: &Request) -> Vec<Point> {
+pub fn same_whoever_is_beside(template: &Template, vary: &str, request: &Request) -> Vec<SweepPoint> {
     let plan = planned(template, &[vary], request);
     let whole = points(&plan, 1);
     assert!(whole.iter().all(|point| point.status == Status::Done), "{vary}");

@@ -3,7 +3,7 @@
 
 use crate::sweep::points;
 use crate::sweep_loops::{by_taylor, shipped};
-use driftless::run::{Outcome, Point, Request, Status, Sweep, simulate};
+use driftless::run::{Outcome, Request, Status, Sweep, SweepPoint, simulate};
 use driftless::scene::{Output, Template};
 use driftless::stepping::taylor::batch::Batch;
 use std::f64::consts::PI;
@@ -21,7 +21,7 @@ fn planned(template: &Template, vary: &[&str], request: &Request) -> Sweep {
 }
 
 /// How far the outputs of a point are from those of a single run, over their largest magnitudes.
-pub fn off(point: &Point, outcome: &Outcome) -> f64 {
+pub fn off(point: &SweepPoint, outcome: &Outcome) -> f64 {
     assert_eq!(point.extremes.len(), outcome.extremes.len());
     point.extremes.iter().zip(&outcome.extremes).fold(0.0, |most: f64, (found, alone)| {
         let size = alone.min[0].abs().max(alone.max[0].abs()).max(1e-4);
@@ -31,7 +31,7 @@ pub fn off(point: &Point, outcome: &Outcome) -> f64 {
 }
 
 /// The points of a sweep, none of them a single run, and how far they are from these at most.
-fn against_single_runs(template: &Template, vary: &[&str], request: &Request) -> (Vec<Point>, f64) {
+fn against_single_runs(template: &Template, vary: &[&str], request: &Request) -> (Vec<SweepPoint>, f64) {
     let plan = planned(template, vary, request);
     let (found, mut most) = (points(&plan, 1), 0.0);
     for point in &found {

@@ -3,18 +3,18 @@
 
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::Level;
-use driftless::run::{Point, Request, Status, Sweep, simulate, sweep};
+use driftless::run::{Request, Status, Sweep, SweepPoint, simulate, sweep};
 use driftless::scene::Template;
 use driftless::stepping::taylor::batch::Batch;
 use std::f64::consts::PI;
 
-fn points(template: &Template, vary: &[&str], request: &Request, trust: Level) -> Vec<Point> {
+fn points(template: &Template, vary: &[&str], request: &Request, trust: Level) -> Vec<SweepPoint> {
     let mechanism = Mechanism::new(&template.scene().expect("a scene")).expect("a mechanism");
     assert!(!mechanism.contacts.is_empty() && Batch::takes_alike(&mechanism));
     let vary = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
     let plan = Sweep::new(template, vary, request).expect("a sweep").trusted(trust);
     let mut points = Vec::new();
-    sweep(&plan, 1, &mut |point: &Point| {
+    sweep(&plan, 1, &mut |point: &SweepPoint| {
         points.push(point.clone());
         Ok(())
     })

@@ -5,7 +5,7 @@ use crate::common;
 
 use common::{ONE_TURN, compile, shipped};
 use driftless::arithmetic::{Complex, DoubleDouble};
-use driftless::dynamics::constraint::Posture;
+use driftless::dynamics::constraint::ConstraintArguments;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::Kernel as Energies;
 use driftless::dynamics::multiplier::Multiplier;
@@ -13,7 +13,7 @@ use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
 use driftless::scene::{Bar, Hinge, Place, Scene, Sine, Spring, Start};
 use driftless::stabilization::Projected;
-use driftless::stepping::taylor::Kernel;
+use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
 use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::f64::consts::{FRAC_PI_2, PI};
@@ -72,14 +72,14 @@ fn double_double_agrees_with_itself_at_another_order() {
 }
 
 /// The method at a tolerance and order on one kind of code.
-pub fn on(kernel: Kernel, tolerance: f64, order: usize) -> Taylor<f64> {
+pub fn on(kernel: ExpansionKernel, tolerance: f64, order: usize) -> Taylor<f64> {
     let mut method = Taylor::with_order(tolerance, order);
     method.kernel = kernel;
     method
 }
 
 /// The method with its first orders in double-double.
-fn extended(kernel: Kernel, tolerance: f64) -> Taylor<f64> {
+fn extended(kernel: ExpansionKernel, tolerance: f64) -> Taylor<f64> {
     let mut method = on(kernel, tolerance, 24);
     method.extended = true;
     method
@@ -162,8 +162,8 @@ fn fast_kernels_agree_with_the_series_and_with_double_double() {
     for (name, scene) in fast_scenes() {
         let exact = end(&scene, Taylor::reference(), 2.0);
         for order in [16, 20, 24] {
-            let series = end(&scene, on(Kernel::Series, 1e-17, order), 2.0);
-            let fast = end(&scene, on(Kernel::Fastest, 1e-17, order), 2.0);
+            let series = end(&scene, on(ExpansionKernel::Series, 1e-17, order), 2.0);
+            let fast = end(&scene, on(ExpansionKernel::Fastest, 1e-17, order), 2.0);
             assert_ne!(series, fast, "{name}: the fast kernel was not entered");
             let (apart, error) = (distance(&series, &fast), distance(&exact, &fast));
             assert!(apart < 2e-13 && error < 1e-13, "{name}, order {order}: {apart:e}, {error:e}");
@@ -175,7 +175,8 @@ fn fast_kernels_agree_with_the_series_and_with_double_double() {
 fn the_error_falls_with_the_tolerance() {
     for (name, scene) in fast_scenes() {
         let exact = end(&scene, Taylor::reference(), 3.0);
-        let error = |tolerance| distance(&exact, &end(&scene, on(Kernel::Fastest, tolerance, 20), 3.0));
+        let error =
+            |tolerance| distance(&exact, &end(&scene, on(ExpansionKernel::Fastest, tolerance, 20), 3.0));
         let errors = [error(1e-6), error(1e-9), error(1e-12)];
         assert!(
             errors[0] > 1e-9 && errors[0] < 1e-3 && errors[1] < 1e-5 && errors[2] < 1e-9,
@@ -189,8 +190,8 @@ fn portable_lanes_and_hardware_have_the_same_bits() {
     for (name, scene) in fast_scenes() {
         for order in [16, 20, 24] {
             let (fast, portable) = (
-                end(&scene, on(Kernel::Fastest, 1e-13, order), 2.0),
-                end(&scene, on(Kernel::Portable, 1e-13, order), 2.0),
+                end(&scene, on(ExpansionKernel::Fastest, 1e-13, order), 2.0),
+                end(&scene, on(ExpansionKernel::Portable, 1e-13, order), 2.0),
             );
             assert_eq!(fast, portable, "{name}, order {order}");
         }
@@ -211,7 +212,11 @@ fn a_motor_with_sines_has_the_same_bits_alone_and_in_lanes() {
             batch.integrate(&mut member, Time::from(20.0), &mut |_, _| Going::On);
             let mut motion = Motion::default();
             problem.read(&member[0].state, &mut motion);
-            assert_eq!(end(&scene, on(Kernel::Fastest, 1e-12, order), 20.0), motion, "{name}, order {order}");
+            assert_eq!(
+                end(&scene, on(ExpansionKernel::Fastest, 1e-12, order), 20.0),
+                motion,
+                "{name}, order {order}"
+            );
             count += 1;
         }
     }
@@ -222,11 +227,11 @@ fn a_motor_with_sines_has_the_same_bits_alone_and_in_lanes() {
 fn orders_in_double_double_leave_only_what_later_ones_round() {
     for (name, scene) in extended_scenes() {
         let exact = end(&scene, Taylor::reference(), 2.0);
-        let plain = distance(&exact, &end(&scene, on(Kernel::Fastest, 1e-22, 24), 2.0));
-        let found = end(&scene, extended(Kernel::Fastest, 1e-22), 2.0);
+        let plain = distance(&exact, &end(&scene, on(ExpansionKernel::Fastest, 1e-22, 24), 2.0));
+        let found = end(&scene, extended(ExpansionKernel::Fastest, 1e-22), 2.0);
         let error = distance(&exact, &found);
         assert!(error < 1e-17 && error < plain / 30.0, "{name}: {error:e}, plain {plain:e}");
-        assert_eq!(found, end(&scene, extended(Kernel::Portable, 1e-22), 2.0), "{name}: lanes");
+        assert_eq!(found, end(&scene, extended(ExpansionKernel::Portable, 1e-22), 2.0), "{name}: lanes");
     }
 }
 
@@ -237,7 +242,7 @@ fn orders_in_double_double_keep_energy_a_thousand_times_closer() {
     let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);
     let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
     let before = energy(&mechanism.start(&scene));
-    let after = energy(&end(&scene, extended(Kernel::Fastest, 1e-20), 1000.0));
+    let after = energy(&end(&scene, extended(ExpansionKernel::Fastest, 1e-20), 1000.0));
     let drift = (after - before).hi.abs() / mechanism.energy_scale;
     assert!(drift < 1e-17, "{drift:e}");
 }
@@ -248,7 +253,7 @@ fn a_symmetric_release_takes_no_step_too_long() {
     // accuracy.
     let scene = shipped("free", &[]);
     let mechanism = compile(&scene);
-    for kernel in [Kernel::Fastest, Kernel::Series] {
+    for kernel in [ExpansionKernel::Fastest, ExpansionKernel::Series] {
         for order in [16, 20, 24] {
             let mut problem = Elimination::<0>::new(mechanism.clone());
             let mut state = problem.state(&mechanism.start(&scene));
@@ -276,7 +281,7 @@ fn hanging_at_rest_stays_to_the_last_bit() {
     let scene = shipped("hanging", &[]);
     let scene = Scene { springs: vec![], ..scene };
     let start = compile(&scene).start(&scene);
-    let last = end(&scene, on(Kernel::Fastest, 1e-12, 20), 1e6);
+    let last = end(&scene, on(ExpansionKernel::Fastest, 1e-12, 20), 1e6);
     assert_eq!((last.phi, last.omega), (start.phi, start.omega));
 }
 
@@ -293,7 +298,7 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
                     })
                     .expect("an end");
             };
-        let mut method = on(Kernel::Fastest, 1e-15, 20);
+        let mut method = on(ExpansionKernel::Fastest, 1e-15, 20);
         let mut whole = problem.state(&mechanism.start(&scene));
         integrate(&mut problem, &mut whole, &mut method, 3.0);
         let mut stored = whole.clone();
@@ -301,7 +306,7 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
         integrate(
             &mut Elimination::<0>::new(mechanism.clone()),
             &mut stored,
-            &mut on(Kernel::Fastest, 1e-15, 20),
+            &mut on(ExpansionKernel::Fastest, 1e-15, 20),
             7.0,
         );
         assert_eq!(whole, stored, "{name}");
@@ -318,7 +323,7 @@ fn energy_stays_at_rounding_for_a_thousand_seconds() {
             (mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total() - motion.work).hi
         };
         let before = balance(&mechanism.start(&scene));
-        let after = balance(&end(&scene, on(Kernel::Fastest, 1e-19, 24), 1000.0));
+        let after = balance(&end(&scene, on(ExpansionKernel::Fastest, 1e-19, 24), 1000.0));
         let drift = (after - before).abs() / mechanism.energy_scale;
         assert!(drift < 5e-14, "{name}: {drift:e}");
     }
@@ -330,7 +335,7 @@ fn numbers_out_of_range_are_a_typed_stop() {
     let mechanism = compile(&scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(&scene));
-    let stop = on(Kernel::Fastest, 1e-12, 20).advance(
+    let stop = on(ExpansionKernel::Fastest, 1e-12, 20).advance(
         &mut problem,
         &mut state,
         Time::from(1.0),
@@ -528,7 +533,7 @@ fn opening(mechanism: &Mechanism, motion: &Motion) -> [f64; 2] {
         let mut jacobian = vec![DoubleDouble::default(); z.len()];
         let here = row.linearise(
             motion.time,
-            Posture { phi: &motion.phi, z: &z, omega: &motion.omega },
+            ConstraintArguments { phi: &motion.phi, z: &z, omega: &motion.omega },
             &mut jacobian,
         );
         let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
@@ -594,9 +599,10 @@ fn motors_by_multipliers_move_as_eliminated_ones() {
     {
         let mechanism = compile(&scene);
         let start = mechanism.start(&scene);
-        let eliminated = end(&scene, on(Kernel::Series, 1e-17, 24), 1.0);
-        let held = bordered(&mechanism, &start, on(Kernel::Fastest, 1e-17, 24), 1.0);
-        let projected = bordered(&mechanism, &start, Projected::new(on(Kernel::Fastest, 1e-17, 24)), 1.0);
+        let eliminated = end(&scene, on(ExpansionKernel::Series, 1e-17, 24), 1.0);
+        let held = bordered(&mechanism, &start, on(ExpansionKernel::Fastest, 1e-17, 24), 1.0);
+        let projected =
+            bordered(&mechanism, &start, Projected::new(on(ExpansionKernel::Fastest, 1e-17, 24)), 1.0);
         assert!(distance(&eliminated, &held) < 1e-12, "{name}: {:e}", distance(&eliminated, &held));
         assert!(distance(&eliminated, &projected) < 1e-12, "{name}: {:e}", distance(&eliminated, &projected));
         let exact = bordered(&mechanism, &start, Taylor::reference(), 1.0);
@@ -618,12 +624,13 @@ fn extended_orders_leave_less_than_a_plain_double() {
     for (name, overrides) in cases {
         let scene = shipped(name, overrides);
         let exact = end(&scene, Taylor::reference(), 1.0);
-        let error = distance(&exact, &end(&scene, extended(Kernel::Series, 1e-22), 1.0));
+        let error = distance(&exact, &end(&scene, extended(ExpansionKernel::Series, 1e-22), 1.0));
         assert!(error < 1e-17, "{name}: {error:e}");
     }
     let (mechanism, start) = FOUR_BAR.mechanism(0.4, 12.0);
     let exact = bordered(&mechanism, &start, Taylor::reference(), 0.5);
-    let error = distance(&exact, &bordered(&mechanism, &start, extended(Kernel::Series, 1e-22), 0.5));
+    let error =
+        distance(&exact, &bordered(&mechanism, &start, extended(ExpansionKernel::Series, 1e-22), 0.5));
     assert!(error < 1e-17, "{error:e}");
 }
 
@@ -634,7 +641,7 @@ fn extended_energy_stays_far_below_a_plain_run() {
     let mut kernel = Energies::<DoubleDouble>::without_rows(&mechanism);
     let mut energy = |motion: &Motion| mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total();
     let before = energy(&mechanism.start(&scene));
-    let after = energy(&end(&scene, extended(Kernel::Series, 1e-21), 100.0));
+    let after = energy(&end(&scene, extended(ExpansionKernel::Series, 1e-21), 100.0));
     let drift = (after - before).hi.abs() / mechanism.energy_scale;
     assert!(drift < 1e-17, "{drift:e}");
 }
@@ -662,7 +669,7 @@ fn symmetric_releases_and_equilibria_take_finite_steps() {
     for (name, scene) in cases {
         let mechanism = compile(&scene);
         let start = mechanism.start(&scene);
-        for kernel in [Kernel::Fastest, Kernel::Series] {
+        for kernel in [ExpansionKernel::Fastest, ExpansionKernel::Series] {
             for order in [16, 20, 24] {
                 let last = end(&scene, on(kernel, 1e-13, order), 3.0);
                 let exact = end(&scene, Taylor::<DoubleDouble>::with_order(1e-30, 30), 3.0);
@@ -711,13 +718,13 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
                 .expect("an end");
         };
         let mut form = Elimination::<0>::new(mechanism.clone());
-        let mut method = on(Kernel::Fastest, 1e-15, 20);
+        let mut method = on(ExpansionKernel::Fastest, 1e-15, 20);
         let mut whole = form.state(&mechanism.start(&scene));
         let (from, inside) = pass(&mut form, &mut method, &mut whole);
         assert!(from.time < row && inside.time == row && whole.time > row);
         finish(&mut form, &mut method, &mut whole);
         let (mut form, mut method, mut again) =
-            (Elimination::<0>::new(mechanism.clone()), on(Kernel::Fastest, 1e-15, 20), from);
+            (Elimination::<0>::new(mechanism.clone()), on(ExpansionKernel::Fastest, 1e-15, 20), from);
         assert_eq!(pass(&mut form, &mut method, &mut again).1, inside, "{name}");
         finish(&mut form, &mut method, &mut again);
         assert_eq!(again, whole, "{name}");

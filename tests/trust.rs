@@ -5,7 +5,7 @@ use crate::common;
 use common::{compile, run, shipped};
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::{Form, Motion, Time};
-use driftless::run::trust::{DistanceMetric, How, Level, Tangent};
+use driftless::run::trust::{DistanceMetric, How, Level, TangentFlow};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running, integrate, reference};
 use driftless::scene::Scene;
 use std::f64::consts::{PI, TAU};
@@ -465,7 +465,7 @@ fn the_tangent_flow_is_symplectic_in_momenta() {
                 .map(|(a, b)| product(&differences[a], &differences[b]))
                 .collect()
         };
-        let mut tangent = Tangent::whole(&mechanism, &start, 2.0).expect("a flow");
+        let mut tangent = TangentFlow::whole(&mechanism, &start, 2.0).expect("a flow");
         let before = products(&start, &tangent.columns());
         let mut motion = start.clone();
         // The flow is known at the ends of its steps, every second time it asks.

@@ -1,7 +1,7 @@
 //! Exceptions: what the crate refuses, with the place and a hint; and interruption.
 
 use driftless::dynamics::CompileError;
-use driftless::run::{Refusal, RunError, SweepError};
+use driftless::run::{RequestRefusal, RunError, SweepError};
 use driftless::scene::SceneError;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
@@ -71,7 +71,7 @@ pub fn of_equations(py: Python<'_>, error: &CompileError) -> PyErr {
     place.map_or_else(|error| error, |()| told)
 }
 
-pub fn of_plan(py: Python<'_>, error: &Refusal) -> PyErr {
+pub fn of_plan(py: Python<'_>, error: &RequestRefusal) -> PyErr {
     refused(py, &error.to_string())
 }
 

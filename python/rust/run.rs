@@ -7,8 +7,8 @@ use crate::scene::Scene;
 use driftless::report::charts::{Chart, draw, motion};
 use driftless::report::result::record;
 use driftless::run::checkpoint::{opened, sealed};
-use driftless::run::table::Shown;
 use driftless::run::methods::MethodId;
+use driftless::run::table::Shown;
 use driftless::run::{Event, Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock};
 use driftless::stepping::interruption;
 use driftless::{Level, Outcome, Trajectory, chart};
@@ -127,7 +127,7 @@ pub fn begun(
 }
 
 enum Refused {
-    Plan(driftless::run::Refusal),
+    Plan(driftless::run::RequestRefusal),
     Run(driftless::run::RunError),
 }
 
@@ -225,8 +225,7 @@ fn go_beside(py: Python<'_>, running: &mut Running, watch: &mut Watch, failed: &
     let (waiting, is_done) = (std::thread::current(), AtomicBool::new(false));
     std::thread::scope(|scope| {
         let worker = scope.spawn(|| {
-            let is_over = running
-                .go_observed(watch, &mut || interruption::is_asked() || has_failed(failed));
+            let is_over = running.go_observed(watch, &mut || interruption::is_asked() || has_failed(failed));
             is_done.store(true, Ordering::Release);
             waiting.unpark();
             is_over

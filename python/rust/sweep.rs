@@ -4,8 +4,8 @@ use crate::errors::{of_sweep, refused};
 use crate::request::asked;
 use crate::scene::Scene;
 use driftless::Level;
-use driftless::run::sweep::table::{Layout, columns, numbers};
-use driftless::run::{Point, PointObserver, Shard, Status, Sweep, Totals, Vary, sweep_on};
+use driftless::run::sweep::table::{SweepLayout, columns, numbers};
+use driftless::run::{PointObserver, Shard, Status, Sweep, SweepPoint, Totals, Vary, sweep_on};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -24,7 +24,7 @@ type Swept<'py> = (
 
 /// Gathers points, tells how far it is, and looks for Ctrl-C.
 struct Gather {
-    layout: Layout,
+    layout: SweepLayout,
     numbers: Vec<f64>,
     flips: Vec<i32>,
     status: Vec<u8>,
@@ -34,7 +34,7 @@ struct Gather {
 }
 
 impl PointObserver for Gather {
-    fn see(&mut self, point: &Point) -> io::Result<()> {
+    fn see(&mut self, point: &SweepPoint) -> io::Result<()> {
         self.numbers.extend(numbers(point, self.layout));
         self.flips.push(point.flip.map_or(-1, |flip| flip.bar as i32));
         let (status, cause) = match &point.status {
@@ -102,7 +102,7 @@ pub fn sweep<'py>(
         .sharded(shard);
     let plan = if to_flip { plan.ending_at_flips() } else { plan };
     let mut gather = Gather {
-        layout: Layout::of(&plan),
+        layout: SweepLayout::of(&plan),
         numbers: Vec::new(),
         flips: Vec::new(),
         status: Vec::new(),

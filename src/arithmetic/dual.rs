@@ -18,7 +18,7 @@ use std::marker::PhantomData;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// What the constants beside a dual number are.
-pub trait Kind: Clone + Copy + Debug + 'static {
+pub trait ConstantKind: Clone + Copy + Debug + 'static {
     /// True where they have derivatives as well.
     const IS_VARIED: bool;
 }
@@ -31,11 +31,11 @@ pub struct Fixed;
 #[derive(Clone, Copy, Debug)]
 pub struct Own;
 
-impl Kind for Fixed {
+impl ConstantKind for Fixed {
     const IS_VARIED: bool = false;
 }
 
-impl Kind for Own {
+impl ConstantKind for Own {
     const IS_VARIED: bool = true;
 }
 
@@ -55,7 +55,7 @@ pub type Dual<const D: usize> = DualNumber<D, Fixed>;
 /// A dual number beside constants that are such numbers too.
 pub type Varied<const D: usize> = DualNumber<D, Own>;
 
-impl<const D: usize, K: Kind> DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> DualNumber<D, K> {
     /// From its value and its derivatives.
     #[inline(always)]
     pub fn new(value: f64, slope: [f64; D]) -> Self {
@@ -106,13 +106,13 @@ impl<const D: usize, K: Kind> DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> Default for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Default for DualNumber<D, K> {
     fn default() -> Self {
         Self::ZERO
     }
 }
 
-impl<const D: usize, K: Kind> Scalar for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Scalar for DualNumber<D, K> {
     const ZERO: Self = Self { value: 0.0, slope: [0.0; D], kind: PhantomData };
     const ONE: Self = Self { value: 1.0, slope: [0.0; D], kind: PhantomData };
 
@@ -160,7 +160,7 @@ impl<const D: usize, K: Kind> Scalar for DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> Real for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Real for DualNumber<D, K> {
     const IS_PLAIN: bool = false;
     const HAS_CONSTANTS: bool = K::IS_VARIED;
 
@@ -198,20 +198,20 @@ impl<const D: usize> Over<Varied<D>> for Varied<D> {
 }
 
 /// Numbers are compared by their values; of those that are constants too, zero is what stays zero.
-impl<const D: usize, K: Kind> PartialEq for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> PartialEq for DualNumber<D, K> {
     fn eq(&self, other: &Self) -> bool {
         self.value == other.value && (!K::IS_VARIED || self.slope == other.slope)
     }
 }
 
-impl<const D: usize, K: Kind> PartialOrd for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> PartialOrd for DualNumber<D, K> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let order = self.value.partial_cmp(&other.value);
         order.filter(|order| order.is_ne() || self == other)
     }
 }
 
-impl<const D: usize, K: Kind> Add for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Add for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -219,7 +219,7 @@ impl<const D: usize, K: Kind> Add for DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> Sub for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Sub for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -227,7 +227,7 @@ impl<const D: usize, K: Kind> Sub for DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> Mul for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Mul for DualNumber<D, K> {
     type Output = Self;
     // The product rule is a sum.
     #[allow(clippy::suspicious_arithmetic_impl)]
@@ -237,7 +237,7 @@ impl<const D: usize, K: Kind> Mul for DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> Div for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Div for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -246,7 +246,7 @@ impl<const D: usize, K: Kind> Div for DualNumber<D, K> {
     }
 }
 
-impl<const D: usize, K: Kind> Neg for DualNumber<D, K> {
+impl<const D: usize, K: ConstantKind> Neg for DualNumber<D, K> {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -254,7 +254,7 @@ impl<const D: usize, K: Kind> Neg for DualNumber<D, K> {
     }
 }
 
-crate::arithmetic::assign_by_operators!([const D: usize, K: Kind] DualNumber<D, K>);
+crate::arithmetic::assign_by_operators!([const D: usize, K: ConstantKind] DualNumber<D, K>);
 
 #[cfg(test)]
 mod tests {

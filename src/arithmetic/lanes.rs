@@ -87,7 +87,7 @@ pub trait Lanes: Signed + Send {
     fn apart<C: Code>(code: C) -> C::Output;
 
     /// Performs a task, compiled for these lanes.
-    fn perform<T: wide::Task>(task: T) -> T::Output;
+    fn perform<T: wide::SlotTask>(task: T) -> T::Output;
 }
 
 /// Plain code, with a software fused multiply-add where the processor lacks one.
@@ -226,7 +226,7 @@ impl Lanes for Portable {
     }
 
     #[inline(never)]
-    fn perform<T: wide::Task>(task: T) -> T::Output {
+    fn perform<T: wide::SlotTask>(task: T) -> T::Output {
         task.perform()
     }
 }

@@ -56,7 +56,7 @@ const fn factors(first: usize) -> [f64; 10] {
 }
 
 /// An angle as quarter turns and the rest.
-struct Reduced<L> {
+struct QuarterTurns<L> {
     /// r and what it leaves out.
     r: L,
     low: L,
@@ -66,7 +66,7 @@ struct Reduced<L> {
 }
 
 #[inline(always)]
-fn reduce<L: Signed>(angle: L, rest: L) -> Reduced<L> {
+fn reduce<L: Signed>(angle: L, rest: L) -> QuarterTurns<L> {
     let shift = L::splat(WHOLE);
     let q = angle.mul_add(L::splat(FRAC_2_PI), shift).sub(shift);
     let long = q.neg_mul_add(L::splat(FRAC_PI_2), angle);
@@ -81,10 +81,10 @@ fn reduce<L: Signed>(angle: L, rest: L) -> Reduced<L> {
     let low = near.sub(r).add(small);
     let m = L::splat(4.0).neg_mul_add(q.mul_add(L::splat(0.25), shift).sub(shift), q);
     let size = m.abs();
-    Reduced { r, low, along: L::ONE.sub(size), across: m.mul(L::splat(2.0).sub(size)) }
+    QuarterTurns { r, low, along: L::ONE.sub(size), across: m.mul(L::splat(2.0).sub(size)) }
 }
 
-impl<L: Signed> Reduced<L> {
+impl<L: Signed> QuarterTurns<L> {
     /// Back to the quadrant: sums of one number and a zero.
     #[inline(always)]
     fn turn(&self, sin: L, cos: L) -> (L, L) {
@@ -134,15 +134,15 @@ pub fn sin_cos<L: Signed>(angle: L, rest: L) -> (L, L) {
 
 /// Writes the unit vectors at these angles \[rad\], four at a time.
 pub fn units(angles: &[f64], units: &mut [Complex<f64>]) {
-    lanes::run(Units { angles, units }, false);
+    lanes::run(UnitVectors { angles, units }, false);
 }
 
-struct Units<'a> {
+struct UnitVectors<'a> {
     angles: &'a [f64],
     units: &'a mut [Complex<f64>],
 }
 
-impl Code for Units<'_> {
+impl Code for UnitVectors<'_> {
     type Output = ();
 
     #[inline(always)]

@@ -6,7 +6,7 @@ use super::lines::Point;
 use super::palette::{Colour, GREY, INK};
 use super::sheet::{CAPTION, NAME, NOTE, Pen, Sheet, note};
 use super::sketch::{NAMES, Pencil, Pose, Sketch, around, finite, trail_colour};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::ticks::nice_step;
 
 /// Share of the panel that a scale bar takes about.
@@ -53,7 +53,7 @@ impl Pencil<'_> {
             }
             occupied.block(bounds);
             let lettering =
-                Lettering { halo: true, ..Lettering::new(NAME, INK).at(Align::Left, Level::Middle) };
+                Lettering { halo: true, ..Lettering::new(NAME, INK).at(Align::Left, TextLevel::Middle) };
             self.sheet.words(name, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])?;
         }
         Ok(())
@@ -79,7 +79,7 @@ impl Pencil<'_> {
             let [x, y] = corner(occupied, 16.0);
             occupied.block(around([x, y], 16.0));
             self.arrow([x + 6.0, y - 13.0], [x + 6.0, y + 14.0], GREY)?;
-            let lettering = Lettering::new(NAME + 1.0, GREY).at(Align::Centre, Level::Middle);
+            let lettering = Lettering::new(NAME + 1.0, GREY).at(Align::Centre, TextLevel::Middle);
             self.sheet.words("*g*", lettering, [x - 5.0, y - 2.0])?;
         }
         if self.view.oblique() {
@@ -88,7 +88,7 @@ impl Pencil<'_> {
             for (axis, name) in [([1.0, 0.0], "*x*"), ([0.0, 1.0], "*y*")] {
                 let d = self.view.direction(axis);
                 self.arrow(centre, [centre[0] + 15.0 * d[0], centre[1] + 15.0 * d[1]], GREY)?;
-                let lettering = Lettering::new(NAME - 1.0, GREY).at(Align::Centre, Level::Middle);
+                let lettering = Lettering::new(NAME - 1.0, GREY).at(Align::Centre, TextLevel::Middle);
                 self.sheet.words(name, lettering, [centre[0] + 21.0 * d[0], centre[1] + 21.0 * d[1]])?;
             }
         }
@@ -129,7 +129,7 @@ impl Pencil<'_> {
             self.sheet.line(&[[end, y - 3.0], [end, y + 0.6]], &pen)?;
         }
         let lettering =
-            Lettering { halo: true, ..Lettering::new(CAPTION, GREY).at(Align::Centre, Level::Baseline) };
+            Lettering { halo: true, ..Lettering::new(CAPTION, GREY).at(Align::Centre, TextLevel::Baseline) };
         self.sheet.words(&words, lettering, [middle, y - 5.5])
     }
 }
@@ -143,7 +143,7 @@ pub(crate) fn legend(sheet: &Sheet, names: &[String], at: Point) -> Result<(), C
             break;
         }
         sheet.line(&[[x, at[1]], [x + SAMPLE, at[1]]], &Pen::new(trail_colour(k), 2.2))?;
-        sheet.words(name, note(GREY, Align::Left, Level::Middle), [x + SAMPLE + 4.0, at[1]])?;
+        sheet.words(name, note(GREY, Align::Left, TextLevel::Middle), [x + SAMPLE + 4.0, at[1]])?;
         x += SAMPLE + 4.0 + width + 14.0;
     }
     Ok(())

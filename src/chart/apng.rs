@@ -4,13 +4,13 @@ use super::ChartError;
 use png::{BlendOp, DisposeOp};
 
 /// Writes frame after frame.
-pub(crate) struct Encoder<'a> {
+pub(crate) struct ApngEncoder<'a> {
     writer: png::Writer<&'a mut Vec<u8>>,
     width: usize,
     shown: Vec<u8>,
 }
 
-impl<'a> Encoder<'a> {
+impl<'a> ApngEncoder<'a> {
     /// An endless animation of so many frames, into `bytes`; `delay` in 1/100 s.
     pub(crate) fn new(
         bytes: &'a mut Vec<u8>,

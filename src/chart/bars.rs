@@ -4,7 +4,7 @@ use super::file::Picture;
 use super::grid::{AIR, shortened};
 use super::palette::{BLUE, GREY, GUIDE, INK, VERMILLION};
 use super::sheet::{Pen, Sheet, note};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::ticks::figure;
 use super::{ChartError, PAGE};
 
@@ -56,7 +56,7 @@ pub fn bars(chart: &Bars, px_per_pt: f64) -> Result<Picture, ChartError> {
         let name = format!("{}{unit}", group.name);
         sheet.words(
             &name,
-            Lettering::new(super::sheet::NAME, INK).at(Align::Left, Level::Middle),
+            Lettering::new(super::sheet::NAME, INK).at(Align::Left, TextLevel::Middle),
             [16.0, top + 6.0],
         )?;
         let values = || group.bars.iter().map(|(_, value)| *value).filter(|value| value.is_finite());
@@ -68,16 +68,20 @@ pub fn bars(chart: &Bars, px_per_pt: f64) -> Result<Picture, ChartError> {
         sheet.line(&[[at(0.0), top + HEAD - 3.0], [at(0.0), bottom]], &Pen::new(GUIDE, 0.8))?;
         for (k, (name, value)) in group.bars.iter().enumerate() {
             let middle = top + HEAD + PITCH * (k as f64 + 0.4);
-            sheet.words(&shortened(&sheet, name), note(INK, Align::Right, Level::Middle), [left, middle])?;
+            sheet.words(
+                &shortened(&sheet, name),
+                note(INK, Align::Right, TextLevel::Middle),
+                [left, middle],
+            )?;
             if !value.is_finite() {
-                sheet.words("none", note(GREY, Align::Left, Level::Middle), [at(0.0) + 5.0, middle])?;
+                sheet.words("none", note(GREY, Align::Left, TextLevel::Middle), [at(0.0) + 5.0, middle])?;
                 continue;
             }
             let (end, colour) = (at(*value), if *value < 0.0 { VERMILLION } else { BLUE });
             let (low, high) = (middle - 4.2, middle + 4.2);
             sheet.polygon(&[[at(0.0), low], [end, low], [end, high], [at(0.0), high]], colour)?;
             let (align, x) = if *value < 0.0 { (Align::Right, end - 5.0) } else { (Align::Left, end + 5.0) };
-            sheet.words(&figure(*value), note(GREY, align, Level::Middle), [x, middle])?;
+            sheet.words(&figure(*value), note(GREY, align, TextLevel::Middle), [x, middle])?;
         }
         top += height(group);
     }

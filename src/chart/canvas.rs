@@ -10,7 +10,7 @@ mod backend;
 use super::ChartError;
 use super::mark::{Drawing, Mark, scaled};
 use super::palette::{Colour, WHITE};
-use super::text::{Align, CAP_HEIGHT, Fonts, Lettering, Level, TextBox, unmarked};
+use super::text::{Align, CAP_HEIGHT, Fonts, Lettering, TextBox, TextLevel, unmarked};
 use plotters_backend::{BackendColor, BackendCoord};
 use tiny_skia::{
     Color, FillRule, LineCap, LineJoin, Paint, Path, PathBuilder, Pixmap, Rect, Stroke, Transform,
@@ -119,9 +119,9 @@ impl Canvas {
         };
         let cap = CAP_HEIGHT * style.size;
         let down = match style.level {
-            Level::Baseline => 0.0,
-            Level::Middle => 0.5 * cap,
-            Level::Top => cap,
+            TextLevel::Baseline => 0.0,
+            TextLevel::Middle => 0.5 * cap,
+            TextLevel::Top => cap,
         };
         let (sin, cos) = (-style.angle).sin_cos();
         let turn = |x: f64, y: f64| [at[0] + cos * x - sin * y, at[1] + sin * x + cos * y];

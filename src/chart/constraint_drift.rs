@@ -9,7 +9,7 @@ use super::lines::{Point, running_maximum};
 use super::palette::{GREY, WHITE, marks, mix};
 use super::panel::Panel;
 use super::sheet::{NOTE, Sheet, note};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::{ChartError, PAGE};
 
 /// One level of the constraints, with its unit.
@@ -121,7 +121,11 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
         }
     }
     if panels.is_empty() {
-        sheet.words("no data", note(GREY, Align::Centre, Level::Middle), [0.5 * PAGE[0], 0.5 * PAGE[1]])?;
+        sheet.words(
+            "no data",
+            note(GREY, Align::Centre, TextLevel::Middle),
+            [0.5 * PAGE[0], 0.5 * PAGE[1]],
+        )?;
     }
     Ok(sheet.picture(&chart.title, &caption))
 }
@@ -145,6 +149,6 @@ fn zeros(sheet: &Sheet, panel: &Panel, data: &ResidualPanel, lines: &[Vec<Point>
     } else {
         "markers: exactly 0"
     };
-    let lettering = Lettering { halo: true, ..note(GREY, Align::Right, Level::Baseline) };
+    let lettering = Lettering { halo: true, ..note(GREY, Align::Right, TextLevel::Baseline) };
     sheet.words(words, lettering, [right - 3.0, bottom - 6.0])
 }

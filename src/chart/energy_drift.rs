@@ -9,10 +9,10 @@ use super::file::Picture;
 use super::grid::{label_room, shortened, stacked};
 use super::labels::Occupied;
 use super::lines::{Point, clip, running_maximum};
-use super::palette::{GREY, GUIDE, Mark, marks, readable};
+use super::palette::{GREY, GUIDE, MarkStyle, marks, readable};
 use super::panel::{Panel, TURNS};
 use super::sheet::{NOTE, Pen, Sheet, note};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::{ChartError, PAGE};
 
 /// Errors of one run.
@@ -123,7 +123,7 @@ pub(crate) fn draw(
     sheet: &Sheet,
     panel: &Panel,
     line: &[Point],
-    mark: &Mark,
+    mark: &MarkStyle,
 ) -> Result<Option<f64>, ChartError> {
     let Some(last) = line.last() else { return Ok(None) };
     let infinite = last[1].is_infinite();
@@ -196,7 +196,7 @@ fn rounding_unit(sheet: &Sheet, panel: &Panel, occupied: &mut Occupied) -> Resul
     occupied.block(best);
     sheet.words(
         words,
-        Lettering { halo: true, ..note(GREY, Align::Left, Level::Baseline) },
+        Lettering { halo: true, ..note(GREY, Align::Left, TextLevel::Baseline) },
         [best[0], best[3]],
     )
 }
@@ -257,6 +257,6 @@ fn guide(
     occupied.line(&piece);
     let reach = [0.5 * width + 2.0, 0.5 * width * angle.sin() + 5.0];
     occupied.block([centre[0] - reach[0], centre[1] - reach[1], centre[0] + reach[0], centre[1] + reach[1]]);
-    let lettering = Lettering { angle, halo: true, ..note(readable(GREY), Align::Centre, Level::Middle) };
+    let lettering = Lettering { angle, halo: true, ..note(readable(GREY), Align::Centre, TextLevel::Middle) };
     sheet.words(words, lettering, centre)
 }

@@ -13,7 +13,7 @@ const APART: i32 = 22;
 const TRANSPARENT: u8 = COLOURS as u8;
 
 /// Writes frame after frame.
-pub(crate) struct Encoder {
+pub(crate) struct GifEncoder {
     gif: gif::Encoder<Vec<u8>>,
     width: usize,
     delay: u16,
@@ -47,7 +47,7 @@ fn palette(samples: &[Vec<u8>]) -> Vec<[u8; 3]> {
     chosen
 }
 
-impl Encoder {
+impl GifEncoder {
     /// An endless animation; `delay` in 1/100 s; colours are chosen from `samples`.
     pub(crate) fn new(width: u32, height: u32, delay: u16, samples: &[Vec<u8>]) -> Result<Self, ChartError> {
         let palette = palette(samples);
@@ -55,7 +55,14 @@ impl Encoder {
         table.resize(3 * (COLOURS + 1), 255);
         let mut gif = gif::Encoder::new(Vec::new(), width as u16, height as u16, &table)?;
         gif.set_repeat(Repeat::Infinite)?;
-        Ok(Encoder { gif, width: width as usize, delay, palette, nearest: HashMap::new(), shown: Vec::new() })
+        Ok(GifEncoder {
+            gif,
+            width: width as usize,
+            delay,
+            palette,
+            nearest: HashMap::new(),
+            shown: Vec::new(),
+        })
     }
 
     fn index(&mut self, colour: [u8; 3]) -> u8 {

@@ -2,7 +2,7 @@
 
 use super::ChartError;
 use super::axis::Axis;
-use super::panel::{LEADER, Panel, Written, left_room, right_room};
+use super::panel::{LEADER, Panel, WrittenParts, left_room, right_room};
 use super::sheet::{EDGE, NOTE, Sheet};
 
 /// Below the lowest panel: tick labels and the name of the axis \[pt\].
@@ -65,7 +65,7 @@ pub(crate) fn stacked<'a>(
         .collect();
     let y_name_at = panels.iter().map(Panel::name_place).fold(f64::INFINITY, f64::min);
     for (k, panel) in panels.iter().enumerate() {
-        panel.frame(Written { x: k + 1 == panels.len(), y_name_at })?;
+        panel.frame(WrittenParts { x: k + 1 == panels.len(), y_name_at })?;
     }
     Ok(panels)
 }
@@ -97,7 +97,7 @@ pub(crate) fn rows<'a>(
         for ((x, y), room) in row.into_iter().zip(&lefts) {
             left += room;
             let panel = Panel::new(sheet, [left, top, left + width.max(20.0), top + height], x, y);
-            panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
+            panel.frame(WrittenParts { x: true, y_name_at: panel.name_place() })?;
             left += width + between;
             panels.push(panel);
         }

@@ -6,9 +6,9 @@ use super::axis::{Axis, Scale};
 use super::file::Picture;
 use super::grid::AIR;
 use super::palette::{Colour, EXCLUDED, FAILED, GREY, INK, SPINE, WHITE, even};
-use super::panel::{Panel, Written, left_room, most_up};
+use super::panel::{Panel, WrittenParts, left_room, most_up};
 use super::sheet::{EDGE, NAME, NOTE, Pen, Sheet, TICK, note};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::ticks::Ticks;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -128,7 +128,7 @@ pub fn map(chart: &Map, px_per_pt: f64) -> Result<Picture, ChartError> {
         colours.of_cell(chart.cells.get(i * chart.y.count + j).copied().unwrap_or(Cell::Failed))
     };
     sheet.raster([left, top], pixels, cell)?;
-    panel.scales(Written { x: true, y_name_at: panel.name_place() })?;
+    panel.scales(WrittenParts { x: true, y_name_at: panel.name_place() })?;
     let mut at = left;
     for (colour, words) in legend {
         let top = top - AIR + 2.0 - SWATCH;
@@ -136,7 +136,7 @@ pub fn map(chart: &Map, px_per_pt: f64) -> Result<Picture, ChartError> {
         sheet.polygon(&square(at + 0.5, top + 0.5, SWATCH - 1.0), colour)?;
         sheet.words(
             &words,
-            note(GREY, Align::Left, Level::Middle),
+            note(GREY, Align::Left, TextLevel::Middle),
             [at + SWATCH + 4.0, top + 0.5 * SWATCH],
         )?;
         at += SWATCH + 4.0 + sheet.width(&words, NOTE, false) + 14.0;
@@ -315,12 +315,12 @@ fn bar(sheet: &Sheet, panel: &Panel, colours: &Colours, px_per_pt: f64) -> Resul
         sheet.line(&[[right, at], [right + 4.0, at]], &spine)?;
         sheet.words(
             &tick.label,
-            Lettering::new(TICK, INK).at(Align::Left, Level::Middle),
+            Lettering::new(TICK, INK).at(Align::Left, TextLevel::Middle),
             [right + GAP, at],
         )?;
     }
     let upright =
-        Lettering { angle: FRAC_PI_2, ..Lettering::new(NAME, INK).at(Align::Centre, Level::Middle) };
+        Lettering { angle: FRAC_PI_2, ..Lettering::new(NAME, INK).at(Align::Centre, TextLevel::Middle) };
     let at = right + colours.room(sheet, bottom - top) - 0.5 * NAME;
     sheet.words(&ticks.name(&colours.axis.name), upright, [at, 0.5 * (top + bottom)])
 }

@@ -5,7 +5,7 @@ use super::file::Picture;
 use super::grid::AIR;
 use super::palette::{Colour, EXCLUDED, FAILED, GREEN, GREY, GRID, INK, SPINE, VERMILLION, WHITE, mix};
 use super::sheet::{CAPTION, EDGE, NOTE, Pen, Sheet, note};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use std::f64::consts::FRAC_PI_2;
 
 /// Width and height of a cell, and the em of its word \[pt\].
@@ -18,7 +18,7 @@ const GAP: f64 = 5.0;
 
 /// What a cell shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Outcome {
+pub enum CellOutcome {
     /// Right.
     Right,
     /// Refused.
@@ -32,7 +32,7 @@ pub enum Outcome {
 
 /// A table of outcomes.
 #[derive(Clone, Debug, Default)]
-pub struct Matrix {
+pub struct OutcomeMatrix {
     /// Title, with markup.
     pub title: String,
     /// Parts of the caption, with markup.
@@ -42,10 +42,10 @@ pub struct Matrix {
     /// See `rows`.
     pub columns: Vec<String>,
     /// Row by row, the outcome and a short word.
-    pub cells: Vec<(Outcome, String)>,
+    pub cells: Vec<(CellOutcome, String)>,
 }
 
-impl Outcome {
+impl CellOutcome {
     const ALL: [Self; 4] = [Self::Right, Self::Refused, Self::Stopped, Self::Wrong];
 
     fn colour(self) -> Colour {
@@ -71,7 +71,7 @@ impl Outcome {
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
-pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
+pub fn matrix(chart: &OutcomeMatrix, px_per_pt: f64) -> Result<Picture, ChartError> {
     let trial = Sheet::new([CELL[0], CELL[1]], px_per_pt)?;
     let widest =
         |names: &[String]| names.iter().map(|name| trial.width(name, NOTE, false)).fold(0.0, f64::max);
@@ -90,24 +90,24 @@ pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
         sheet.polygon(&square([at + 0.5, under + AIR - 3.5], [SWATCH - 1.0; 2]), *colour)?;
         sheet.words(
             words,
-            note(GREY, Align::Left, Level::Middle),
+            note(GREY, Align::Left, TextLevel::Middle),
             [at + SWATCH + 4.0, under + AIR - 4.0 + 0.5 * SWATCH],
         )?;
         at += SWATCH + 18.0 + sheet.width(words, NOTE, false);
     }
     for (k, name) in chart.columns.iter().enumerate() {
-        let upright = Lettering { angle: FRAC_PI_2, ..note(INK, Align::Left, Level::Middle) };
+        let upright = Lettering { angle: FRAC_PI_2, ..note(INK, Align::Left, TextLevel::Middle) };
         sheet.words(name, upright, [left + (k as f64 + 0.5) * CELL[0], top - GAP])?;
     }
     for (i, name) in chart.rows.iter().enumerate() {
         let y = top + i as f64 * CELL[1];
-        sheet.words(name, note(INK, Align::Right, Level::Middle), [left - GAP, y + 0.5 * CELL[1]])?;
+        sheet.words(name, note(INK, Align::Right, TextLevel::Middle), [left - GAP, y + 0.5 * CELL[1]])?;
         for k in 0..chart.columns.len() {
             let Some((outcome, word)) = chart.cells.get(i * chart.columns.len() + k) else { continue };
             let x = left + k as f64 * CELL[0];
             sheet.polygon(&square([x, y], CELL), outcome.colour())?;
-            let ink = if *outcome == Outcome::Wrong { WHITE } else { INK };
-            let lettering = Lettering::new(WORD, ink).at(Align::Centre, Level::Middle);
+            let ink = if *outcome == CellOutcome::Wrong { WHITE } else { INK };
+            let lettering = Lettering::new(WORD, ink).at(Align::Centre, TextLevel::Middle);
             sheet.words(word, lettering, [x + 0.5 * CELL[0], y + 0.5 * CELL[1]])?;
         }
     }
@@ -127,9 +127,9 @@ pub fn matrix(chart: &Matrix, px_per_pt: f64) -> Result<Picture, ChartError> {
 }
 
 /// The outcomes, in colours and words: `423 right, with its error`.
-fn legend(chart: &Matrix) -> Vec<(Colour, String)> {
-    let count = |outcome: Outcome| chart.cells.iter().filter(|cell| cell.0 == outcome).count();
-    Outcome::ALL
+fn legend(chart: &OutcomeMatrix) -> Vec<(Colour, String)> {
+    let count = |outcome: CellOutcome| chart.cells.iter().filter(|cell| cell.0 == outcome).count();
+    CellOutcome::ALL
         .iter()
         .map(|&outcome| (outcome.colour(), format!("{} {}", count(outcome), outcome.word())))
         .collect()
@@ -146,15 +146,15 @@ mod tests {
     #[test]
     fn every_cell_and_every_name_is_there() {
         let cells = vec![
-            (Outcome::Right, "1e-9".into()),
-            (Outcome::Wrong, "2e-3".into()),
-            (Outcome::Stopped, String::new()),
+            (CellOutcome::Right, "1e-9".into()),
+            (CellOutcome::Wrong, "2e-3".into()),
+            (CellOutcome::Stopped, String::new()),
         ];
-        let chart = Matrix {
+        let chart = OutcomeMatrix {
             rows: vec!["spring".into()],
             columns: ["a", "b", "c"].map(Into::into).into(),
             cells,
-            ..Matrix::default()
+            ..OutcomeMatrix::default()
         };
         let picture = matrix(&chart, 2.0).expect("a picture");
         for words in ["spring", "a", "b", "c", "1e-9", "2e-3", "1 wrong", "0 refused"] {
@@ -168,8 +168,8 @@ mod tests {
             let parts = [(a.0, b.0), (a.1, b.1), (a.2, b.2)];
             parts.iter().map(|&(a, b)| (f64::from(a) - f64::from(b)).powi(2)).sum::<f64>().sqrt()
         };
-        for (k, a) in Outcome::ALL.iter().enumerate() {
-            for b in &Outcome::ALL[..k] {
+        for (k, a) in CellOutcome::ALL.iter().enumerate() {
+            for b in &CellOutcome::ALL[..k] {
                 // A palette of 16 colours takes together what is nearer than about 40.
                 assert!(apart(a.colour(), b.colour()) > 50.0, "{a:?} and {b:?}");
             }
@@ -178,6 +178,6 @@ mod tests {
 
     #[test]
     fn an_empty_table_is_a_picture() {
-        assert!(matrix(&Matrix::default(), 1.0).is_ok());
+        assert!(matrix(&OutcomeMatrix::default(), 1.0).is_ok());
     }
 }

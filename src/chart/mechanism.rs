@@ -4,7 +4,7 @@ use super::annotations::legend;
 use super::file::Picture;
 use super::grid::AIR;
 use super::labels::Occupied;
-use super::panel::{Panel, Written, left_room, pale};
+use super::panel::{Panel, WrittenParts, left_room, pale};
 use super::sheet::{EDGE, Sheet};
 use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
 use super::view::View;
@@ -66,7 +66,7 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
     let (x, y) = view.axes();
     let top = under + AIR;
     let panel = Panel::new(&sheet, [left, top, left + width, top + height], x, y).equal_steps();
-    panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
+    panel.frame(WrittenParts { x: true, y_name_at: panel.name_place() })?;
 
     let mut occupied = Occupied::default();
     let size = poses.last().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));

@@ -19,10 +19,10 @@
 //! | [`work_precision()`] | [`WorkPrecision`] | error against run time or evaluations |
 //! | [`map()`] | [`Map`] | a value over two others, as colours |
 //! | [`multipliers()`] | [`Multipliers`] | Floquet multipliers and the unit circle |
-//! | [`matrix()`] | [`Matrix`] | outcomes by row and column, as colours and words |
+//! | [`matrix()`] | [`OutcomeMatrix`] | outcomes by row and column, as colours and words |
 //! | [`bars()`] | [`Bars`] | signed values in groups, as bars |
 //! | [`bands()`] | [`Bands`] | curves with bands of uncertainty and measured dots |
-//! | [`profile()`] | [`Profile`] | a value over one other |
+//! | [`profile()`] | [`ProfileChart`] | a value over one other |
 //! | [`motion_gif()`], [`motion_apng()`] | [`MotionGif`] | the mechanism in motion |
 
 mod angles;
@@ -66,12 +66,12 @@ pub use constraint_drift::{ConstraintDrift, ResidualPanel, constraint_drift};
 pub use energy_drift::{DriftSeries, EnergyDrift, energy_drift};
 pub use file::{Format, Picture};
 pub use map::{Cell, Map, MapAxis, map};
-pub use matrix::{Matrix, Outcome, matrix};
+pub use matrix::{CellOutcome, OutcomeMatrix, matrix};
 pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_apng, motion_gif};
 pub use multipliers::{Multipliers, multipliers};
 pub use outputs::{OutputSeries, OutputsChart, outputs};
-pub use profile::{Profile, profile};
+pub use profile::{ProfileChart, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
 pub use torque_power::{MotorSeries, TorquePower, force_power, torque_power};

@@ -3,13 +3,13 @@
 use super::ChartError;
 use super::apng;
 use super::file::write_whole;
-use super::gif::Encoder;
+use super::gif::GifEncoder;
 use super::labels::Occupied;
 use super::palette::{GREY, GRID};
 use super::panel::{Panel, pale};
 use super::sheet::{CAPTION, EDGE, Pen, Sheet};
 use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::ticks::decimal;
 use super::view::View;
 use std::path::Path;
@@ -76,7 +76,7 @@ pub fn motion_gif(chart: &MotionGif) -> Result<Animation, ChartError> {
         // Colours are chosen from a part of the frames, so that all of them never lie in memory together.
         let samples =
             (0..frames).step_by(frames.div_ceil(24)).map(&mut *draw).collect::<Result<Vec<_>, _>>()?;
-        let mut encoder = Encoder::new(width, height, chart.delay.max(2), &samples)?;
+        let mut encoder = GifEncoder::new(width, height, chart.delay.max(2), &samples)?;
         for k in 0..frames {
             encoder.frame(&draw(k)?)?;
         }
@@ -93,7 +93,8 @@ pub fn motion_apng(chart: &MotionGif) -> Result<Animation, ChartError> {
     let frames = chart.poses.len().max(1);
     animated(chart, APNG, |[width, height], draw| {
         let mut bytes = Vec::new();
-        let mut encoder = apng::Encoder::new(&mut bytes, [width, height], frames as u32, chart.delay.max(2))?;
+        let mut encoder =
+            apng::ApngEncoder::new(&mut bytes, [width, height], frames as u32, chart.delay.max(2))?;
         for k in 0..frames {
             encoder.frame(&draw(k)?)?;
         }
@@ -147,7 +148,7 @@ fn animated(
         }
         pencil.pose(&chart.sketch, pose, &mut occupied)?;
         if let Some(&time) = chart.time.get(k) {
-            let words = Lettering::new(CAPTION, GREY).at(Align::Right, Level::Baseline);
+            let words = Lettering::new(CAPTION, GREY).at(Align::Right, TextLevel::Baseline);
             let past = if is_past { ", beyond trust" } else { "" };
             sheet.words(
                 &format!("*t* = {} s{past}", decimal(time, 2)),

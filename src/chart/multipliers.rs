@@ -6,7 +6,7 @@ use super::grid::AIR;
 use super::labels::Occupied;
 use super::lines::Point;
 use super::palette::{BLUE, GUIDE, VERMILLION, readable};
-use super::panel::{Panel, Written};
+use super::panel::{Panel, WrittenParts};
 use super::sheet::{Pen, Sheet};
 use super::{ChartError, PAGE};
 use std::f64::consts::TAU;
@@ -43,7 +43,7 @@ pub fn multipliers(chart: &Multipliers, px_per_pt: f64) -> Result<Picture, Chart
     let left = 0.5 * (PAGE[0] - SIDE);
     let top = under + AIR;
     let panel = Panel::new(&sheet, [left, top, left + SIDE, top + SIDE], x, y).equal_steps();
-    panel.frame(Written { x: true, y_name_at: panel.name_place() })?;
+    panel.frame(WrittenParts { x: true, y_name_at: panel.name_place() })?;
     let mut occupied = Occupied::default();
     let circle: Vec<Point> = (0..=POINTS)
         .map(|k| {

@@ -53,7 +53,7 @@ pub(crate) fn even(share: f64) -> Colour {
 
 /// Shape of a marker.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shape {
+pub(crate) enum MarkerShape {
     Disc,
     Ring,
     Square,
@@ -64,39 +64,39 @@ pub(crate) enum Shape {
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Mark {
+pub(crate) struct MarkStyle {
     pub colour: Colour,
-    pub shape: Shape,
+    pub shape: MarkerShape,
     /// 0 for the first series of this family of colours, 1 for the second, …; chooses the dashes.
     pub turn: usize,
 }
 
 /// Seven series without a name of their own, in the order in which they are easiest to tell apart.
-const FREE: [(Colour, Shape); 7] = [
-    (BLUE, Shape::Disc),
-    (VERMILLION, Shape::Up),
-    (GREEN, Shape::Square),
-    (ORANGE, Shape::Ring),
-    (PURPLE, Shape::Diamond),
-    (SKY, Shape::Down),
-    (INK, Shape::Disc),
+const FREE: [(Colour, MarkerShape); 7] = [
+    (BLUE, MarkerShape::Disc),
+    (VERMILLION, MarkerShape::Up),
+    (GREEN, MarkerShape::Square),
+    (ORANGE, MarkerShape::Ring),
+    (PURPLE, MarkerShape::Diamond),
+    (SKY, MarkerShape::Down),
+    (INK, MarkerShape::Disc),
 ];
 
 /// The fixed colour and shape of a method or stabilization, found by the beginning of its name.
-fn fixed(name: &str) -> Option<(Colour, Shape)> {
-    const FIXED: [(&str, Colour, Shape); 12] = [
-        ("dopri5", SKY, Shape::Down),
-        ("dp5", SKY, Shape::Down),
-        ("dop853", BLUE, Shape::Disc),
-        ("dp8", BLUE, Shape::Disc),
-        ("gauss", GREEN, Shape::Square),
-        ("rattle", PURPLE, Shape::Diamond),
-        ("radau", ORANGE, Shape::Ring),
-        ("taylor", VERMILLION, Shape::Up),
-        ("none", VERMILLION, Shape::Down),
-        ("baumgarte", ORANGE, Shape::Ring),
-        ("projection", BLUE, Shape::Disc),
-        ("elimination", GREEN, Shape::Square),
+fn fixed(name: &str) -> Option<(Colour, MarkerShape)> {
+    const FIXED: [(&str, Colour, MarkerShape); 12] = [
+        ("dopri5", SKY, MarkerShape::Down),
+        ("dp5", SKY, MarkerShape::Down),
+        ("dop853", BLUE, MarkerShape::Disc),
+        ("dp8", BLUE, MarkerShape::Disc),
+        ("gauss", GREEN, MarkerShape::Square),
+        ("rattle", PURPLE, MarkerShape::Diamond),
+        ("radau", ORANGE, MarkerShape::Ring),
+        ("taylor", VERMILLION, MarkerShape::Up),
+        ("none", VERMILLION, MarkerShape::Down),
+        ("baumgarte", ORANGE, MarkerShape::Ring),
+        ("projection", BLUE, MarkerShape::Disc),
+        ("elimination", GREEN, MarkerShape::Square),
     ];
     FIXED.iter().find(|(word, ..)| name.starts_with(word)).map(|&(_, colour, shape)| (colour, shape))
 }
@@ -114,19 +114,20 @@ fn shade(colour: Colour, turn: usize, count: usize) -> Colour {
 
 /// A mark for each name: known methods and stabilizations keep theirs, in shades where they share a colour;
 /// other names take what is left.
-pub(crate) fn marks<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<Mark> {
+pub(crate) fn marks<'a>(names: impl IntoIterator<Item = &'a str>) -> Vec<MarkStyle> {
     let names: Vec<&str> = names.into_iter().collect();
     let known: Vec<_> = names.iter().map(|name| fixed(name)).collect();
     let mut free =
         FREE.iter().filter(|(colour, _)| !known.iter().flatten().any(|(taken, _)| taken == colour)).cycle();
-    let mut chosen: Vec<(Colour, Shape)> = Vec::new();
+    let mut chosen: Vec<(Colour, MarkerShape)> = Vec::new();
     for known in &known {
         chosen.push(known.or_else(|| free.next().copied()).unwrap_or(FREE[6]));
     }
-    let of = |colour: Colour, all: &[(Colour, Shape)]| all.iter().filter(|other| other.0 == colour).count();
-    let mark = |(k, &(colour, shape)): (usize, &(Colour, Shape))| {
+    let of =
+        |colour: Colour, all: &[(Colour, MarkerShape)]| all.iter().filter(|other| other.0 == colour).count();
+    let mark = |(k, &(colour, shape)): (usize, &(Colour, MarkerShape))| {
         let turn = of(colour, &chosen[..k]);
-        Mark { colour: shade(colour, turn, of(colour, &chosen)), shape, turn }
+        MarkStyle { colour: shade(colour, turn, of(colour, &chosen)), shape, turn }
     };
     chosen.iter().enumerate().map(mark).collect()
 }

@@ -4,9 +4,9 @@ use super::ChartError;
 use super::axis::Axis;
 use super::labels::{Occupied, spread};
 use super::lines::{Point, clip, envelope, is_dense, turns};
-use super::palette::{Colour, GREY, GRID, GUIDE, INK, Mark, SPINE, WHITE, mix, readable};
+use super::palette::{Colour, GREY, GRID, GUIDE, INK, MarkStyle, SPINE, WHITE, mix, readable};
 use super::sheet::{NAME, NOTE, Pen, Sheet, TICK, note, units};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::ticks::Ticks;
 use plotters::coord::cartesian::Cartesian2d;
 use plotters::style::{Color, ShapeStyle};
@@ -24,7 +24,7 @@ pub(crate) const TURNS: [&[f64]; 4] = [&[], &[6.0, 3.2], &[2.0, 3.0], &[7.0, 3.0
 
 /// Which parts of the frame are written.
 #[derive(Clone, Copy)]
-pub(crate) struct Written {
+pub(crate) struct WrittenParts {
     pub x: bool,
     /// Middle of the name of the y axis \[pt\].
     pub y_name_at: f64,
@@ -139,13 +139,13 @@ impl<'a> Panel<'a> {
     }
 
     /// Grid, spines, ticks and names.
-    pub(crate) fn frame(&self, written: Written) -> Result<(), ChartError> {
+    pub(crate) fn frame(&self, written: WrittenParts) -> Result<(), ChartError> {
         self.grid()?;
         self.scales(written)
     }
 
     /// Spines, ticks and names.
-    pub(crate) fn scales(&self, written: Written) -> Result<(), ChartError> {
+    pub(crate) fn scales(&self, written: WrittenParts) -> Result<(), ChartError> {
         let [left, top, right, bottom] = self.bounds;
         let spine = Pen::new(SPINE, 0.75);
         let small = Pen::new(SPINE, 0.6);
@@ -164,7 +164,7 @@ impl<'a> Panel<'a> {
             if written.x {
                 self.sheet.words(
                     &tick.label,
-                    Lettering::new(TICK, INK).at(Align::Centre, Level::Top),
+                    Lettering::new(TICK, INK).at(Align::Centre, TextLevel::Top),
                     [x, bottom + MAJOR + GAP],
                 )?;
             }
@@ -175,17 +175,17 @@ impl<'a> Panel<'a> {
             // The lowest label of a narrow panel would meet the first of the x axis otherwise.
             self.sheet.words(
                 &tick.label,
-                Lettering::new(TICK, INK).at(Align::Right, Level::Middle),
+                Lettering::new(TICK, INK).at(Align::Right, TextLevel::Middle),
                 [left - MAJOR - GAP, y],
             )?;
         }
         self.sheet.line(&[[left, top], [left, bottom]], &spine)?;
         self.sheet.line(&[[left, bottom], [right, bottom]], &spine)?;
-        let name = Lettering::new(NAME, INK).at(Align::Centre, Level::Top);
+        let name = Lettering::new(NAME, INK).at(Align::Centre, TextLevel::Top);
         if written.x {
             self.sheet.words(&x_ticks.name(&self.x.name), name, [0.5 * (left + right), bottom + 22.0])?;
         }
-        let upright = Lettering { angle: FRAC_PI_2, ..name.at(Align::Centre, Level::Middle) };
+        let upright = Lettering { angle: FRAC_PI_2, ..name.at(Align::Centre, TextLevel::Middle) };
         self.sheet.words(&y_ticks.name(&self.y.name), upright, [written.y_name_at, 0.5 * (top + bottom)])
     }
 
@@ -284,7 +284,7 @@ impl<'a> Panel<'a> {
         let Some(words) = words else { return Ok(()) };
         let half = 0.5 * self.sheet.width(words, NOTE, false);
         let middle = x.clamp(self.bounds[0] + half, (self.bounds[2] - half).max(self.bounds[0] + half));
-        self.sheet.words(words, note(GREY, Align::Centre, Level::Baseline), [middle, top - 3.0])
+        self.sheet.words(words, note(GREY, Align::Centre, TextLevel::Baseline), [middle, top - 3.0])
     }
 
     /// Data that make no line, as dots.
@@ -308,11 +308,15 @@ impl<'a> Panel<'a> {
 
     /// Words in the middle of a panel without data.
     pub(crate) fn empty(&self, words: &str) -> Result<(), ChartError> {
-        self.sheet.words(words, note(GREY, Align::Centre, Level::Middle), self.page([0.5, 0.5]))
+        self.sheet.words(words, note(GREY, Align::Centre, TextLevel::Middle), self.page([0.5, 0.5]))
     }
 
     /// Labels right of the panel at the ends of lines: height of the end \[pt\], words, mark.
-    pub(crate) fn end_labels(&self, ends: &[(f64, String, Mark)], markers: bool) -> Result<(), ChartError> {
+    pub(crate) fn end_labels(
+        &self,
+        ends: &[(f64, String, MarkStyle)],
+        markers: bool,
+    ) -> Result<(), ChartError> {
         let wanted: Vec<f64> = ends.iter().map(|end| end.0).collect();
         let places = spread(&wanted, 12.0, self.bounds[1] + 2.0, self.bounds[3] - 2.0);
         let right = self.bounds[2];
@@ -325,7 +329,11 @@ impl<'a> Panel<'a> {
                 self.sheet.marker([x + 2.5, place], mark.shape, mark.colour)?;
                 x += 8.0;
             }
-            self.sheet.words(words, note(readable(mark.colour), Align::Left, Level::Middle), [x, place])?;
+            self.sheet.words(
+                words,
+                note(readable(mark.colour), Align::Left, TextLevel::Middle),
+                [x, place],
+            )?;
         }
         Ok(())
     }
@@ -341,7 +349,7 @@ impl<'a> Panel<'a> {
         let size = [self.sheet.width(words, NOTE, false), 0.8 * NOTE];
         let (bounds, _) = super::labels::place(at, 5.0, size, self.bounds, &[], occupied);
         occupied.block(bounds);
-        let lettering = Lettering { halo: true, ..note(colour, Align::Left, Level::Middle) };
+        let lettering = Lettering { halo: true, ..note(colour, Align::Left, TextLevel::Middle) };
         self.sheet.words(words, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])
     }
 }

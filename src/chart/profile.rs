@@ -15,7 +15,7 @@ const FEW: usize = 60;
 
 /// A value at many others.
 #[derive(Clone, Debug, Default)]
-pub struct Profile {
+pub struct ProfileChart {
     /// Title, with markup.
     pub title: String,
     /// Parts of the caption, with markup.
@@ -36,7 +36,7 @@ pub struct Profile {
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
-pub fn profile(chart: &Profile, px_per_pt: f64) -> Result<Picture, ChartError> {
+pub fn profile(chart: &ProfileChart, px_per_pt: f64) -> Result<Picture, ChartError> {
     let sheet = Sheet::new(PAGE, px_per_pt)?;
     let under = sheet.heading(&chart.title, &chart.caption)?;
     let points: Vec<Point> = chart.x.iter().zip(&chart.y).map(|(&x, &y)| [x, y]).collect();
@@ -101,13 +101,13 @@ mod tests {
             for log in [false, true] {
                 let x: Vec<f64> = (0..count).map(|k| f64::from(k) * 0.02 - 3.0).collect();
                 let y = x.iter().map(|x| if x.abs() < 1.0 { f64::NAN } else { x * x }).collect();
-                let chart = Profile {
+                let chart = ProfileChart {
                     x,
                     y,
                     log,
                     x_name: "*φ* [rad]".into(),
                     y_name: "time [s]".into(),
-                    ..Profile::default()
+                    ..ProfileChart::default()
                 };
                 let picture = profile(&chart, 1.0).expect("a picture");
                 let blue =

@@ -5,8 +5,8 @@ use super::ChartError;
 use super::canvas::{Canvas, UNITS};
 use super::file::Picture;
 use super::lines::{Point, dashes};
-use super::palette::{Colour, GREY, INK, Shape, WHITE};
-use super::text::{Align, Lettering, Level, unmarked};
+use super::palette::{Colour, GREY, INK, MarkerShape, WHITE};
+use super::text::{Align, Lettering, TextLevel, unmarked};
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, Drawable, PathElement, PointCollection, Polygon};
@@ -170,23 +170,23 @@ impl Sheet {
     }
 
     /// A marker with a white rim.
-    pub(crate) fn marker(&self, at: Point, shape: Shape, colour: Colour) -> Result<(), ChartError> {
+    pub(crate) fn marker(&self, at: Point, shape: MarkerShape, colour: Colour) -> Result<(), ChartError> {
         let polygon = |corners: &[Point], grow: f64| -> Vec<Point> {
             corners.iter().map(|c| [at[0] + c[0] * grow, at[1] + c[1] * grow]).collect()
         };
         let (corners, rim): (&[Point], f64) = match shape {
-            Shape::Disc => {
+            MarkerShape::Disc => {
                 self.disc(at, 3.5, WHITE)?;
                 return self.disc(at, 2.5, colour);
             }
-            Shape::Ring => {
+            MarkerShape::Ring => {
                 self.disc(at, 3.5, WHITE)?;
                 return self.ring(at, 2.6, colour, 1.2);
             }
-            Shape::Square => (&[[-2.3, -2.3], [2.3, -2.3], [2.3, 2.3], [-2.3, 2.3]], 1.4),
-            Shape::Diamond => (&[[0.0, -3.1], [3.1, 0.0], [0.0, 3.1], [-3.1, 0.0]], 1.45),
-            Shape::Up => (&[[0.0, -3.2], [2.9, 2.0], [-2.9, 2.0]], 1.6),
-            Shape::Down => (&[[0.0, 3.2], [2.9, -2.0], [-2.9, -2.0]], 1.6),
+            MarkerShape::Square => (&[[-2.3, -2.3], [2.3, -2.3], [2.3, 2.3], [-2.3, 2.3]], 1.4),
+            MarkerShape::Diamond => (&[[0.0, -3.1], [3.1, 0.0], [0.0, 3.1], [-3.1, 0.0]], 1.45),
+            MarkerShape::Up => (&[[0.0, -3.2], [2.9, 2.0], [-2.9, 2.0]], 1.6),
+            MarkerShape::Down => (&[[0.0, 3.2], [2.9, -2.0], [-2.9, -2.0]], 1.6),
         };
         self.polygon(&polygon(corners, rim), WHITE)?;
         self.polygon(&polygon(corners, 1.0), colour)
@@ -299,7 +299,7 @@ fn wrap(parts: &[String], room: f64, width: impl Fn(&str) -> f64) -> Vec<String>
 }
 
 /// Letters for a label in the middle left of its anchor and the like.
-pub(crate) fn note(colour: Colour, align: Align, level: Level) -> Lettering {
+pub(crate) fn note(colour: Colour, align: Align, level: TextLevel) -> Lettering {
     Lettering::new(NOTE, colour).at(align, level)
 }
 

@@ -8,7 +8,7 @@ use super::palette::{
 };
 use super::panel::Panel;
 use super::sheet::{NAME, Pen, Sheet};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::view::View;
 
 /// What does not change while a mechanism moves.
@@ -378,7 +378,7 @@ impl Pencil<'_> {
             };
             occupied.block(around(at, 5.0));
             let lettering =
-                Lettering { halo: true, ..Lettering::new(NAME, colour).at(Align::Centre, Level::Middle) };
+                Lettering { halo: true, ..Lettering::new(NAME, colour).at(Align::Centre, TextLevel::Middle) };
             self.sheet.words("*ω*", lettering, at)?;
         }
         Ok(())

@@ -25,7 +25,7 @@ pub(crate) enum Align {
 
 /// Which height of the words lies at the given place; the middle is that of the digits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Level {
+pub(crate) enum TextLevel {
     Baseline,
     Middle,
     Top,
@@ -39,7 +39,7 @@ pub(crate) struct Lettering {
     pub bold: bool,
     pub colour: Colour,
     pub align: Align,
-    pub level: Level,
+    pub level: TextLevel,
     /// Direction of the line of text, counter-clockwise from the right \[rad\].
     pub angle: f64,
     /// A white rim, for words that lie on lines.
@@ -53,13 +53,13 @@ impl Lettering {
             bold: false,
             colour,
             align: Align::Left,
-            level: Level::Baseline,
+            level: TextLevel::Baseline,
             angle: 0.0,
             halo: false,
         }
     }
 
-    pub(crate) fn at(self, align: Align, level: Level) -> Self {
+    pub(crate) fn at(self, align: Align, level: TextLevel) -> Self {
         Lettering { align, level, ..self }
     }
 }

@@ -6,7 +6,7 @@ use super::file::Picture;
 use super::grid::{label_room, shortened, stacked};
 use super::labels::Occupied;
 use super::lines::Point;
-use super::palette::{BLUE, Colour, Mark, SPINE, Shape, VERMILLION, marks, readable};
+use super::palette::{BLUE, Colour, MarkStyle, MarkerShape, SPINE, VERMILLION, marks, readable};
 use super::panel::Panel;
 use super::sheet::{Pen, Sheet};
 use super::ticks::{decimal, figure};
@@ -111,7 +111,11 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
     let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
     for (k, (panel, (lines, _, unit))) in panels.iter().zip(&rows).enumerate() {
         panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
-        let own = Mark { colour: if *unit == "W" { VERMILLION } else { BLUE }, shape: Shape::Disc, turn: 0 };
+        let own = MarkStyle {
+            colour: if *unit == "W" { VERMILLION } else { BLUE },
+            shape: MarkerShape::Disc,
+            turn: 0,
+        };
         let mark = |motor: usize| if several { marks[motor] } else { own };
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (motor, line) in lines.iter().enumerate() {

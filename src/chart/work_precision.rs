@@ -9,10 +9,10 @@ use super::file::Picture;
 use super::grid::{shortened, stacked};
 use super::labels::{Occupied, place};
 use super::lines::{Point, clip};
-use super::palette::{Colour, GREY, INK, Mark, ORANGE, WHITE, marks, mix, readable};
+use super::palette::{Colour, GREY, INK, MarkStyle, ORANGE, WHITE, marks, mix, readable};
 use super::panel::{Panel, TURNS};
 use super::sheet::{NOTE, Pen, Sheet, note};
-use super::text::{Align, Lettering, Level};
+use super::text::{Align, Lettering, TextLevel};
 use super::{ChartError, PAGE};
 use crate::run::compare::front;
 
@@ -144,7 +144,7 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     order.sort_by_key(|&k| is_best[k]);
     for &k in &order {
         let pale = if is_best[k] { 0.0 } else { PALE };
-        let mark = Mark { colour: mix(marks[k].colour, WHITE, pale), ..marks[k] };
+        let mark = MarkStyle { colour: mix(marks[k].colour, WHITE, pale), ..marks[k] };
         let pen = Pen::new(mark.colour, if is_best[k] { LINE } else { OTHER });
         curve(&sheet, panel, &points[k].iter().map(at).collect::<Vec<_>>(), &mark, pen, &mut occupied)?;
     }
@@ -189,7 +189,7 @@ fn curve(
     sheet: &Sheet,
     panel: &Panel,
     points: &[Point],
-    mark: &Mark,
+    mark: &MarkStyle,
     pen: Pen,
     occupied: &mut Occupied,
 ) -> Result<(), ChartError> {
@@ -242,7 +242,7 @@ fn along(
     });
     let Some((bounds, _)) = places.min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };
     occupied.block(bounds);
-    let lettering = Lettering { halo: true, ..note(colour, Align::Left, Level::Middle) };
+    let lettering = Lettering { halo: true, ..note(colour, Align::Left, TextLevel::Middle) };
     sheet.words(words, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])
 }
 

@@ -5,7 +5,7 @@ use super::failure::{Exit, Failure};
 use super::flags::CompareFlags;
 use super::interrupt;
 use super::output::{name_files, print, print_object};
-use super::progress::Stages;
+use super::progress::CompareProgress;
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::run::compare::{Asked, Comparison, compare};
@@ -36,7 +36,7 @@ pub fn run(flags: &CompareFlags) -> Result<(), Failure> {
     };
     asked.horizon(&scene, &mechanism)?;
     let mut folder = Folder::open(&flags.folder.out.join(&scene.name).join("compare"), flags.folder.force)?;
-    let mut progress = Stages::new(&scene.name, flags.scene.tell.quiet);
+    let mut progress = CompareProgress::new(&scene.name, flags.scene.tell.quiet);
     let begin = Instant::now();
     let comparison = compare(
         &scene,

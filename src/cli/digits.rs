@@ -4,16 +4,16 @@ use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
 use super::interrupt::{self, CheckpointTimer};
 use super::output::{message, name_files, print, print_object};
-use super::progress::Progress;
-use super::resume::{Saved, Work};
+use super::progress::RunProgress;
+use super::resume::{PendingWork, SavedWork};
 use crate::dynamics::Mechanism;
-use crate::report::digits::{self as report, Table};
+use crate::report::digits::{self as report, DigitsTable};
 use crate::run::digits::{
-    Forecast, LongError, Pair, Precision, Progress as Reached, Row, Saved as LongSaved, Source, exceeded,
+    DigitsPair, DigitsSource, Forecast, LongError, PairProgress, Precision, SavedDigits, ShownRow, exceeded,
     forecast, planned,
 };
 use crate::run::files::{EVENTS, RECORD, TRAJECTORY};
-use crate::run::{Checkpoints, Folder, Refusal, Stream};
+use crate::run::{Checkpoints, Folder, RequestRefusal, Stream};
 use crate::scene::{Template, read_text, source_name};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -26,8 +26,8 @@ const ATTEMPTS: u32 = 6;
 
 /// What a checkpoint holds of a run in many digits.
 #[derive(Clone, Serialize, Deserialize)]
-pub struct Snapshot {
-    runs: Vec<LongSaved>,
+pub struct DigitsSnapshot {
+    runs: Vec<SavedDigits>,
     next: u64,
     summary: report::Summary,
     attempt: u32,
@@ -35,9 +35,9 @@ pub struct Snapshot {
 }
 
 /// A run under way.
-struct Task<'a> {
+struct DigitsTask<'a> {
     flags: &'a RunFlags,
-    source: Source,
+    source: DigitsSource,
     text: &'a str,
     arguments: &'a [String],
     /// How near runs must be; `None` where only one is made.
@@ -54,7 +54,7 @@ struct Task<'a> {
 pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     refuse_others(flags)?;
     let text = read_text(&flags.scene.scene)?;
-    let mut task = Task::new(flags, &text, arguments)?;
+    let mut task = DigitsTask::new(flags, &text, arguments)?;
     if !task.source.scene.outputs.is_empty() && !flags.scene.tell.quiet {
         super::output::message(
             "note: outputs are not written in many digits, whose table has the coordinates alone",
@@ -62,7 +62,7 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     }
     let precisions = task.first()?;
     let path = flags.out.join(&task.source.scene.name).join(folder_name(&precisions, task.within));
-    let pair = Pair::new(&task.source, &precisions)?;
+    let pair = DigitsPair::new(&task.source, &precisions)?;
     let folder = Folder::open(&path, flags.force)?;
     let table = task.begin(&folder, &precisions)?;
     task.finish(pair, table, report::Summary::default(), folder, Checkpoints::none(&path))
@@ -74,23 +74,23 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
 /// As [`run`], or a checkpoint that does not fit.
 pub fn resume(
     flags: &RunFlags,
-    saved: Saved,
+    saved: SavedWork,
     folder: Folder,
     checkpoints: Checkpoints,
 ) -> Result<(), Failure> {
     interrupt::listen()?;
-    let Saved { arguments, scene: text, cursor, work, .. } = saved;
+    let SavedWork { arguments, scene: text, cursor, work, .. } = saved;
     let misfit = || Failure::from(crate::run::ResumeError::Misfit);
-    let Work::Digits(snapshot) = work else { return Err(misfit()) };
-    let mut task = Task::new(flags, &text, &arguments)?;
+    let PendingWork::Digits(snapshot) = work else { return Err(misfit()) };
+    let mut task = DigitsTask::new(flags, &text, &arguments)?;
     (task.attempt, task.measured) = (snapshot.attempt, snapshot.forecast);
-    let precisions: Vec<Precision> = snapshot.runs.iter().map(LongSaved::precision).collect();
-    let mut pair = Pair::new(&task.source, &precisions)?;
+    let precisions: Vec<Precision> = snapshot.runs.iter().map(SavedDigits::precision).collect();
+    let mut pair = DigitsPair::new(&task.source, &precisions)?;
     if !pair.resume(&snapshot.runs, snapshot.next) {
         return Err(misfit());
     }
     let stream = folder.take_up(TRAJECTORY, &cursor)?;
-    let table = Table::going_on(task.layout(&precisions), stream);
+    let table = DigitsTable::going_on(task.layout(&precisions), stream);
     task.finish(pair, table, snapshot.summary, folder, checkpoints)
 }
 
@@ -128,14 +128,14 @@ fn folder_name(precisions: &[Precision], within: Option<f64>) -> String {
     }
 }
 
-impl<'a> Task<'a> {
+impl<'a> DigitsTask<'a> {
     fn new(flags: &'a RunFlags, text: &'a str, arguments: &'a [String]) -> Result<Self, Failure> {
         let (scene, mechanism) = super::compile(&flags.scene, text)?;
         let typed = super::simulate::typed(arguments, &flags.scene.set);
         let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
         let until = flags.digits.trusted_until.or(flags.plan.until).map(shortest).transpose()?;
         let every = flags.plan.every.map(shortest).transpose()?;
-        let source = Source { template, typed, until, every, scene, mechanism };
+        let source = DigitsSource { template, typed, until, every, scene, mechanism };
         let within = flags.digits.trusted_until.map(|_| flags.digits.within.unwrap_or(1e-3));
         Ok(Self { flags, source, text, arguments, within, measured: None, attempt: 0 })
     }
@@ -171,9 +171,9 @@ impl<'a> Task<'a> {
         }
     }
 
-    fn layout(&self, precisions: &[Precision]) -> report::Layout {
+    fn layout(&self, precisions: &[Precision]) -> report::RowLayout {
         let carried = precisions.first().map_or(0, |precision| precision.digits);
-        report::Layout::new(
+        report::RowLayout::new(
             self.mechanism(),
             self.flags.digits.show_digits.map(usize::from),
             carried,
@@ -181,16 +181,17 @@ impl<'a> Task<'a> {
         )
     }
 
-    fn begin(&self, folder: &Folder, precisions: &[Precision]) -> Result<Table<Stream>, Failure> {
+    fn begin(&self, folder: &Folder, precisions: &[Precision]) -> Result<DigitsTable<Stream>, Failure> {
         let stream = folder.begin(TRAJECTORY)?;
-        Table::new(self.layout(precisions), stream).map_err(|error| folder.failed(TRAJECTORY, error).into())
+        DigitsTable::new(self.layout(precisions), stream)
+            .map_err(|error| folder.failed(TRAJECTORY, error).into())
     }
 
     /// Takes a run to its end, and begins again with more digits where a proof falls short.
     fn finish(
         mut self,
-        mut pair: Pair,
-        mut table: Table<Stream>,
+        mut pair: DigitsPair,
+        mut table: DigitsTable<Stream>,
         mut summary: report::Summary,
         mut folder: Folder,
         mut checkpoints: Checkpoints,
@@ -210,14 +211,14 @@ impl<'a> Task<'a> {
             // The table begins anew: its rows get as many digits as the others.
             table = self.begin(&folder, &precisions)?;
             summary = report::Summary::default();
-            pair = Pair::new(&self.source, &precisions)?;
+            pair = DigitsPair::new(&self.source, &precisions)?;
         }
         summary.wall_s = begin.elapsed().as_secs_f64();
         self.publish(&pair, table, summary, &mut folder, checkpoints)
     }
 
     /// The digits of the next attempt, from the growth this one has met.
-    fn again(&mut self, pair: &Pair, summary: &report::Summary) -> Result<Vec<Precision>, Failure> {
+    fn again(&mut self, pair: &DigitsPair, summary: &report::Summary) -> Result<Vec<Precision>, Failure> {
         let (Some(within), Some([growth, mean])) = (self.within, self.measured) else {
             return Ok(Vec::new());
         };
@@ -243,8 +244,8 @@ impl<'a> Task<'a> {
     /// True where the runs part before the horizon.
     fn integrate(
         &self,
-        pair: &mut Pair,
-        table: &mut Table<Stream>,
+        pair: &mut DigitsPair,
+        table: &mut DigitsTable<Stream>,
         summary: &mut report::Summary,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
@@ -255,7 +256,7 @@ impl<'a> Task<'a> {
         }
         let mut timer = CheckpointTimer::new(every);
         let until = pair.runs().first().map_or(0.0, |run| run.last_time());
-        let mut progress = Progress::new(&self.source.scene.name, until, self.flags.scene.tell.quiet);
+        let mut progress = RunProgress::new(&self.source.scene.name, until, self.flags.scene.tell.quiet);
         let ended = self.rows(pair, table, summary, |pair, table, summary| {
             progress.see(summary.t);
             if !timer.wants() {
@@ -271,31 +272,31 @@ impl<'a> Task<'a> {
         });
         progress.finish();
         ended.map_err(|error| match error {
-            Ended::Failure(failure) => failure,
-            Ended::Table(error) => folder.failed(TRAJECTORY, error).into(),
+            EarlyEnd::Failure(failure) => failure,
+            EarlyEnd::Table(error) => folder.failed(TRAJECTORY, error).into(),
         })
     }
 
     /// From row to row; `between` is called after every few of them.
     fn rows(
         &self,
-        pair: &mut Pair,
-        table: &mut Table<Stream>,
+        pair: &mut DigitsPair,
+        table: &mut DigitsTable<Stream>,
         summary: &mut report::Summary,
-        mut between: impl FnMut(&Pair, &mut Table<Stream>, &report::Summary) -> Result<(), Failure>,
-    ) -> Result<bool, Ended> {
+        mut between: impl FnMut(&DigitsPair, &mut DigitsTable<Stream>, &report::Summary) -> Result<(), Failure>,
+    ) -> Result<bool, EarlyEnd> {
         loop {
             let (rows, stop) = match pair.go(&interrupt::is_asked) {
-                Ok(Reached::Over) => return Ok(false),
-                Ok(Reached::Paused) => (Vec::new(), None),
-                Ok(Reached::Rows(rows)) => (rows, None),
+                Ok(PairProgress::Over) => return Ok(false),
+                Ok(PairProgress::Paused) => (Vec::new(), None),
+                Ok(PairProgress::Rows(rows)) => (rows, None),
                 Err(stop) => (pair.up_to_stop(), Some(stop)),
             };
             for (row, agreement) in rows {
                 if self.is_short(&row, agreement, summary) {
                     return Ok(true);
                 }
-                table.write(&row, agreement).map_err(Ended::Table)?;
+                table.write(&row, agreement).map_err(EarlyEnd::Table)?;
                 summary.take(&row, agreement);
                 // At the last state a stop of the run itself comes first.
                 let is_last = stop.as_ref().is_some_and(|stop| row.time() >= stop.t);
@@ -310,12 +311,12 @@ impl<'a> Task<'a> {
                 summary.stop = Some(stop);
                 return Ok(false);
             }
-            between(pair, table, summary).map_err(Ended::Failure)?;
+            between(pair, table, summary).map_err(EarlyEnd::Failure)?;
         }
     }
 
     /// True where a row is not known as well as asked for.
-    fn is_short(&self, row: &Row, agreement: Option<f64>, summary: &mut report::Summary) -> bool {
+    fn is_short(&self, row: &ShownRow, agreement: Option<f64>, summary: &mut report::Summary) -> bool {
         let (Some(within), Some(agreement)) = (self.within, agreement) else { return false };
         let is_short = agreement.is_nan() || agreement < -libm::log10(within);
         if is_short {
@@ -326,15 +327,15 @@ impl<'a> Task<'a> {
 
     fn save(
         &self,
-        pair: &Pair,
-        table: &mut Table<Stream>,
+        pair: &DigitsPair,
+        table: &mut DigitsTable<Stream>,
         summary: &report::Summary,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
     ) -> Result<(), Failure> {
         let failed = |error| folder.failed(TRAJECTORY, error);
         let (runs, next) = pair.save();
-        let snapshot = Snapshot {
+        let snapshot = DigitsSnapshot {
             runs: runs.to_vec(),
             next,
             summary: summary.clone(),
@@ -342,12 +343,12 @@ impl<'a> Task<'a> {
             forecast: self.measured,
         };
         let stream = table.written().map_err(failed)?;
-        checkpoints.save(&Saved {
+        checkpoints.save(&SavedWork {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
             scene: self.text.to_owned(),
             cursor: stream.cursor().map_err(failed)?,
-            work: Work::Digits(Box::new(snapshot)),
+            work: PendingWork::Digits(Box::new(snapshot)),
         })?;
         stream.outlive();
         Ok(())
@@ -356,8 +357,8 @@ impl<'a> Task<'a> {
     /// Names the table, writes the record, and says what came of it.
     fn publish(
         &self,
-        pair: &Pair,
-        table: Table<Stream>,
+        pair: &DigitsPair,
+        table: DigitsTable<Stream>,
         summary: report::Summary,
         folder: &mut Folder,
         mut checkpoints: Checkpoints,
@@ -369,7 +370,7 @@ impl<'a> Task<'a> {
         }
         let hash = folder.keep(stream)?;
         let events = pair.events();
-        let shown = report::Shown {
+        let shown = report::DigitsReport {
             source: &self.source,
             pair,
             layout: &layout,
@@ -407,7 +408,7 @@ impl<'a> Task<'a> {
 }
 
 /// Why a run ended early.
-enum Ended {
+enum EarlyEnd {
     Failure(Failure),
     Table(std::io::Error),
 }
@@ -425,7 +426,7 @@ impl From<LongError> for Failure {
     fn from(error: LongError) -> Self {
         match error {
             LongError::Scene(error) => error.into(),
-            LongError::Refused(refusal) => Refusal::into(refusal),
+            LongError::Refused(refusal) => RequestRefusal::into(refusal),
             LongError::Step(stop) => stop.into(),
         }
     }

@@ -3,9 +3,9 @@
 
 use super::output::print_object;
 use crate::dynamics::CompileError;
-use crate::dynamics::assembly::Change;
+use crate::dynamics::assembly::StartChange;
 use crate::run::files::quoted;
-use crate::run::{CheckpointError, FileError, Refusal, ResumeError, RunError, SweepError};
+use crate::run::{CheckpointError, FileError, RequestRefusal, ResumeError, RunError, SweepError};
 use crate::scene::SceneError;
 use crate::stepping::{Cause, StepError};
 use serde_json::{Value, json};
@@ -83,8 +83,8 @@ impl Failure {
     }
 
     /// A start that is not as given, where `--strict` asks for that.
-    pub(super) fn changed(changes: &[Change]) -> Self {
-        let list: Vec<String> = changes.iter().map(Change::to_string).collect();
+    pub(super) fn changed(changes: &[StartChange]) -> Self {
+        let list: Vec<String> = changes.iter().map(StartChange::to_string).collect();
         let message = format!(
             "--strict: {}\nhint: give the values used, or leave out what the constraints tell",
             list.join("; ")
@@ -129,8 +129,8 @@ impl From<CompileError> for Failure {
     }
 }
 
-impl From<Refusal> for Failure {
-    fn from(refusal: Refusal) -> Self {
+impl From<RequestRefusal> for Failure {
+    fn from(refusal: RequestRefusal) -> Self {
         let exit = if refusal.is_usage { Exit::Usage } else { Exit::Scene };
         let details =
             json!({"what": refusal.what, "reason": refusal.reason, "alternative": refusal.alternative});

@@ -2,7 +2,7 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::FitFlags;
-use super::study::{Study, StudyFolder};
+use super::study::{StudyFiles, StudyFolder};
 use super::{interrupt, load_template};
 use crate::report::fit as report;
 use crate::run::files::{FIT, FIT_RECORD};
@@ -43,14 +43,14 @@ pub fn run(flags: &FitFlags) -> Result<(), Failure> {
     let scene = template.scene()?.name;
     let folder = StudyFolder::new(&flags.folder, &flags.scene.tell, &scene, "fit")?;
     let found = fit(&template, &data, &request, &mut interrupt::is_asked)?;
-    let study = Study {
+    let study = StudyFiles {
         files: vec![(FIT, report::table(&found).into_bytes())],
         record: FIT_RECORD,
         object: report::object(&found),
         text: report::text(&found),
         #[cfg(feature = "charts")]
         pictures: flags.folder.charts.drawn(|| report::charts(&found))?,
-        ..Study::default()
+        ..StudyFiles::default()
     };
     folder.publish(study, FILES)
 }

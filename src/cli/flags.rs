@@ -18,7 +18,7 @@ use values::{count, levels, limit, methods, number, preferences, stabilizations,
 use super::charts::{ChartFlags, MotionFlags};
 use super::failure::{Exit, Failure};
 use super::output::{message, print};
-use crate::run::kinematics::Drive;
+use crate::run::kinematics::KinematicDrive;
 use crate::run::stress::MAX_EVALUATIONS;
 use crate::run::trust::Level;
 use crate::run::{Limits, MethodId, Prefer, Request, Shard, Stabilization, Vary};

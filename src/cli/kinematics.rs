@@ -3,10 +3,10 @@
 use super::failure::{Exit, Failure};
 use super::flags::KinematicsFlags;
 use super::load;
-use super::study::{Study, StudyFolder};
+use super::study::{StudyFiles, StudyFolder};
 use crate::report::kinematics as report;
 use crate::run::files::{KINEMATICS, KINEMATICS_RECORD};
-use crate::run::kinematics::{Drive, KinematicsError, kinematics};
+use crate::run::kinematics::{KinematicDrive, KinematicsError, kinematics};
 
 /// Every file it may leave.
 const FILES: &[&str] = &[KINEMATICS, KINEMATICS_RECORD, "mechanism.png", "kinematics.png"];
@@ -29,18 +29,18 @@ impl From<KinematicsError> for Failure {
 /// The scene, its drive, or files.
 pub fn run(flags: &KinematicsFlags) -> Result<(), Failure> {
     let (scene, _) = load(&flags.scene)?;
-    let drive = Drive { rate: flags.rate, ..flags.drive.clone().unwrap_or_default() };
+    let drive = KinematicDrive { rate: flags.rate, ..flags.drive.clone().unwrap_or_default() };
     let found = kinematics(&scene, &drive, flags.positions as usize)?;
     let name = format!("kinematics-{}", found.drive);
     let folder = StudyFolder::new(&flags.folder, &flags.scene.tell, &scene.name, &name)?;
-    let study = Study {
+    let study = StudyFiles {
         files: vec![(KINEMATICS, report::table(&found))],
         record: KINEMATICS_RECORD,
         object: report::object(&found),
         text: report::text(&found),
         #[cfg(feature = "charts")]
         pictures: flags.folder.charts.drawn(|| report::charts(&found))?,
-        ..Study::default()
+        ..StudyFiles::default()
     };
     folder.publish(study, FILES)
 }

@@ -3,10 +3,10 @@
 use super::failure::{Exit, Failure};
 use super::flags::{Command, Flags, MergeFlags, SweepFlags};
 use super::output::message;
-use super::sweep::{Part, Swept, prepared, tell};
+use super::sweep::{SweepPart, Swept, prepared, tell};
 use crate::report;
 #[cfg(feature = "charts")]
-use crate::report::sweep::Curve;
+use crate::report::sweep::SweepChart;
 use crate::run::files::{PART, SWEEP, quoted};
 use crate::run::{CheckpointError, FileError, Folder, Shard, Stream, Sweep, Totals, checkpoint};
 use clap::Parser;
@@ -19,10 +19,10 @@ use std::path::{Path, PathBuf};
 const NAMED: usize = 12;
 
 /// A part that was read.
-struct Found {
+struct ReadPart {
     folder: PathBuf,
     shard: Shard,
-    part: Part,
+    part: SweepPart,
     flags: Box<SweepFlags>,
 }
 
@@ -44,7 +44,7 @@ pub fn run(flags: &MergeFlags) -> Result<(), Failure> {
     let plan = prepared(&sweep_flags, &first.part.scene)?;
     agree(&found, &plan)?;
     complete(&found, flags)?;
-    let parent = |found: &Found| found.folder.parent().map(Path::to_owned);
+    let parent = |found: &ReadPart| found.folder.parent().map(Path::to_owned);
     let out = match &flags.out {
         Some(out) => out.clone(),
         None => parent(first)
@@ -133,7 +133,7 @@ fn is_part(folder: &Path) -> bool {
         && (folder.join(PART).exists() || (name.starts_with("shard-") && checkpoint::is_in(folder)))
 }
 
-fn read(folder: PathBuf) -> Result<Found, Failure> {
+fn read(folder: PathBuf) -> Result<ReadPart, Failure> {
     let file = folder.join(PART);
     if !file.exists() {
         let text = format!(
@@ -144,21 +144,21 @@ fn read(folder: PathBuf) -> Result<Found, Failure> {
         return Err(refused(text));
     }
     let bytes = fs::read(&file).map_err(|source| FileError::File { file: file.clone(), source })?;
-    let part: Part = checkpoint::opened(&bytes, &file)?;
+    let part: SweepPart = checkpoint::opened(&bytes, &file)?;
     let damaged = || CheckpointError::Damaged { file: file.clone(), why: "its command line cannot be read" };
     match Flags::try_parse_from(&part.arguments).map_err(|_| damaged())?.command {
         Command::Sweep(flags) => {
             let shard = flags.shard.ok_or_else(damaged)?;
-            Ok(Found { folder, shard, part, flags })
+            Ok(ReadPart { folder, shard, part, flags })
         }
         _ => Err(damaged().into()),
     }
 }
 
 /// Whether all parts are of one sweep.
-fn agree(found: &[Found], plan: &Sweep) -> Result<(), Failure> {
+fn agree(found: &[ReadPart], plan: &Sweep) -> Result<(), Failure> {
     let first = &found[0];
-    let differs = |other: &Found, what: &str| {
+    let differs = |other: &ReadPart, what: &str| {
         let (ours, theirs) = (first.folder.display(), other.folder.display());
         Err(refused(format!("{theirs} is part of another sweep than {ours}: {what}")))
     };
@@ -193,7 +193,7 @@ fn agree(found: &[Found], plan: &Sweep) -> Result<(), Failure> {
 }
 
 /// Whether every part is there once.
-fn complete(found: &[Found], flags: &MergeFlags) -> Result<(), Failure> {
+fn complete(found: &[ReadPart], flags: &MergeFlags) -> Result<(), Failure> {
     if let Some(pair) = found.windows(2).find(|pair| pair[0].shard == pair[1].shard) {
         let [one, other] = [&pair[0], &pair[1]].map(|found| found.folder.display());
         return Err(refused(format!("part {} is there twice: {one} and {other}", pair[0].shard)));
@@ -216,7 +216,7 @@ fn complete(found: &[Found], flags: &MergeFlags) -> Result<(), Failure> {
 }
 
 /// The rows of all parts under one header.
-fn joined(found: &[Found], folder: &Folder) -> Result<Stream, Failure> {
+fn joined(found: &[ReadPart], folder: &Folder) -> Result<Stream, Failure> {
     let mut stream = folder.begin(SWEEP)?;
     let mut header = Vec::new();
     for found in found {
@@ -255,13 +255,13 @@ fn joined(found: &[Found], folder: &Folder) -> Result<Stream, Failure> {
 
 /// The chart of all points, where every part has its own.
 #[cfg(feature = "charts")]
-fn curve(found: &[Found]) -> Result<Option<Curve>, Failure> {
-    let mut whole: Option<Curve> = None;
-    for Found { folder, part, .. } in found {
+fn curve(found: &[ReadPart]) -> Result<Option<SweepChart>, Failure> {
+    let mut whole: Option<SweepChart> = None;
+    for ReadPart { folder, part, .. } in found {
         let Some(bytes) = &part.drawn else { return Ok(None) };
         let damaged =
             |_| CheckpointError::Damaged { file: folder.join(PART), why: "its chart cannot be read" };
-        let curve: Curve = postcard::from_bytes(bytes).map_err(damaged)?;
+        let curve: SweepChart = postcard::from_bytes(bytes).map_err(damaged)?;
         match &mut whole {
             Some(whole) => whole.join(&curve),
             None => whole = Some(curve),

@@ -3,7 +3,7 @@
 use super::failure::{Exit, Failure};
 use super::flags::ModesFlags;
 use super::load;
-use super::study::{Study, StudyFolder};
+use super::study::{StudyFiles, StudyFolder};
 use crate::report::{modes as at_rest, periodic as in_motion};
 use crate::run::files::MODES_RECORD;
 use crate::run::modes::{Modes, ModesError, PeriodicMotions, modes, periodic};
@@ -25,7 +25,7 @@ const FILES: &[&str] = &[
 ];
 
 /// What was found.
-enum Found {
+enum ModesResult {
     Rest(Modes),
     Motion(PeriodicMotions),
 }
@@ -48,22 +48,22 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
     let starts = flags.starts as usize;
     let resting = if flags.period.is_none() { Some(modes(&scene, &mechanism, starts)) } else { None };
     let found = match resting {
-        Some(Ok(found)) => Found::Rest(found),
+        Some(Ok(found)) => ModesResult::Rest(found),
         Some(Err(error)) if !matches!(error, ModesError::Moving(_) | ModesError::Forced) => {
             return Err(error.into());
         }
-        _ => Found::Motion(periodic(&scene, &mechanism, starts, flags.period)?),
+        _ => ModesResult::Motion(periodic(&scene, &mechanism, starts, flags.period)?),
     };
     let (object, text) = match &found {
-        Found::Rest(found) => (at_rest::object(found), at_rest::text(found)),
-        Found::Motion(found) => (in_motion::object(found), in_motion::text(found)),
+        ModesResult::Rest(found) => (at_rest::object(found), at_rest::text(found)),
+        ModesResult::Motion(found) => (in_motion::object(found), in_motion::text(found)),
     };
     #[cfg(feature = "charts")]
     let (pictures, motions) = flags.folder.charts.drawn(|| match &found {
-        Found::Rest(found) => at_rest::charts(found),
-        Found::Motion(found) => in_motion::charts(found),
+        ModesResult::Rest(found) => at_rest::charts(found),
+        ModesResult::Motion(found) => in_motion::charts(found),
     })?;
-    let study = Study {
+    let study = StudyFiles {
         record: MODES_RECORD,
         object,
         text,
@@ -71,7 +71,7 @@ pub fn run(flags: &ModesFlags) -> Result<(), Failure> {
         pictures,
         #[cfg(feature = "charts")]
         motions,
-        ..Study::default()
+        ..StudyFiles::default()
     };
     folder.publish(study, FILES)
 }

@@ -19,7 +19,7 @@ const MOST_CALLS: u32 = 1024;
 const POSITIONS: f64 = 10_000.0;
 
 /// Shows the progress of one run.
-pub struct Progress {
+pub struct RunProgress {
     scene: String,
     until: f64,
     bar: Option<ProgressBar>,
@@ -71,7 +71,7 @@ fn bar(scene: &str, length: u64, words: &str, quiet: bool) -> Option<ProgressBar
 }
 
 /// Shows the progress of a sweep: its rate so far, and the time the rest takes at that rate.
-pub struct Points {
+pub struct SweepProgress {
     scene: String,
     /// Points of an earlier part of it, and all there are.
     before: u64,
@@ -82,7 +82,7 @@ pub struct Points {
     quiet: bool,
 }
 
-impl Points {
+impl SweepProgress {
     /// Begins; `count` is the number of points, of which `before` were finished earlier.
     pub fn new(scene: &str, before: u64, count: u64, quiet: bool) -> Self {
         let bar = bar(scene, count, "{msg}", quiet);
@@ -131,14 +131,14 @@ impl Points {
 }
 
 /// Shows the progress of a comparison: what is being done, and the most time that is left.
-pub struct Stages {
+pub struct CompareProgress {
     scene: String,
     bar: Option<ProgressBar>,
     next: Instant,
     quiet: bool,
 }
 
-impl Stages {
+impl CompareProgress {
     /// Begins.
     pub fn new(scene: &str, quiet: bool) -> Self {
         let bar = bar(scene, POSITIONS as u64, "{msg}", quiet);
@@ -195,7 +195,7 @@ fn told(before: u64, finished: u64, count: u64, spent: Duration) -> String {
     format!("{finished} of {of}, {rate} a second, {left} left")
 }
 
-impl Progress {
+impl RunProgress {
     /// Begins; `until` is the horizon \[s\].
     pub fn new(scene: &str, until: f64, quiet: bool) -> Self {
         let bar = bar(scene, POSITIONS as u64, "{msg}  {elapsed}, {eta} left", quiet);

@@ -5,34 +5,36 @@ use super::flags::{Command, Flags, ResumeFlags};
 use super::output::message;
 use super::{simulate, sweep};
 use crate::run::files::{RECORD, SWEEP_RECORD, quoted};
-use crate::run::{CheckpointError, Checkpoints, Cursor, Folder, Loaded, Snapshot, Totals, checkpoint};
+use crate::run::{
+    CheckpointError, Checkpoints, Folder, Loaded, Snapshot, StreamPosition, Totals, checkpoint,
+};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// What a checkpoint of the program holds.
 #[derive(Serialize, Deserialize)]
-pub struct Saved {
+pub struct SavedWork {
     /// The version that wrote it.
     pub version: String,
     /// The command line, and the text of the scene it names.
     pub arguments: Vec<String>,
     pub scene: String,
     /// How far the table was written.
-    pub cursor: Cursor,
-    pub work: Work,
+    pub cursor: StreamPosition,
+    pub work: PendingWork,
 }
 
 /// What was under way.
 #[derive(Serialize, Deserialize)]
-pub enum Work {
+pub enum PendingWork {
     /// A run.
     Run(Box<Snapshot>),
     /// A sweep: what its points seen so far amount to, and its chart so far.
     Sweep(Totals, Option<Vec<u8>>),
     /// A run in many digits, and the proof beside it.
     #[cfg(feature = "digits")]
-    Digits(Box<super::digits::Snapshot>),
+    Digits(Box<super::digits::DigitsSnapshot>),
 }
 
 /// Levels of folders that are searched for interrupted runs.
@@ -49,7 +51,7 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
     }
     // Locked before anything is read: nobody else goes on with it meanwhile.
     let folder = Folder::reopen(&path)?;
-    let (checkpoints, loaded) = match Checkpoints::load::<Saved>(folder.path()) {
+    let (checkpoints, loaded) = match Checkpoints::load::<SavedWork>(folder.path()) {
         Err(CheckpointError::Missing { .. }) => return Err(nothing(folder.path())),
         loaded => loaded?,
     };
@@ -64,18 +66,18 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
                 from one run by either alone"
         ));
     }
-    if let (Some(max_evaluations), Work::Run(snapshot)) = (flags.max_evaluations, &mut saved.work) {
+    if let (Some(max_evaluations), PendingWork::Run(snapshot)) = (flags.max_evaluations, &mut saved.work) {
         snapshot.allow(max_evaluations);
     }
     let damaged = || Failure::new(Exit::Io, "the command line in the checkpoint cannot be read");
     match (Flags::try_parse_from(&saved.arguments).map_err(|_| damaged())?.command, &saved.work) {
-        (Command::Run(mut run), Work::Run(_)) => {
+        (Command::Run(mut run), PendingWork::Run(_)) => {
             run.scene.tell = flags.tell.clone();
             run.checkpoints = flags.checkpoints.clone();
             simulate::resume(&run, saved, flags.until, folder, checkpoints)
         }
         #[cfg(feature = "digits")]
-        (Command::Run(mut run), Work::Digits(_)) => {
+        (Command::Run(mut run), PendingWork::Digits(_)) => {
             if flags.until.is_some() || flags.max_evaluations.is_some() {
                 let text = "--until and --max-evaluations: a run in many digits goes on as it was \
                     begun\nhint: leave them out";
@@ -85,15 +87,15 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
             run.checkpoints = flags.checkpoints.clone();
             super::digits::resume(&run, saved, folder, checkpoints)
         }
-        (Command::Sweep(_), Work::Sweep(..)) if flags.until.is_some() => Err(Failure::new(
+        (Command::Sweep(_), PendingWork::Sweep(..)) if flags.until.is_some() => Err(Failure::new(
             Exit::Usage,
             "--until: the points of a sweep have one horizon\nhint: a new sweep",
         )),
-        (Command::Sweep(_), Work::Sweep(..)) if flags.max_evaluations.is_some() => Err(Failure::new(
+        (Command::Sweep(_), PendingWork::Sweep(..)) if flags.max_evaluations.is_some() => Err(Failure::new(
             Exit::Usage,
             "--max-evaluations: the points of a sweep have one limit\nhint: a new sweep",
         )),
-        (Command::Sweep(mut sweep), Work::Sweep(..)) => {
+        (Command::Sweep(mut sweep), PendingWork::Sweep(..)) => {
             sweep.scene.tell = flags.tell.clone();
             sweep.checkpoints = flags.checkpoints.clone();
             sweep::resume(&sweep, saved, folder, checkpoints)

@@ -3,7 +3,7 @@
 
 use super::failure::{Exit, Failure};
 use super::flags::SensitivityFlags;
-use super::study::{Study, StudyFolder};
+use super::study::{StudyFiles, StudyFolder};
 use super::{interrupt, load_template};
 use crate::report::sensitivity as report;
 use crate::run::files::{SENSITIVITY, SENSITIVITY_RECORD, SPECTRUM, SPECTRUM_RECORD};
@@ -43,7 +43,7 @@ pub fn run(flags: &SensitivityFlags) -> Result<(), Failure> {
     folder.publish(study, FILES[usize::from(flags.lyapunov)])
 }
 
-fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<Study, Failure> {
+fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<StudyFiles, Failure> {
     let usage = |text: &str| Failure::new(Exit::Usage, text);
     if flags.of.is_empty() {
         return Err(usage(
@@ -91,7 +91,7 @@ fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<Study, F
         true => Vec::new(),
         false => vec![(SENSITIVITY, report::table(&found, &sigmas).into_bytes())],
     };
-    Ok(Study {
+    Ok(StudyFiles {
         files,
         record: SENSITIVITY_RECORD,
         object: report::object(&found, &sigmas),
@@ -99,14 +99,14 @@ fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<Study, F
         #[cfg(feature = "charts")]
         pictures: flags.folder.charts.drawn(|| report::charts(&found, &sigmas))?,
         failure,
-        ..Study::default()
+        ..StudyFiles::default()
     })
 }
 
-fn spectrum(template: &Template, flags: &SensitivityFlags) -> Result<Study, Failure> {
+fn spectrum(template: &Template, flags: &SensitivityFlags) -> Result<StudyFiles, Failure> {
     let found = lyapunov(template, flags.at, flags.rtol, &mut interrupt::is_asked)?;
     let failure = found.lost.as_ref().map(|lost| Failure::new(Exit::Stopped, lost.clone()));
-    Ok(Study {
+    Ok(StudyFiles {
         files: vec![(SPECTRUM, report::spectrum_table(&found).into_bytes())],
         record: SPECTRUM_RECORD,
         object: report::spectrum_object(&found),
@@ -114,6 +114,6 @@ fn spectrum(template: &Template, flags: &SensitivityFlags) -> Result<Study, Fail
         #[cfg(feature = "charts")]
         pictures: flags.folder.charts.drawn(|| report::spectrum_charts(&found))?,
         failure,
-        ..Study::default()
+        ..StudyFiles::default()
     })
 }

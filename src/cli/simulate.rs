@@ -11,8 +11,8 @@ use super::failure::{Exit, Failure};
 use super::flags::RunFlags;
 use super::interrupt::{self, CheckpointTimer};
 use super::output::{name_files, print, print_objects};
-use super::progress::Progress;
-use super::resume::{Saved, Work};
+use super::progress::RunProgress;
+use super::resume::{PendingWork, SavedWork};
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::run::async_writer::AsyncWriter;
@@ -67,7 +67,7 @@ pub(super) fn typed(arguments: &[String], set: &[Override]) -> Vec<String> {
 }
 
 /// What is run, and what was said on the command line.
-struct Task<'a> {
+struct SimulateTask<'a> {
     scene: &'a Scene,
     mechanism: &'a Arc<Mechanism>,
     flags: &'a RunFlags,
@@ -101,7 +101,7 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     let notes = super::stays(&flags.scene, &text, &scene);
     plans.iter_mut().for_each(|plan| plan.notes.extend(notes.iter().cloned()));
     let folders = folders(&requests, &plans, &mechanism);
-    let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments };
+    let task = SimulateTask { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments };
     let mut done = Vec::new();
     for (plan, folder) in plans.into_iter().zip(&folders) {
         done.push(task.run(plan, folder)?);
@@ -116,14 +116,14 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
 /// As [`run`], or a checkpoint that does not fit.
 pub fn resume(
     flags: &RunFlags,
-    saved: Saved,
+    saved: SavedWork,
     until: Option<f64>,
     folder: Folder,
     checkpoints: Checkpoints,
 ) -> Result<(), Failure> {
     interrupt::listen()?;
-    let Saved { arguments, scene: text, cursor, work, .. } = saved;
-    let Work::Run(mut snapshot) = work else { return Err(ResumeError::Misfit.into()) };
+    let SavedWork { arguments, scene: text, cursor, work, .. } = saved;
+    let PendingWork::Run(mut snapshot) = work else { return Err(ResumeError::Misfit.into()) };
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     if let Some(until) = until
         && !snapshot.extend(until)
@@ -142,7 +142,8 @@ pub fn resume(
     let running =
         Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?.timed(wall_clock);
     let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
-    let task = Task { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
+    let task =
+        SimulateTask { scene: &scene, mechanism: &mechanism, flags, text: &text, arguments: &arguments };
     let done = vec![task.finish(running, AsyncWriter::new(table), Pages::default(), folder, checkpoints)?];
     conclude(&scene, &mechanism, done, flags)
 }
@@ -165,7 +166,7 @@ fn conclude(scene: &Scene, mechanism: &Mechanism, done: Vec<Done>, flags: &RunFl
     done.into_iter().find_map(|done| done.failure).map_or(Ok(()), |failure| Err(failure.told()))
 }
 
-impl Task<'_> {
+impl SimulateTask<'_> {
     /// Runs one plan in a folder of its own.
     fn run(&self, plan: Plan, folder: &str) -> Result<Done, Failure> {
         let Self { scene, mechanism, flags, .. } = *self;
@@ -237,7 +238,8 @@ impl Task<'_> {
             self.save(running, writer, folder, checkpoints)?;
         }
         let mut checkpoint_timer = CheckpointTimer::new(every);
-        let mut progress = Progress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
+        let mut progress =
+            RunProgress::new(&self.scene.name, running.plan().until, self.flags.scene.tell.quiet);
         loop {
             let mut observer = |sample: &Sample| {
                 page.see(writer.write(sample)?);
@@ -277,12 +279,12 @@ impl Task<'_> {
     ) -> Result<(), Failure> {
         let failed = |error| folder.failed(TRAJECTORY, error);
         let stream = writer.table().and_then(Table::written).map_err(failed)?;
-        checkpoints.save(&Saved {
+        checkpoints.save(&SavedWork {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
             scene: self.text.to_owned(),
             cursor: stream.cursor().map_err(failed)?,
-            work: Work::Run(Box::new(running.snapshot())),
+            work: PendingWork::Run(Box::new(running.snapshot())),
         })?;
         stream.outlive();
         Ok(())

@@ -4,11 +4,11 @@ use super::failure::{Exit, Failure};
 use super::flags::StressFlags;
 use super::interrupt;
 use super::output::{name_files, print, print_object};
-use super::progress::Points;
+use super::progress::SweepProgress;
 use crate::report;
 use crate::run::Folder;
 use crate::run::files::{STRESS, STRESS_RECORD};
-use crate::run::stress::{Case, Expected, Line, Stress, Verdict, stress};
+use crate::run::stress::{Case, Expected, Stress, StressLine, Verdict, stress};
 use crate::scene::{read_text, source_name};
 
 /// The files it may leave; those of an earlier one in the same folder go with it.
@@ -28,7 +28,7 @@ pub fn run(flags: &StressFlags) -> Result<(), Failure> {
     interrupt::listen()?;
     let plan = plan(flags)?;
     let mut folder = Folder::open(&flags.out.join("stress"), flags.force)?;
-    let mut progress = Points::new("stress", 0, plan.count() as u64, flags.tell.quiet);
+    let mut progress = SweepProgress::new("stress", 0, plan.count() as u64, flags.tell.quiet);
     let lines = stress(&plan, &mut |finished| {
         progress.see(finished as u64);
         !interrupt::is_asked()
@@ -82,7 +82,12 @@ fn plan(flags: &StressFlags) -> Result<Stress, Failure> {
     })
 }
 
-fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags) -> Result<(), Failure> {
+fn publish(
+    plan: &Stress,
+    lines: &[StressLine],
+    folder: &mut Folder,
+    flags: &StressFlags,
+) -> Result<(), Failure> {
     if flags.force {
         folder.clear(FILES)?;
     }
@@ -103,7 +108,12 @@ fn publish(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFla
 }
 
 #[cfg(feature = "charts")]
-fn draw(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags) -> Result<(), Failure> {
+fn draw(
+    plan: &Stress,
+    lines: &[StressLine],
+    folder: &mut Folder,
+    flags: &StressFlags,
+) -> Result<(), Failure> {
     use crate::run::stress::stability;
     if flags.charts.no_charts {
         return Ok(());
@@ -111,9 +121,10 @@ fn draw(plan: &Stress, lines: &[Line], folder: &mut Folder, flags: &StressFlags)
     flags.charts.keep(folder, MATRIX, &report::stress::matrix(plan, lines)?, &flags.tell)?;
     for (name, file) in STABILITY {
         let Some(method) = plan.methods.iter().find(|method| method.info().name == name) else { continue };
-        let mut progress: Option<Points> = None;
+        let mut progress: Option<SweepProgress> = None;
         let map = stability(*method, &mut |finished, count| {
-            let bar = progress.get_or_insert_with(|| Points::new(name, 0, count as u64, flags.tell.quiet));
+            let bar =
+                progress.get_or_insert_with(|| SweepProgress::new(name, 0, count as u64, flags.tell.quiet));
             bar.see(finished as u64);
             !interrupt::is_asked()
         });

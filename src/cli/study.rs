@@ -15,7 +15,7 @@ use std::path::PathBuf;
 
 /// The results of a study.
 #[derive(Default)]
-pub(super) struct Study {
+pub(super) struct StudyFiles {
     /// Tables and pages, by name.
     pub files: Vec<(&'static str, Vec<u8>)>,
     /// The name of the record, and what is in it.
@@ -74,8 +74,8 @@ impl<'a> StudyFolder<'a> {
     ///
     /// # Errors
     /// A file that cannot be written, or what is missing in the results.
-    pub fn publish(self, study: Study, may: &[&str]) -> Result<(), Failure> {
-        let Study { files: tables, record, mut object, text, failure, .. } = study;
+    pub fn publish(self, study: StudyFiles, may: &[&str]) -> Result<(), Failure> {
+        let StudyFiles { files: tables, record, mut object, text, failure, .. } = study;
         let mut folder = Folder::open(&self.path, self.flags.force)?;
         if self.flags.force {
             folder.clear(may)?;

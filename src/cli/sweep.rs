@@ -4,16 +4,16 @@ use super::failure::{Exit, Failure};
 use super::flags::SweepFlags;
 use super::interrupt::{self, CheckpointTimer};
 use super::output::{name_files, print, print_object};
-use super::progress::Points;
-use super::resume::{Saved, Work};
+use super::progress::SweepProgress;
+use super::resume::{PendingWork, SavedWork};
 use crate::report;
 use crate::report::page::counted;
 #[cfg(feature = "charts")]
-use crate::report::sweep::{Curve, NoChart};
+use crate::report::sweep::{NoChart, SweepChart};
 use crate::run::checkpoint::sealed;
 use crate::run::files::{PART, SWEEP, SWEEP_RECORD};
 use crate::run::{
-    Checkpoints, Folder, Limits, Point, PointObserver, Request, ResumeError, Stream, Sweep, SweepError,
+    Checkpoints, Folder, Limits, PointObserver, Request, ResumeError, Stream, Sweep, SweepError, SweepPoint,
     SweepTable, Totals, sweep_on,
 };
 use crate::scene::{Template, points_that_stay, read_text, source_name};
@@ -56,7 +56,7 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
         SweepTable::new(&plan, folder.begin(SWEEP)?).map_err(|error| folder.failed(SWEEP, error.into()))?;
     let writer = Writer {
         table,
-        progress: Points::new(&plan.scene().name, 0, plan.count(), flags.scene.tell.quiet),
+        progress: SweepProgress::new(&plan.scene().name, 0, plan.count(), flags.scene.tell.quiet),
         checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints: Checkpoints::none(&path),
         text: &text,
@@ -75,20 +75,20 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
 /// As [`run`], or a checkpoint that does not fit.
 pub fn resume(
     flags: &SweepFlags,
-    saved: Saved,
+    saved: SavedWork,
     folder: Folder,
     checkpoints: Checkpoints,
 ) -> Result<(), Failure> {
     interrupt::listen()?;
-    let Saved { arguments, scene: text, cursor, work, .. } = saved;
-    let Work::Sweep(seen, drawn) = work else { return Err(ResumeError::Misfit.into()) };
+    let SavedWork { arguments, scene: text, cursor, work, .. } = saved;
+    let PendingWork::Sweep(seen, drawn) = work else { return Err(ResumeError::Misfit.into()) };
     let plan = prepared(flags, &text)?;
     if seen.points() > plan.count() {
         return Err(ResumeError::Misfit.into());
     }
     flags.scene.remark(&format!("{}; from point {} on", report::setting(plan.plan()), seen.points()));
     #[cfg(feature = "charts")]
-    let curve = match drawn.map(|bytes| postcard::from_bytes::<Curve>(&bytes)) {
+    let curve = match drawn.map(|bytes| postcard::from_bytes::<SweepChart>(&bytes)) {
         Some(Ok(curve)) if curve.fits(&plan, seen.points()) => Some(curve),
         None => None,
         Some(_) => return Err(ResumeError::Misfit.into()),
@@ -97,7 +97,7 @@ pub fn resume(
     drop(drawn);
     let writer = Writer {
         table: SweepTable::going_on(&plan, folder.take_up(SWEEP, &cursor)?),
-        progress: Points::new(&plan.scene().name, seen.points(), plan.count(), flags.scene.tell.quiet),
+        progress: SweepProgress::new(&plan.scene().name, seen.points(), plan.count(), flags.scene.tell.quiet),
         checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints,
         text: &text,
@@ -131,7 +131,7 @@ fn finish(plan: &Sweep, mut writer: Writer, seen: Totals, flags: &SweepFlags) ->
 
 /// What joins a part of a sweep to the others.
 #[derive(Serialize, Deserialize)]
-pub struct Part {
+pub struct SweepPart {
     /// The version that ran it.
     pub version: String,
     /// The command line, and the text of the scene it names.
@@ -148,7 +148,7 @@ pub struct Swept<'a> {
     pub plan: &'a Sweep,
     pub totals: Totals,
     #[cfg(feature = "charts")]
-    pub curve: Option<Curve>,
+    pub curve: Option<SweepChart>,
 }
 
 /// Gives the table its name and publishes the rest; of a part, what joins it to the others.
@@ -162,7 +162,7 @@ fn publish(plan: &Sweep, writer: Writer, totals: Totals, flags: &SweepFlags) -> 
     }
     let hash = folder.keep(stream)?;
     if plan.shard().is_some() {
-        let part = Part {
+        let part = SweepPart {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: arguments.to_vec(),
             scene: text.to_owned(),
@@ -256,7 +256,7 @@ fn folder_name(plan: &Sweep) -> String {
 /// Writes points as they come, and a checkpoint now and then.
 struct Writer<'a> {
     table: SweepTable<Stream>,
-    progress: Points,
+    progress: SweepProgress,
     checkpoint_timer: CheckpointTimer,
     checkpoints: Checkpoints,
     folder: Folder,
@@ -266,7 +266,7 @@ struct Writer<'a> {
     /// What ended the sweep, where it was no point.
     trouble: Option<Failure>,
     #[cfg(feature = "charts")]
-    curve: Option<Curve>,
+    curve: Option<SweepChart>,
 }
 
 impl Writer<'_> {
@@ -283,12 +283,12 @@ impl Writer<'_> {
         let failed = |error| self.folder.failed(SWEEP, error);
         let drawn = self.drawn()?;
         let stream = self.table.written().map_err(failed)?;
-        self.checkpoints.save(&Saved {
+        self.checkpoints.save(&SavedWork {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
             scene: self.text.to_owned(),
             cursor: stream.cursor().map_err(failed)?,
-            work: Work::Sweep(seen.clone(), drawn),
+            work: PendingWork::Sweep(seen.clone(), drawn),
         })?;
         stream.outlive();
         Ok(())
@@ -296,7 +296,7 @@ impl Writer<'_> {
 }
 
 impl PointObserver for Writer<'_> {
-    fn see(&mut self, point: &Point) -> std::io::Result<()> {
+    fn see(&mut self, point: &SweepPoint) -> std::io::Result<()> {
         #[cfg(feature = "charts")]
         if let Some(curve) = &mut self.curve {
             curve.see(point);
@@ -323,14 +323,14 @@ impl PointObserver for Writer<'_> {
 
 /// The chart, where there can be one; a column that was asked for must be there.
 #[cfg(feature = "charts")]
-fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<Curve>, Failure> {
+fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<SweepChart>, Failure> {
     if flags.charts.no_charts && !flags.html {
         return Ok(None);
     }
     if flags.html {
         report::view::holds(plan)?;
     }
-    match Curve::new(plan, flags.map.as_deref()) {
+    match SweepChart::new(plan, flags.map.as_deref()) {
         Ok(curve) => Ok(Some(curve)),
         Err(reason) if flags.html => Err(Failure::new(Exit::Usage, format!("--html: {reason}"))),
         Err(reason) if flags.map.is_some() => Err(Failure::new(Exit::Usage, format!("--map: {reason}"))),
@@ -342,7 +342,7 @@ fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<Curve>, Failure> {
 }
 
 #[cfg(feature = "charts")]
-fn draw(plan: &Sweep, curve: &Curve, folder: &mut Folder, flags: &SweepFlags) -> Result<(), Failure> {
+fn draw(plan: &Sweep, curve: &SweepChart, folder: &mut Folder, flags: &SweepFlags) -> Result<(), Failure> {
     let name = if plan.grid().axes().len() == 2 { "map" } else { "profile" };
     match curve.draw(plan)? {
         Ok(picture) => flags.charts.keep(folder, name, &picture, &flags.scene.tell)?,

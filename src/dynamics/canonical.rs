@@ -16,7 +16,7 @@
 
 mod stages;
 
-use super::constraint::Posture;
+use super::constraint::ConstraintArguments;
 use super::energy::moment;
 use super::jacobian::{LANES, Slopes};
 use super::kernel::{Kernel, dot};
@@ -25,23 +25,23 @@ use super::stiffness::Stiffness;
 use super::tree::{self, size};
 use super::{Form, Mechanism, Motion, OdeSystem, Points, State, Time};
 use crate::arithmetic::{DoubleDouble, Real, Scalar};
-use stages::Stages;
+use stages::LaneStages;
 use std::sync::Arc;
 
 /// Equations in coordinates and momenta, for `N` bodies (any number where `N` is 0); `WORK` carries p_t.
 #[derive(Clone, Debug)]
 pub struct Canonical<const N: usize, const WORK: bool> {
     mechanism: Arc<Mechanism>,
-    work: Scratch<f64>,
-    exact: Scratch<DoubleDouble>,
-    stages: Stages,
+    work: CanonicalScratch<f64>,
+    exact: CanonicalScratch<DoubleDouble>,
+    stages: LaneStages,
     /// For the Jacobian; made when first asked for.
-    slopes: Option<Box<Scratch<Slopes>>>,
+    slopes: Option<Box<CanonicalScratch<Slopes>>>,
 }
 
 /// Scratch space of one evaluation.
 #[derive(Clone, Debug)]
-struct Scratch<T> {
+struct CanonicalScratch<T> {
     kernel: Kernel<T>,
     /// The known part of every angle at the time of the evaluation (n); not looked at without an account.
     drive: Vec<Phase<T>>,
@@ -58,7 +58,7 @@ struct Scratch<T> {
     u_rate: Vec<T>,
 }
 
-impl<T: Scalar> Scratch<T> {
+impl<T: Scalar> CanonicalScratch<T> {
     fn new(mechanism: &Mechanism) -> Self {
         let (n, f) = (mechanism.coordinates(), mechanism.partition.count());
         let zeros = || vec![T::ZERO; n];
@@ -134,7 +134,7 @@ impl<T: Scalar> Scratch<T> {
         for force in &mechanism.forces {
             force.pull_by_potential(
                 self.time,
-                Posture { phi: y, z: &kernel.z, omega: &self.omega },
+                ConstraintArguments { phi: y, z: &kernel.z, omega: &self.omega },
                 &mut kernel.load,
             );
         }
@@ -161,7 +161,7 @@ impl<T: Scalar> Scratch<T> {
             for force in &mechanism.forces {
                 force.pull_applied(
                     self.time,
-                    Posture { phi: y, z: &kernel.z, omega: &self.omega },
+                    ConstraintArguments { phi: y, z: &kernel.z, omega: &self.omega },
                     &mut kernel.load,
                 );
             }
@@ -174,7 +174,7 @@ impl<T: Scalar> Scratch<T> {
     }
 }
 
-impl<T: Real> Scratch<T> {
+impl<T: Real> CanonicalScratch<T> {
     /// Takes the known parts of all angles at one time.
     #[inline]
     fn drive_at(&mut self, mechanism: &Mechanism, t: Time) {
@@ -199,8 +199,8 @@ impl<const N: usize, const WORK: bool> Canonical<N, WORK> {
     pub fn with_lanes(mechanism: Arc<Mechanism>, portable: bool) -> Self {
         debug_assert!(N == 0 || N == mechanism.size());
         debug_assert!(WORK || !mechanism.has_work_integral());
-        let (work, exact) = (Scratch::new(&mechanism), Scratch::new(&mechanism));
-        Self { work, exact, stages: Stages::new(&mechanism, portable), slopes: None, mechanism }
+        let (work, exact) = (CanonicalScratch::new(&mechanism), CanonicalScratch::new(&mechanism));
+        Self { work, exact, stages: LaneStages::new(&mechanism, portable), slopes: None, mechanism }
     }
 }
 
@@ -234,7 +234,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
     }
 
     fn jacobian(&mut self, t: Time, y: &[f64], y_by_y: &mut [f64]) -> bool {
-        let scratch = self.slopes.get_or_insert_with(|| Box::new(Scratch::new(&self.mechanism)));
+        let scratch = self.slopes.get_or_insert_with(|| Box::new(CanonicalScratch::new(&self.mechanism)));
         slopes(scratch, WORK, &self.mechanism, t, y, y_by_y);
         true
     }
@@ -267,7 +267,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
 
 /// dy'/dy row by row (d × d); not generic, so that it is compiled once.
 fn slopes(
-    scratch: &mut Scratch<Slopes>,
+    scratch: &mut CanonicalScratch<Slopes>,
     work_integral: bool,
     mechanism: &Mechanism,
     t: Time,

@@ -11,10 +11,10 @@ mod turns;
 
 use super::assembly::Assembly;
 use super::constraint::{self, ConstraintEquation, Site};
-use super::force::formula::{Driven, Formulas};
-use super::force::{Action, Spring, Torsion, UserForce, Vibration};
+use super::force::formula::{DrivenPart, Formulas};
+use super::force::{AppliedAction, CompiledSpring, Torsion, UserForce, Vibration};
 use super::forest::Forest;
-use super::friction::{Friction, Mode, check_lines, frictions};
+use super::friction::{CompiledFriction, FrictionMode, check_lines, frictions};
 use super::impact::Contact;
 use super::output::Outputs;
 use super::partition::CoordinatePartition;
@@ -54,7 +54,7 @@ pub struct Mechanism {
     /// The hinge trees' matrices.
     pub tree: Tree,
     /// Springs and dampers.
-    pub springs: Vec<Spring>,
+    pub springs: Vec<CompiledSpring>,
     /// Torsion springs and dampers.
     pub torsions: Vec<Torsion>,
     /// The fast vibration of the rigid spring, where it carries energy.
@@ -62,7 +62,7 @@ pub struct Mechanism {
     /// The slowest vibration of a rigid spring at the start, whether it carries energy or not \[rad/s\].
     pub rigid_rate: Option<f64>,
     /// Applied forces and torques.
-    pub actions: Vec<Action>,
+    pub actions: Vec<AppliedAction>,
     /// Forces from outside the crate.
     pub forces: Vec<UserForce>,
     /// The scene's formulas, and where they are recorded with other parameters or on other branches: the
@@ -89,9 +89,9 @@ pub struct Mechanism {
     /// [`Mechanism::holding`].
     pub held: Vec<usize>,
     /// Places with dry friction.
-    pub frictions: Vec<Friction>,
+    pub frictions: Vec<CompiledFriction>,
     /// What each of them does; all are open as compiled: see [`Mechanism::moving`].
-    pub modes: Vec<Mode>,
+    pub modes: Vec<FrictionMode>,
     /// The driven angles solved for: coordinates left when the rows are eliminated.
     pub partition: CoordinatePartition,
     /// Gravity \[m/s²\].
@@ -279,7 +279,7 @@ impl Mechanism {
             motors: scene.motors.len(),
             contacts,
             held: Vec::new(),
-            modes: vec![Mode::Open; frictions.len()],
+            modes: vec![FrictionMode::Open; frictions.len()],
             frictions,
             partition,
             gravity,
@@ -301,7 +301,7 @@ impl Mechanism {
         {
             let recorded = laws.formulas.record(&parameters, &modes)?;
             mechanism.forces.splice(..recorded.len(), recorded);
-            for (Driven { name, is_wall }, profile) in laws.formulas.profiles(&parameters, &modes) {
+            for (DrivenPart { name, is_wall }, profile) in laws.formulas.profiles(&parameters, &modes) {
                 let row = match is_wall {
                     true => {
                         mechanism.contacts.iter_mut().map(|wall| &mut wall.row).find(|row| row.name == *name)

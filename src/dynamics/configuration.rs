@@ -11,10 +11,10 @@ use crate::arithmetic::{Complex, Over, Real, Scalar};
 /// Bodies are named by their number in the order of the scene's bars ([`Mechanism::body`]), points by a
 /// [`Site`] ([`Mechanism::site`]).
 #[derive(Clone, Copy)]
-pub struct Configuration<'a, S, C = f64>(&'a dyn Source<S, C>);
+pub struct Configuration<'a, S, C = f64>(&'a dyn ConfigurationSource<S, C>);
 
 /// What a configuration is read from.
-pub trait Source<S, C = f64> {
+pub trait ConfigurationSource<S, C = f64> {
     /// Time \[s\].
     fn time(&self) -> S;
     /// Angle of a body \[rad\], winding.
@@ -33,7 +33,7 @@ pub trait Source<S, C = f64> {
 
 impl<'a, S: Scalar, C> Configuration<'a, S, C> {
     /// That of a source.
-    pub fn new(source: &'a dyn Source<S, C>) -> Self {
+    pub fn new(source: &'a dyn ConfigurationSource<S, C>) -> Self {
         Self(source)
     }
 
@@ -92,7 +92,7 @@ pub struct Values<'a, S> {
     pub omega: &'a [S],
 }
 
-impl<S: Scalar + Over<C>, C: Real> Source<S, C> for Values<'_, S> {
+impl<S: Scalar + Over<C>, C: Real> ConfigurationSource<S, C> for Values<'_, S> {
     fn time(&self) -> S {
         self.time
     }

@@ -15,9 +15,9 @@
 pub mod metric;
 pub mod scale;
 
-use self::metric::{Basis, Gradient, Metric};
-use super::constraint::Posture;
-use super::friction::Mode;
+use self::metric::{Basis, ContactMetric, MetricRow};
+use super::constraint::ConstraintArguments;
+use super::friction::FrictionMode;
 use super::impact::{Contact, NO_FREEDOM};
 use super::kernel::dot;
 use super::{Mechanism, Time};
@@ -39,7 +39,7 @@ impl Mechanism {
     ///
     /// Nothing is renumbered: the event function of a contact that is held is its force instead of its gap.
     pub fn holding(&self, contacts: &[usize]) -> Self {
-        self.moving(contacts, &vec![Mode::Open; self.frictions.len()])
+        self.moving(contacts, &vec![FrictionMode::Open; self.frictions.len()])
     }
 
     /// The elements at these coordinates \[rad, m\].
@@ -60,19 +60,19 @@ impl Mechanism {
     /// Coordinates \[rad, m\] and rates \[rad/s, m/s\].  A point stays where it would rebound to less than
     /// [`REST_HEIGHT`] and be pressed.
     pub fn staying(&self, touching: &[usize], t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<usize>> {
-        let (metric, z) = (Metric::at(self, t, phi, omega)?, self.elements(phi));
-        let at = Posture { phi, z: &z, omega };
+        let (metric, z) = (ContactMetric::at(self, t, phi, omega)?, self.elements(phi));
+        let at = ConstraintArguments { phi, z: &z, omega };
         let acceleration = metric.acceleration();
         let met = |&contact: &usize| {
-            Met::new(
+            MetContact::new(
                 &self.contacts[contact],
                 &metric,
                 &acceleration,
-                Gradient::of(&self.contacts[contact].row, t, at),
+                MetricRow::of(&self.contacts[contact].row, t, at),
                 omega,
             )
         };
-        let points: Vec<Met> = touching.iter().map(met).collect();
+        let points: Vec<MetContact> = touching.iter().map(met).collect();
         let mut set: Vec<usize> = Vec::new();
         // Every round adds or drops one point; more rounds than this would go in a circle.
         for _ in 0..4 * points.len() + 4 {
@@ -130,7 +130,7 @@ impl Contact {
 }
 
 /// A contact that touches, as the set of those that stay is found.
-struct Met<'a> {
+struct MetContact<'a> {
     contact: &'a Contact,
     /// What the constraints leave of its freedom, and the size of all of it.
     free: DVector<f64>,
@@ -144,15 +144,15 @@ struct Met<'a> {
     is_dead: bool,
 }
 
-impl<'a> Met<'a> {
+impl<'a> MetContact<'a> {
     fn new(
         contact: &'a Contact,
-        metric: &Metric,
+        metric: &ContactMetric,
         acceleration: &DVector<f64>,
-        gradient: Gradient,
+        gradient: MetricRow,
         omega: &[f64],
     ) -> Self {
-        let Gradient { row, along } = gradient;
+        let MetricRow { row, along } = gradient;
         let column = metric.column(&along);
         let parts = column.component_mul(acceleration);
         Self {

@@ -8,7 +8,7 @@
 //! Unknowns: u (f), u' (f), work of motors, dampers and applied forces \[J\].  The rows hold exactly,
 //! whatever the method.
 
-use super::constraint::Posture;
+use super::constraint::ConstraintArguments;
 use super::gap::turning;
 use super::jacobian::Jacobian;
 use super::kernel::{Bias, Kernel};
@@ -121,7 +121,7 @@ impl<const N: usize> Elimination<N> {
         for k in 0..n {
             power -= (load[k] - given[k]) * drive_rate[k];
         }
-        let at = Posture { phi: &self.phi, z: &kernel.z, omega };
+        let at = ConstraintArguments { phi: &self.phi, z: &kernel.z, omega };
         power += mechanism.force_power_beside(t, at, kernel.law_power);
         rate[..f].copy_from_slice(&u_rate[..f]);
         rate[f..2 * f].copy_from_slice(&acceleration[..f]);

@@ -3,8 +3,8 @@
 //! Written over the scalar trait and used in double-double by the monitors: at 1e-15 of the scale an energy
 //! evaluated in plain doubles shows its own rounding.
 
-use super::constraint::Posture;
-use super::force::action::Kind;
+use super::constraint::ConstraintArguments;
+use super::force::action::Applied;
 use super::kernel::{Kernel, dot};
 use super::{Mechanism, Motion, Time, tree};
 use crate::arithmetic::lanes::{self, Code, Lanes};
@@ -58,10 +58,9 @@ impl Mechanism {
     pub(super) fn forces_at_start(&self, start: &Motion, size: f64) -> f64 {
         let [phi, omega] = start.rounded();
         let z = self.elements(&phi);
-        let magnitudes = self
-            .forces
-            .iter()
-            .map(|force| force.magnitudes(start.time.hi, Posture { phi: &phi, z: &z, omega: &omega }));
+        let magnitudes = self.forces.iter().map(|force| {
+            force.magnitudes(start.time.hi, ConstraintArguments { phi: &phi, z: &z, omega: &omega })
+        });
         magnitudes.map(|[force, torque]| force * size + torque).sum()
     }
 
@@ -195,13 +194,21 @@ impl Mechanism {
     /// Adds the potentials of forces from outside \[J\] to a sum.
     #[inline(always)]
     fn other_energy<T: Real>(&self, z: &[Complex<T>], phi: &[T], sum: T) -> T {
-        self.forces.iter().fold(sum, |sum, force| sum + force.energy(T::ZERO, Posture { phi, z, omega: &[] }))
+        self.forces
+            .iter()
+            .fold(sum, |sum, force| sum + force.energy(T::ZERO, ConstraintArguments { phi, z, omega: &[] }))
     }
 
     /// Adds the generalized forces \[N·m, N\] of springs, dampers and applied forces; returns the power of
     /// those that are laws of their own \[W\], which their evaluation has at hand.
     #[inline(always)]
-    pub fn add_applied_forces<T: Real>(&self, t: Time, at: Posture<T>, stretch: &[T], load: &mut [T]) -> T {
+    pub fn add_applied_forces<T: Real>(
+        &self,
+        t: Time,
+        at: ConstraintArguments<T>,
+        stretch: &[T],
+        load: &mut [T],
+    ) -> T {
         for (s, spring) in self.springs.iter().enumerate() {
             let force = match stretch.get(s) {
                 Some(&stretch) if spring.free_length > 0.0 => spring.stretched(stretch, at.z, at.omega),
@@ -231,7 +238,12 @@ impl Mechanism {
         let column = |k: usize| {
             moved[k].slope = [1.0];
             let mut load = vec![Dual::<1>::ZERO; phi.len()];
-            self.add_applied_forces(t, Posture { phi: &phi, z: &z, omega: &moved }, &[], &mut load);
+            self.add_applied_forces(
+                t,
+                ConstraintArguments { phi: &phi, z: &z, omega: &moved },
+                &[],
+                &mut load,
+            );
             moved[k].slope = [0.0];
             load.iter().map(|load| load.slope[0]).collect()
         };
@@ -239,14 +251,19 @@ impl Mechanism {
     }
 
     /// Power of dampers and applied forces on the bodies \[W\].
-    pub fn force_power<T: Real>(&self, t: Time, at: Posture<T>) -> T {
+    pub fn force_power<T: Real>(&self, t: Time, at: ConstraintArguments<T>) -> T {
         let laws = self.forces.iter().fold(T::ZERO, |power, force| power + force.work_rate(moment(t), at));
         self.force_power_beside(t, at, laws)
     }
 
     /// The same where the power of the [laws](Self::add_applied_forces) is known.
     #[inline(always)]
-    pub fn force_power_beside<T: Real>(&self, t: Time, Posture { z, omega, .. }: Posture<T>, laws: T) -> T {
+    pub fn force_power_beside<T: Real>(
+        &self,
+        t: Time,
+        ConstraintArguments { z, omega, .. }: ConstraintArguments<T>,
+        laws: T,
+    ) -> T {
         let mut power = T::ZERO;
         for spring in self.springs.iter().filter(|spring| spring.damping != 0.0) {
             power += spring.drag_power(z, omega);
@@ -277,8 +294,8 @@ impl Mechanism {
         let falling: f64 =
             self.bodies.iter().map(|body| body.mass * self.gravity.norm_squared().sqrt() * size).sum();
         let applied = self.actions.iter().map(|action| match &action.kind {
-            Kind::Force { force, .. } => force.norm_squared().sqrt() * size,
-            Kind::Torque { torque, .. } => torque.abs(),
+            Applied::Force { force, .. } => force.norm_squared().sqrt() * size,
+            Applied::Torque { torque, .. } => torque.abs(),
         });
         let moving = falling + applied.sum::<f64>() + self.forces_at_start(start, size);
         // A start almost at rest is one at rest.

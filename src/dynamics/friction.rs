@@ -23,11 +23,11 @@ pub mod modes;
 mod shared;
 pub mod simultaneous;
 
-pub use modes::{Moment, Paradox, Transition};
+pub use modes::{FrictionMoment, Paradox, Transition};
 
 use super::Mechanism;
 use super::compile::{CompileError, Joint};
-use super::constraint::{self, ConstraintEquation, Measure};
+use super::constraint::{self, ConstraintEquation, RowMeasure};
 use super::forest::Forest;
 use super::impact::Contact;
 use super::law::Law;
@@ -43,7 +43,7 @@ const MOST_ROUNDS: usize = 9;
 
 /// A place with dry friction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Friction<C = f64> {
+pub struct CompiledFriction<C = f64> {
     /// Name of the hinge, slider or wall.
     pub name: String,
     /// Measures the relative displacement \[rad, m\]; its multiplier is tau \[N·m, N\].
@@ -71,7 +71,7 @@ pub enum Normal {
 
 /// What a place with friction does at the moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-pub enum Mode<C = f64> {
+pub enum FrictionMode<C = f64> {
     /// Nothing: its wall is not touched.
     #[default]
     Open,
@@ -84,17 +84,17 @@ pub enum Mode<C = f64> {
     Strained(f64),
 }
 
-impl<C: Copy> Mode<C> {
+impl<C: Copy> FrictionMode<C> {
     /// The same with its displacement as a double.
-    pub fn in_doubles(&self) -> Mode
+    pub fn in_doubles(&self) -> FrictionMode
     where
         C: Real,
     {
         match *self {
-            Self::Open => Mode::Open,
-            Self::Stick(at) => Mode::Stick(at.value()),
-            Self::Slip(sign) => Mode::Slip(sign),
-            Self::Strained(sign) => Mode::Strained(sign),
+            Self::Open => FrictionMode::Open,
+            Self::Stick(at) => FrictionMode::Stick(at.value()),
+            Self::Slip(sign) => FrictionMode::Slip(sign),
+            Self::Strained(sign) => FrictionMode::Strained(sign),
         }
     }
 
@@ -108,7 +108,7 @@ impl<C: Copy> Mode<C> {
     }
 
     /// tau over N of what has its friction at the limit.
-    pub fn coefficient<F: Real>(self, friction: &Friction<F>) -> Option<F> {
+    pub fn coefficient<F: Real>(self, friction: &CompiledFriction<F>) -> Option<F> {
         match self {
             Self::Open | Self::Stick(_) => None,
             Self::Slip(sign) => Some(friction.kinetic.scale(sign)),
@@ -122,7 +122,7 @@ pub(super) fn frictions<C: Real>(
     scene: &Scene<C>,
     forest: &Forest<C>,
     joints: &[Joint<C>],
-) -> Vec<Friction<C>> {
+) -> Vec<CompiledFriction<C>> {
     let of = |friction: &crate::scene::Friction<C>| {
         let (tangent, normal, lever, is_newton) = match friction.at {
             FrictionPlace::Hinge { hinge, radius } => {
@@ -155,21 +155,21 @@ pub(super) fn frictions<C: Real>(
             }
         };
         let (kinetic, stiction) = (friction.kinetic * lever, friction.stiction * lever);
-        Some(Friction { name: tangent.name.clone(), tangent, normal, kinetic, stiction, is_newton })
+        Some(CompiledFriction { name: tangent.name.clone(), tangent, normal, kinetic, stiction, is_newton })
     };
     scene.frictions.iter().filter(|friction| friction.stiction > C::ZERO).filter_map(of).collect()
 }
 
 /// Refuses friction at walls whose lines move with the points that meet them: curves, along which it does not
 /// act.
-pub(super) fn check_lines(frictions: &[Friction], contacts: &[Contact]) -> Result<(), CompileError> {
+pub(super) fn check_lines(frictions: &[CompiledFriction], contacts: &[Contact]) -> Result<(), CompileError> {
     let is_curve = |contact: &&Contact| {
         let terms = contact.point.terms.iter().map(|term| term.0);
         let own: Vec<usize> =
             terms.chain(contact.point.shifts.iter().flat_map(|shift| [shift.0, shift.0 + 1])).collect();
         contact.row.aim.as_ref().is_some_and(|aim| aim.coordinates().any(|k| own.contains(&k)))
     };
-    let contact = |friction: &Friction| match friction.normal {
+    let contact = |friction: &CompiledFriction| match friction.normal {
         Normal::Contact(number) => contacts.get(number),
         _ => None,
     };
@@ -179,7 +179,7 @@ pub(super) fn check_lines(frictions: &[Friction], contacts: &[Contact]) -> Resul
     }
 }
 
-impl<C: Real> Friction<C> {
+impl<C: Real> CompiledFriction<C> {
     /// The relative displacement \[rad, m\] at these coordinates.
     pub fn displacement<T: Over<C>>(&self, phi: &[T], z: &[Complex<T>]) -> T {
         self.tangent.measure.value(phi, z)
@@ -190,8 +190,8 @@ impl<C: Real> Friction<C> {
         let mut row = self.tangent.clone();
         row.name.push_str(".friction");
         match &mut row.measure {
-            Measure::Angle { .. } => row.law = Some(Law { start: at, ..Law::default() }),
-            Measure::Place(place) => place.constant -= at,
+            RowMeasure::Angle { .. } => row.law = Some(Law { start: at, ..Law::default() }),
+            RowMeasure::Place(place) => place.constant -= at,
         }
         row
     }
@@ -208,17 +208,17 @@ impl<C: Real> Friction<C> {
 
 impl Mechanism {
     /// The friction at a wall, by its number.
-    pub fn friction_at(&self, contact: usize) -> Option<&Friction> {
+    pub fn friction_at(&self, contact: usize) -> Option<&CompiledFriction> {
         self.frictions.iter().find(|friction| friction.normal == Normal::Contact(contact))
     }
 
     /// The mechanism with these contacts held and its places with friction in these modes.
-    pub fn moving(&self, contacts: &[usize], modes: &[Mode]) -> Self {
+    pub fn moving(&self, contacts: &[usize], modes: &[FrictionMode]) -> Self {
         let mut mechanism = self.clone();
         mechanism.constraints.truncate(self.standing_rows());
         mechanism.constraints.extend(contacts.iter().map(|&contact| self.contacts[contact].row.clone()));
         let stuck = self.frictions.iter().zip(modes).filter_map(|(friction, mode)| match mode {
-            Mode::Stick(at) => Some(friction.stuck(*at)),
+            FrictionMode::Stick(at) => Some(friction.stuck(*at)),
             _ => None,
         });
         mechanism.constraints.extend(stuck);
@@ -230,17 +230,17 @@ impl Mechanism {
 
     /// How many places stick: their rows are the last.
     pub fn sticking(&self) -> usize {
-        self.modes.iter().filter(|mode| matches!(mode, Mode::Stick(_))).count()
+        self.modes.iter().filter(|mode| matches!(mode, FrictionMode::Stick(_))).count()
     }
 
     /// The places that slide, or rest with their friction at its limit, with tau over N.
-    pub fn sliding(&self) -> impl Iterator<Item = (&Friction, f64)> {
+    pub fn sliding(&self) -> impl Iterator<Item = (&CompiledFriction, f64)> {
         let all = self.frictions.iter().zip(&self.modes);
         all.filter_map(|(friction, mode)| Some((friction, mode.coefficient(friction)?)))
     }
 
     /// The row whose multiplier is the normal force of a place, where it is one.
-    fn normal_row<C>(&self, friction: &Friction<C>) -> Option<usize> {
+    fn normal_row<C>(&self, friction: &CompiledFriction<C>) -> Option<usize> {
         match friction.normal {
             Normal::Joint(_) => None,
             Normal::Rail => self.constraints[..self.standing_rows()]
@@ -257,7 +257,7 @@ impl Mechanism {
     /// these multipliers and joint forces.
     pub(super) fn normal_force<T: Real, C>(
         &self,
-        friction: &Friction<C>,
+        friction: &CompiledFriction<C>,
         multiplier: &[T],
         carried: &[Complex<T>],
     ) -> Complex<T> {

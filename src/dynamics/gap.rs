@@ -12,7 +12,7 @@
 //! Derivatives may be by time or by anything that grows in proportion with it.
 
 use super::Along;
-use super::constraint::Measure;
+use super::constraint::RowMeasure;
 use super::impact::{AWAY, Contact};
 use super::law::Law;
 use crate::arithmetic::Complex;
@@ -29,7 +29,7 @@ impl Contact {
     /// Gap, slope and the magnitude gaps are rounded to, where elements and their derivatives are
     /// `element(k)`, and time goes by at `step_size` \[s\]; `None` for what is no sum of elements.
     pub fn gap_along(&self, at: &Along, mut element: impl FnMut(usize) -> Moving) -> Option<[f64; 3]> {
-        let Measure::Place(place) = &self.row.measure else { return None };
+        let RowMeasure::Place(place) = &self.row.measure else { return None };
         if self.is_off {
             return Some([AWAY, 0.0, AWAY]);
         }
@@ -65,7 +65,7 @@ impl Contact {
     /// A bound of the second derivative of the gap, where those of coordinate k and its square first
     /// derivative are at most `most(k)`, up to the time `t` \[s\] that goes by at `step_size`.
     pub fn gap_bend(&self, t: f64, step_size: f64, mut most: impl FnMut(usize) -> [f64; 2]) -> f64 {
-        let Measure::Place(place) = &self.row.measure else { return f64::INFINITY };
+        let RowMeasure::Place(place) = &self.row.measure else { return f64::INFINITY };
         if self.is_off {
             return 0.0;
         }
@@ -115,7 +115,7 @@ mod tests {
     fn slopes_are_derivatives_and_bounds_are_bounds() {
         let normal = Complex::unit(0.7);
         let point = Point::floating(2).along(0, Complex::new(0.6, 0.1)).along(1, Complex::new(0.2, -0.4));
-        let measure = Measure::Place(Quadratic::along(&point, normal, 2));
+        let measure = RowMeasure::Place(Quadratic::along(&point, normal, 2));
         let row = ConstraintEquation { name: "wall".into(), measure, law: None, push: None, aim: None };
         let contact = Contact { point, length: 0.5, ..Contact::new(row, normal, 1.0) };
         // Two angles and an origin, each a parabola in t.

@@ -13,8 +13,8 @@
 //! energy changes by `-rho (1-e) J w⁻ / 2`. Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with
 //! Unilateral Contacts* (1996), section 8.2 (Newton's law of impact).
 
-use super::constraint::{ConstraintEquation, Measure, Posture};
-use super::contact::metric::{Gradient, Metric};
+use super::constraint::{ConstraintArguments, ConstraintEquation, RowMeasure};
+use super::contact::metric::{ContactMetric, MetricRow};
 use super::contact::scale::magnitudes;
 use super::friction::impact::Shock;
 use super::kernel::dot;
@@ -99,7 +99,7 @@ impl Contact {
     /// The rate of the gap \[m/s\].
     pub fn gap_rate(&self, t: Time, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> f64 {
         let rate = match (&self.row.measure, self.on) {
-            (Measure::Place(place), Some(_)) => {
+            (RowMeasure::Place(place), Some(_)) => {
                 let mut rate = 0.0;
                 place.slopes(z, |k, slope| rate += slope * omega[k]);
                 rate
@@ -156,10 +156,10 @@ impl Mechanism {
         phi: &[f64],
         omega: &[f64],
     ) -> Option<usize> {
-        let metric = Metric::at(self, t, phi, omega)?;
+        let metric = ContactMetric::at(self, t, phi, omega)?;
         let z = self.elements(phi);
-        let Gradient { along, .. } =
-            Gradient::of(&self.contacts[contact].row, t, Posture { phi, z: &z, omega });
+        let MetricRow { along, .. } =
+            MetricRow::of(&self.contacts[contact].row, t, ConstraintArguments { phi, z: &z, omega });
         self.pulled(&metric.multipliers(&metric.column(&along)), NO_FREEDOM)
     }
 
@@ -177,9 +177,9 @@ impl Mechanism {
     /// approaching keeps its rates.
     pub fn impact_at(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> Option<Impact> {
         let Contact { row, restitution, .. } = &self.contacts[contact];
-        let metric = Metric::at(self, t, phi, omega)?;
+        let metric = ContactMetric::at(self, t, phi, omega)?;
         let z = self.elements(phi);
-        let Gradient { row: here, along } = Gradient::of(row, t, Posture { phi, z: &z, omega });
+        let MetricRow { row: here, along } = MetricRow::of(row, t, ConstraintArguments { phi, z: &z, omega });
         let approach = dot(&along, omega) + here.drive;
         if approach >= 0.0 {
             let row_impulses = vec![0.0; self.constraints.len()];
@@ -202,7 +202,7 @@ impl Mechanism {
         let (mut push, mut change) = (&column * impulse, &kept - &before + &free * impulse);
         let mut tangential = 0.0;
         if let Some(friction) = self.friction_at(contact) {
-            let along = Gradient::of(&friction.tangent, t, Posture { phi, z: &z, omega }).along;
+            let along = MetricRow::of(&friction.tangent, t, ConstraintArguments { phi, z: &z, omega }).along;
             let across = metric.column(&along);
             let free_across = metric.free(&across);
             let shock = Shock {

@@ -10,8 +10,8 @@
 //! alone is determinate; of the rest the forces of least norm are one choice among many, those of joints that
 //! give equally.
 
-use super::assembly::svd::{Matrix, dot};
-use super::constraint::Posture;
+use super::assembly::svd::{RowMatrix, dot};
+use super::constraint::ConstraintArguments;
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
@@ -79,7 +79,7 @@ impl Mechanism {
         // Orthonormal lists of joint forces that move nothing, each with its mu and its hinge forces.
         let mut units: Vec<Unit> = Vec::new();
         for mu in self.idle(t, kernel, phi, omega, open) {
-            let at = Posture { phi, z: &kernel.z, omega };
+            let at = ConstraintArguments { phi, z: &kernel.z, omega };
             let hinges = self.transmitted(t, at, &mu, vec![Complex::ZERO; self.bodies.len()]);
             let mut unit = (self.listed(&hinges, &mu), mu, hinges);
             for _ in 0..2 {
@@ -131,10 +131,10 @@ impl Mechanism {
         let (rows, n, size, angles) =
             (self.constraints.len(), self.coordinates(), self.size_of_parts(), self.bodies.len());
         let unit = |row: usize| if self.constraints[row].is_angle() { 1.0 } else { 1.0 / size };
-        let mut jacobian = Matrix::zero(rows, n);
+        let mut jacobian = RowMatrix::zero(rows, n);
         for (r, row) in self.constraints.iter().enumerate() {
             let entries = jacobian.row_mut(r);
-            row.differentiate(t, Posture { phi, z: &kernel.z, omega }, entries);
+            row.differentiate(t, ConstraintArguments { phi, z: &kernel.z, omega }, entries);
             entries
                 .iter_mut()
                 .enumerate()

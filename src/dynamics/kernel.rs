@@ -11,7 +11,7 @@
 mod constrained;
 mod exact;
 
-use super::constraint::{Linearised, Posture};
+use super::constraint::{ConstraintArguments, Linearised};
 use super::force::Vibration;
 use super::rank::Metric;
 use super::recursive::Evaluation;
@@ -186,7 +186,7 @@ impl<T: Real> Kernel<T> {
     pub fn assemble<const N: usize>(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         mechanism.tree.mass_matrix::<T, N>(&self.z, &mut self.mass, &mut self.twist);
         mechanism.tree.velocity_and_gravity_forces::<T, N>(&self.z, omega, &self.twist, &mut self.load);
-        let at = Posture { phi, z: &self.z, omega };
+        let at = ConstraintArguments { phi, z: &self.z, omega };
         self.law_power = mechanism.add_applied_forces(t, at, &self.stretch, &mut self.load);
     }
 
@@ -228,7 +228,7 @@ impl<T: Real> Kernel<T> {
             self.law_power = bodywise.inward_pass(
                 mechanism,
                 t,
-                Posture { phi, z: &self.z, omega },
+                ConstraintArguments { phi, z: &self.z, omega },
                 &self.stretch,
                 &mut self.load,
             );
@@ -274,7 +274,7 @@ impl<T: Real> Kernel<T> {
     fn accelerate_bodywise(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T], bias: Bias) {
         let Some(bodywise) = &mut self.bodywise else { return };
         bodywise.unit_vectors(phi, &mut self.z);
-        let at = Posture { phi, z: &self.z, omega };
+        let at = ConstraintArguments { phi, z: &self.z, omega };
         self.law_power = bodywise.inward_pass(mechanism, t, at, &self.stretch, &mut self.load);
         if !mechanism.constraints.is_empty() {
             let found = (&mut self.rows[..], &mut self.multiplier[..], &mut self.correction[..]);
@@ -316,7 +316,7 @@ impl<T: Real> Kernel<T> {
         if !self.friction.is_empty() {
             work -= self.friction_power(omega);
         }
-        let at = Posture { phi, z: &self.z, omega };
+        let at = ConstraintArguments { phi, z: &self.z, omega };
         (work + mechanism.force_power_beside(t, at, self.law_power), stabilizer)
     }
 }

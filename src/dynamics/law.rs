@@ -151,7 +151,7 @@ impl Law {
     /// The same in plain doubles, for a law without acceleration.
     #[inline(always)]
     fn plain(&self, t: Time) -> Phase<f64> {
-        let base = Reduced::new(t, self.rate, self.start);
+        let base = ReducedAngle::new(t, self.rate, self.start);
         if self.sines.is_empty() {
             return Phase { angle: base.angle(), unit: base.unit(), rate: self.rate, acceleration: 0.0 };
         }
@@ -168,7 +168,7 @@ impl Law {
     /// Sum of the sines and its derivatives; the unit vector is left out.
     fn sum_of_sines(&self, t: Time) -> Phase<f64> {
         self.sines.iter().fold(Phase::default(), |sum, sine| {
-            let Complex { re: cos, im: sin } = Reduced::new(t, sine.frequency, sine.phase).unit();
+            let Complex { re: cos, im: sin } = ReducedAngle::new(t, sine.frequency, sine.phase).unit();
             Phase {
                 angle: sum.angle + sin * sine.amplitude,
                 unit: sum.unit,
@@ -195,7 +195,7 @@ impl Law {
 
 /// An angle in quarter turns: q π/2 + x + y.
 #[derive(Clone, Copy)]
-struct Reduced {
+struct ReducedAngle {
     /// q modulo 4.
     quarter: u64,
     /// x \[rad\].
@@ -204,7 +204,7 @@ struct Reduced {
     low: f64,
 }
 
-impl Reduced {
+impl ReducedAngle {
     /// rate·t + start \[rad\].
     #[inline(always)]
     fn new(t: Time, rate: f64, start: f64) -> Self {
@@ -366,7 +366,7 @@ mod tests {
             rate in -40.0..40.0f64,
         ) {
             let t = Time::sum(hi, part * f64::EPSILON * hi.abs());
-            let found = Reduced::new(t, rate, 0.3);
+            let found = ReducedAngle::new(t, rate, 0.3);
             let exact = DoubleDouble::of(0.3) + t.scale(rate);
             let quarters = DoubleDouble::PI.ldexp(0.5).scale(found.quarter as f64);
             let whole = quarters + DoubleDouble::sum(found.high, found.low);

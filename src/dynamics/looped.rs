@@ -10,12 +10,12 @@
 //!
 //! Written once over [`Lanes`] and compiled twice, to the same bits.
 
-use super::constraint::Posture;
+use super::constraint::ConstraintArguments;
 use super::energy::moment;
-use super::force::action::Kind;
+use super::force::action::Applied;
 use super::multiplier::Multiplier;
-use super::natural::columns::{self, Columns};
-use super::natural::{Reduced, sorted_rows};
+use super::natural::columns::{self, LaneColumns};
+use super::natural::{ReducedMatrices, sorted_rows};
 use super::stiffness::Stiffness;
 use super::{BodyAngles, Coordinates, Form, Mechanism, Motion, OdeSystem, State, Time};
 use crate::arithmetic::lanes::row::{Row, load, store};
@@ -36,25 +36,25 @@ const WORST: f64 = 1e4;
 #[derive(Clone, Debug)]
 pub struct Looped {
     mechanism: Arc<Mechanism>,
-    reduced: Reduced,
+    reduced: ReducedMatrices,
     /// What all else is asked of.
     angles: Multiplier<0, true>,
-    room: Room,
+    room: SizedScratch,
     is_portable: bool,
 }
 
 /// Up to four, eight or sixteen bodies.
 #[derive(Clone, Debug)]
-enum Room {
-    Few(Box<Bench<1>>),
-    Several(Box<Bench<2>>),
-    Many(Box<Bench<4>>),
+enum SizedScratch {
+    Few(Box<LoopedScratch<1>>),
+    Several(Box<LoopedScratch<2>>),
+    Many(Box<LoopedScratch<4>>),
 }
 
 /// Constants and scratch space.
 #[derive(Clone, Debug)]
-struct Bench<const B: usize> {
-    columns: Columns<B>,
+struct LoopedScratch<const B: usize> {
+    columns: LaneColumns<B>,
     schur: Vec<Row<B>>,
     across: Vec<Row<B>>,
     z: Vec<Complex<f64>>,
@@ -66,7 +66,7 @@ struct Bench<const B: usize> {
 
 /// The matrices of a mechanism this form fits: hinged bodies only, with rows other than angles, all of them
 /// linear with constant coefficients.
-pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
+pub fn reduced(mechanism: &Mechanism) -> Option<ReducedMatrices> {
     let n = mechanism.bodies.len();
     let is_small = mechanism.coordinates() == n && n <= MOST && mechanism.tree.is_dense();
     if !is_small
@@ -83,7 +83,7 @@ pub fn reduced(mechanism: &Mechanism) -> Option<Reduced> {
     if !guides.is_empty() {
         return None;
     }
-    let reduced = Reduced::new(mechanism, linear).ok()?;
+    let reduced = ReducedMatrices::new(mechanism, linear).ok()?;
     // Light members that carry heavy ones: W has entries that cancel everywhere, M in angles only where these
     // are in line.
     let is_sound =
@@ -96,9 +96,9 @@ impl Looped {
     pub fn new(mechanism: Arc<Mechanism>) -> Option<Self> {
         let reduced = reduced(&mechanism)?;
         let room = match mechanism.bodies.len() {
-            0..=4 => Room::Few(Box::new(Bench::new(&reduced))),
-            5..=8 => Room::Several(Box::new(Bench::new(&reduced))),
-            _ => Room::Many(Box::new(Bench::new(&reduced))),
+            0..=4 => SizedScratch::Few(Box::new(LoopedScratch::new(&reduced))),
+            5..=8 => SizedScratch::Several(Box::new(LoopedScratch::new(&reduced))),
+            _ => SizedScratch::Many(Box::new(LoopedScratch::new(&reduced))),
         };
         Some(Self {
             angles: Multiplier::new(Arc::clone(&mechanism)),
@@ -116,11 +116,11 @@ impl Looped {
     }
 }
 
-impl<const B: usize> Bench<B> {
-    fn new(reduced: &Reduced) -> Self {
+impl<const B: usize> LoopedScratch<B> {
+    fn new(reduced: &ReducedMatrices) -> Self {
         let n = reduced.free.len();
         Self {
-            columns: Columns::new(reduced),
+            columns: LaneColumns::new(reduced),
             schur: vec![[[0.0; 4]; B]; n],
             across: vec![[[0.0; 4]; B]; n],
             z: vec![Complex::ZERO; n],
@@ -146,7 +146,7 @@ impl<const B: usize> Bench<B> {
 }
 
 struct Accelerations<'a, const B: usize> {
-    bench: &'a mut Bench<B>,
+    bench: &'a mut LoopedScratch<B>,
     mechanism: &'a Mechanism,
     t: Time,
     phi: &'a [f64],
@@ -165,7 +165,7 @@ impl<const B: usize> Code for Accelerations<'_, B> {
 /// Accelerations \[rad/s²\] into `alpha`.
 #[inline(always)]
 fn accelerate<L: Lanes, const B: usize>(
-    bench: &mut Bench<B>,
+    bench: &mut LoopedScratch<B>,
     mechanism: &Mechanism,
     t: Time,
     phi: &[f64],
@@ -180,7 +180,7 @@ fn accelerate<L: Lanes, const B: usize>(
         (s[b], c[b]) = sincos::sin_cos(L::of(angles[b]), L::ZERO);
     }
     let (cos, sin) = (store(c), store(s));
-    let Bench { columns, schur, across, z, force, alpha, least } = bench;
+    let LoopedScratch { columns, schur, across, z, force, alpha, least } = bench;
     for (z, (&c, &s)) in z.iter_mut().zip(cos.as_flattened().iter().zip(sin.as_flattened())) {
         *z = Complex::new(c, s);
     }
@@ -238,8 +238,8 @@ fn forces(
     for action in &mechanism.actions {
         let factor = action.factor(t);
         match &action.kind {
-            Kind::Force { point, .. } => point.spread(action.force(factor, z), |k, pull| force[k] += pull),
-            Kind::Torque { torque, base } => {
+            Applied::Force { point, .. } => point.spread(action.force(factor, z), |k, pull| force[k] += pull),
+            Applied::Torque { torque, base } => {
                 force[action.body] += z[action.body].left().times(torque * factor);
                 if let Some(base) = base {
                     force[*base] -= z[*base].left().times(torque * factor);
@@ -248,7 +248,7 @@ fn forces(
         }
     }
     for user in &mechanism.forces {
-        user.spread(moment(t), Posture { phi, z, omega }, |k, pull| force[k] += pull);
+        user.spread(moment(t), ConstraintArguments { phi, z, omega }, |k, pull| force[k] += pull);
     }
 }
 
@@ -266,16 +266,17 @@ impl OdeSystem for Looped {
         let n = mechanism.bodies.len();
         let (phi, omega) = (&y[..n], &y[n..2 * n]);
         let found = match &mut self.room {
-            Room::Few(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
-            Room::Several(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
-            Room::Many(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
+            SizedScratch::Few(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
+            SizedScratch::Several(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
+            SizedScratch::Many(bench) => bench.run(mechanism, t, phi, omega, self.is_portable),
         };
         // Which rows to leave out near a singular position, and when, is the angle form's to say.
         let Some((alpha, z)) = found else { return self.angles.rhs(t, y, rate) };
         rate[n..2 * n].copy_from_slice(alpha);
         rate[..n].copy_from_slice(omega);
         // Rows that never move do no work.
-        (rate[2 * n], rate[2 * n + 1]) = (mechanism.force_power(t, Posture { phi, z, omega }), 0.0);
+        (rate[2 * n], rate[2 * n + 1]) =
+            (mechanism.force_power(t, ConstraintArguments { phi, z, omega }), 0.0);
     }
 
     fn fine_rate(&mut self, t: Time, y: &[f64], low: &[f64], rate: &mut [f64]) {
@@ -316,7 +317,7 @@ impl Form for Looped {
         Coordinates::All
     }
 
-    fn reduced(&self) -> Option<&Reduced> {
+    fn reduced(&self) -> Option<&ReducedMatrices> {
         Some(&self.reduced)
     }
 

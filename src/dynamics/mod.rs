@@ -114,7 +114,7 @@ pub use stiffness::Stiffness;
 pub use units::Units;
 
 use crate::arithmetic::{DoubleDouble, Scalar, angle};
-use natural::Reduced;
+use natural::ReducedMatrices;
 
 /// Time \[s\], as a pair: at 1e6 s a plain double resolves no better than 1e-10 s, and a motor's phase with
 /// it.
@@ -318,7 +318,7 @@ pub trait Form {
     }
 
     /// The matrices of the natural form, of a form that solves with them.
-    fn reduced(&self) -> Option<&Reduced> {
+    fn reduced(&self) -> Option<&ReducedMatrices> {
         None
     }
 

@@ -33,12 +33,12 @@ mod guide;
 pub mod keeper;
 mod reduced;
 
-use coupling::Coupling;
+use coupling::GuideCoupling;
 pub use guide::{Demand, Guide};
-pub use reduced::{Block, Linear, Reduced, times};
+pub use reduced::{Block, LinearRow, ReducedMatrices, times};
 
-use super::constraint::{ConstraintEquation, Measure, Posture};
-use super::force::action::Kind;
+use super::constraint::{ConstraintArguments, ConstraintEquation, RowMeasure};
+use super::force::action::Applied;
 use super::law::Law;
 use super::quadratic::Quadratic;
 use super::{Form, Mechanism, Motion, State, Time, schur, tree};
@@ -86,7 +86,7 @@ pub struct ConstraintResidual {
 
 /// A constant torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Torque {
+pub struct ConstantTorque {
     /// The body.
     pub body: usize,
     /// The body that takes the opposite.
@@ -99,14 +99,14 @@ pub struct Torque {
 #[derive(Clone, Debug)]
 pub struct Natural {
     mechanism: Arc<Mechanism>,
-    reduced: Reduced,
+    reduced: ReducedMatrices,
     guides: Vec<Guide>,
-    couplings: Vec<Coupling>,
+    couplings: Vec<GuideCoupling>,
     /// Gravity and constant forces on every element (n) \[N·m, N\].
     weight: Vec<Complex<f64>>,
     /// The share of the latter.
     applied: Vec<Complex<f64>>,
-    torques: Vec<Torque>,
+    torques: Vec<ConstantTorque>,
 }
 
 impl Natural {
@@ -136,11 +136,11 @@ impl Natural {
         let mut torques = Vec::new();
         for action in &mechanism.actions {
             match &action.kind {
-                Kind::Force { point, force, follows: false } if action.law.is_none() => {
+                Applied::Force { point, force, follows: false } if action.law.is_none() => {
                     point.spread(*force, |k, force| applied[k] += force);
                 }
-                Kind::Torque { torque, base } if action.law.is_none() => {
-                    torques.push(Torque { body: action.body, base: *base, torque: *torque });
+                Applied::Torque { torque, base } if action.law.is_none() => {
+                    torques.push(ConstantTorque { body: action.body, base: *base, torque: *torque });
                 }
                 _ => return Err(NaturalError::Applied(action.name.clone())),
             }
@@ -148,7 +148,8 @@ impl Natural {
         let (linear, guides) = sorted_rows(&mechanism);
         let couplings = coupling::couplings(&mechanism, guides.iter().map(|guide| guide.row));
         let name = |body: usize| mechanism.bodies.get(body).map_or(String::new(), |body| body.name.clone());
-        let reduced = Reduced::new(&mechanism, linear).map_err(|body| NaturalError::Singular(name(body)))?;
+        let reduced =
+            ReducedMatrices::new(&mechanism, linear).map_err(|body| NaturalError::Singular(name(body)))?;
         let weight =
             mechanism.tree.weight.iter().zip(&applied).map(|(&weight, &applied)| weight + applied).collect();
         Ok(Self { mechanism, reduced, guides, couplings, weight, applied, torques })
@@ -156,7 +157,7 @@ impl Natural {
 
     /// W and what belongs to it.
     #[inline(always)]
-    pub fn reduced(&self) -> &Reduced {
+    pub fn reduced(&self) -> &ReducedMatrices {
         &self.reduced
     }
 
@@ -168,7 +169,7 @@ impl Natural {
 
     /// Those of them that a formula of time and place is taken off.
     #[inline(always)]
-    pub fn couplings(&self) -> &[Coupling] {
+    pub fn couplings(&self) -> &[GuideCoupling] {
         &self.couplings
     }
 
@@ -217,9 +218,9 @@ impl Natural {
             spring.span.spread(pull, |k, pull| force[k] += pull);
         }
         for user in &self.mechanism.forces {
-            user.spread(T::ZERO, Posture { phi: &[], z, omega: &[] }, |k, pull| force[k] += pull);
+            user.spread(T::ZERO, ConstraintArguments { phi: &[], z, omega: &[] }, |k, pull| force[k] += pull);
         }
-        for &Torque { body, base, torque } in &self.torques {
+        for &ConstantTorque { body, base, torque } in &self.torques {
             force[body] += z[body].left().times(T::of(torque));
             if let Some(base) = base {
                 force[base] -= z[base].left().times(T::of(torque));
@@ -330,7 +331,7 @@ impl Natural {
             .zip(z)
             .fold(DoubleDouble::ZERO, |sum, (&force, &z)| sum + Complex::of(force).dot(z));
         let whole = |k: usize| motion.phi[k] + DoubleDouble::TAU.scale(motion.turns[k] as f64);
-        self.torques.iter().fold(forces, |sum, &Torque { body, base, torque }| {
+        self.torques.iter().fold(forces, |sum, &ConstantTorque { body, base, torque }| {
             let angle = base.map_or(whole(body), |base| whole(body) - whole(base));
             sum + angle.scale(torque)
         })
@@ -338,11 +339,11 @@ impl Natural {
 }
 
 /// The rows of a mechanism that are linear with constant coefficients, and all others.
-pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<Linear>, Vec<Guide>) {
+pub fn sorted_rows(mechanism: &Mechanism) -> (Vec<LinearRow>, Vec<Guide>) {
     let (mut linear, mut guides) = (Vec::new(), Vec::new());
     for (number, row) in mechanism.constraints.iter().enumerate() {
         match linear_place(row, mechanism.bodies.len()) {
-            Some(place) => linear.push(Linear { row: number, place }),
+            Some(place) => linear.push(LinearRow { row: number, place }),
             None => guides.push(Guide::new(number, row)),
         }
     }
@@ -356,11 +357,11 @@ fn linear_place(row: &ConstraintEquation, angles: usize) -> Option<Quadratic> {
     }
     let is_constant = row.law.as_ref().is_none_or(Law::is_constant);
     match (&row.measure, &row.law) {
-        (&Measure::Angle { body, base: None }, Some(law)) if is_constant => {
+        (&RowMeasure::Angle { body, base: None }, Some(law)) if is_constant => {
             let unit = law.at::<f64>(Time::default()).unit;
             Some(Quadratic { angles, linear: vec![(body, unit.left())], ..Quadratic::default() })
         }
-        (Measure::Place(place), law) if is_constant && place.bilinear.is_empty() => {
+        (RowMeasure::Place(place), law) if is_constant && place.bilinear.is_empty() => {
             let constant = place.constant - law.as_ref().map_or(0.0, |law| law.start);
             Some(Quadratic { constant, ..place.clone() })
         }

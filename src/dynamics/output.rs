@@ -2,7 +2,7 @@
 
 use super::compile::CompileError;
 use super::configuration::{Configuration, Values};
-use super::constraint::{Aim, ConstraintEquation, Posture, Site};
+use super::constraint::{Aim, ConstraintArguments, ConstraintEquation, Site};
 use super::forest::{Forest, turning_acceleration};
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
@@ -12,24 +12,24 @@ use crate::scene::{BoundOutput, Component, Meaning, OutputNames, Quantity, Scene
 
 /// A formula with what its names stand for.
 #[derive(Clone, Debug, PartialEq)]
-struct Expression {
+struct OutputExpression {
     formula: Formula,
     sources: Vec<Source<Site>>,
 }
 
 /// An output.
 #[derive(Clone, Debug, PartialEq)]
-struct Output {
+struct CompiledOutput {
     name: String,
     unit: String,
-    expression: Expression,
+    expression: OutputExpression,
 }
 
 /// The outputs of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Outputs {
-    list: Vec<Output>,
-    signals: Vec<Expression>,
+    list: Vec<CompiledOutput>,
+    signals: Vec<OutputExpression>,
     parameters: Vec<f64>,
     /// True where joint forces are among them.
     needs_forces: bool,
@@ -90,7 +90,7 @@ impl Outputs {
                 Source::State(meaning) => Source::State(Meaning::with_points(meaning, site)),
                 Source::Carried(quantity) => Source::Carried(Quantity::with_points(quantity, site)),
             };
-            Expression { formula, sources: sources.into_iter().map(placed).collect() }
+            OutputExpression { formula, sources: sources.into_iter().map(placed).collect() }
         };
         let mut signals = Vec::new();
         for signal in &scene.signals {
@@ -100,7 +100,7 @@ impl Outputs {
         for output in &scene.outputs {
             let bound = names.bind(output).map_err(unsound)?;
             let (name, unit) = (bound.name.clone(), bound.unit.clone());
-            list.push(Output { name, unit, expression: place(bound) });
+            list.push(CompiledOutput { name, unit, expression: place(bound) });
         }
         let is_state = |source: &Source<Site>| {
             use Quantity::{Acceleration, AngularAcceleration, Gap, MovingGap, Tension, Torsion, Travel};
@@ -198,12 +198,12 @@ impl Outputs {
         if self.needs_forces {
             forces.take(at, centres, needed);
         }
-        let shared = Shared { centres, forces };
+        let shared = MomentQuantities { centres, forces };
         let seen = Values { time: time.hi, phi: at.winding, z: &kernel.z, omega: at.omega };
         let configuration = Configuration::new(&seen);
         let parameters = mechanism.laws.as_ref().map_or(&self.parameters, |laws| &laws.parameters);
         signals.clear();
-        let mut value = |expression: &Expression, signals: &[f64]| {
+        let mut value = |expression: &OutputExpression, signals: &[f64]| {
             let source = |source: &Source<Site>| match source {
                 Source::State(meaning) => meaning.value(&configuration, parameters, signals),
                 Source::Carried(quantity) => quantity.value(at, &configuration, &shared),
@@ -252,7 +252,7 @@ impl Forces {
 }
 
 /// What quantities of a moment are read from.
-struct Shared<'a> {
+struct MomentQuantities<'a> {
     centres: &'a [Complex<f64>],
     forces: &'a Forces,
 }
@@ -268,7 +268,7 @@ impl Component {
 }
 
 impl Quantity<Site> {
-    fn value(&self, at: &Moment, seen: &Configuration<f64>, shared: &Shared) -> f64 {
+    fn value(&self, at: &Moment, seen: &Configuration<f64>, shared: &MomentQuantities) -> f64 {
         let Moment { mechanism, time, phi, omega, kernel, .. } = *at;
         let (z, alpha, forces) = (&kernel.z, &kernel.load, shared.forces);
         let row = |is_it: &dyn Fn(&ConstraintEquation) -> bool| {
@@ -289,7 +289,7 @@ impl Quantity<Site> {
             }
             Self::Multiplier(name) => given(name).map_or(0.0, |(_, multiplier)| -multiplier),
             Self::Power(name) => given(name).map_or(0.0, |(row, multiplier)| {
-                let drive = |aim: &Aim| aim.drive(time, Posture { phi: at.winding, z, omega });
+                let drive = |aim: &Aim| aim.drive(time, ConstraintArguments { phi: at.winding, z, omega });
                 let rate = match (&row.law, &row.aim) {
                     (Some(law), _) => law.rates::<f64>(time).0,
                     (None, aim) => aim.as_deref().map_or(0.0, drive),
@@ -310,7 +310,7 @@ impl Quantity<Site> {
                 }
                 let mut load = vec![0.0; omega.len()];
                 if let Some(law) = mechanism.forces.iter().find(|force| force.name == *name) {
-                    law.pull(time.hi, Posture { phi: at.winding, z, omega }, &mut load);
+                    law.pull(time.hi, ConstraintArguments { phi: at.winding, z, omega }, &mut load);
                 }
                 load[*bar]
             }
@@ -364,7 +364,7 @@ fn tension<'a>(
         return along(spring.force(&kernel.z, omega));
     }
     if let Some(law) = mechanism.forces.iter().find(|force| force.name == name) {
-        let posture = Posture { phi: at.winding, z: &kernel.z, omega };
+        let posture = ConstraintArguments { phi: at.winding, z: &kernel.z, omega };
         let mut pulls = [Complex::ZERO; 2];
         law.forces(time.hi, posture, |body, force| {
             if let Some(end) = ends.iter().position(|end| end.body == Some(body)) {

@@ -8,7 +8,7 @@
 //! is free, or none where the group is tied to the ground.
 
 use super::compile::CompileError;
-use super::constraint::{ConstraintEquation, Measure};
+use super::constraint::{ConstraintEquation, RowMeasure};
 use super::law::{Law, Phase};
 use super::{Mechanism, Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar, angle};
@@ -106,7 +106,7 @@ impl<C: Real> CoordinatePartition<C> {
     ) -> Result<Self, CompileError> {
         let given: Vec<_> = (rows.iter())
             .filter_map(|row| match (&row.measure, &row.law) {
-                (&Measure::Angle { body, base }, Some(law)) => Some((row, body, base, law)),
+                (&RowMeasure::Angle { body, base }, Some(law)) => Some((row, body, base, law)),
                 _ => None,
             })
             .collect();

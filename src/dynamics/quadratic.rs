@@ -11,7 +11,7 @@
 //! Points on lines of the ground are linear, points on lines of other bodies bilinear; nothing planar needs
 //! more.
 
-use super::constraint::{Linearised, Posture};
+use super::constraint::{ConstraintArguments, Linearised};
 use super::point::Point;
 use crate::arithmetic::{Complex, Over, Real};
 
@@ -146,13 +146,21 @@ impl<C: Real> Quadratic<C> {
 
     /// What a row with C = Q - s(t) is at this posture, without s; adds its Jacobian to `jacobian`.
     #[inline]
-    pub fn linearise<T: Real + Over<C>>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+    pub fn linearise<T: Real + Over<C>>(
+        &self,
+        at: ConstraintArguments<T>,
+        jacobian: &mut [T],
+    ) -> Linearised<T> {
         Linearised { position: self.value(at.z), ..self.differentiate(at, jacobian) }
     }
 
     /// The same without Q itself.
     #[inline]
-    pub fn differentiate<T: Real + Over<C>>(&self, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+    pub fn differentiate<T: Real + Over<C>>(
+        &self,
+        at: ConstraintArguments<T>,
+        jacobian: &mut [T],
+    ) -> Linearised<T> {
         self.slopes(at.z, |k, slope| jacobian[k] += slope);
         Linearised { position: T::ZERO, drive: T::ZERO, convective: self.convective(at.z, at.omega) }
     }

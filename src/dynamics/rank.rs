@@ -12,7 +12,7 @@
 //! are those that have no pivot in S.
 
 use super::Mechanism;
-use super::constraint::{ConstraintEquation, Measure, Way};
+use super::constraint::{ConstraintEquation, ForceDirection, RowMeasure};
 use super::schur::{DROPPED, NEAR, Weakest};
 use crate::arithmetic::Real;
 
@@ -40,7 +40,7 @@ pub struct Metric {
 
 /// Which constraints depend on others at one position.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Verdict {
+pub struct RankVerdict {
     /// The least share, in the order of A.
     weakest: Weakest,
     /// The least share of those that are kept.
@@ -69,7 +69,7 @@ impl Metric {
     }
 
     /// The verdict on constraints with this Jacobian (r × columns).
-    pub fn judge<T: Real>(&self, jacobian: &[T]) -> Verdict {
+    pub fn judge<T: Real>(&self, jacobian: &[T]) -> RankVerdict {
         let (r, n) = (self.rows.len(), self.columns.len());
         let row = |i: usize| &jacobian[i * n..(i + 1) * n];
         let mut a = vec![0.0; r * r];
@@ -97,7 +97,7 @@ impl Metric {
     }
 
     /// The verdict on constraints with these shares.
-    pub fn verdict(&self, shares: &[f64]) -> Verdict {
+    pub fn verdict(&self, shares: &[f64]) -> RankVerdict {
         let least = |weakest: Weakest, (row, &share): (usize, &f64)| {
             if share < weakest.share { Weakest { share, row, ..weakest } } else { weakest }
         };
@@ -107,7 +107,7 @@ impl Metric {
         // Constraints that are redundant everywhere say nothing of the position.
         let is_singular = is_left_out.iter().filter(|&&is_left_out| is_left_out).count() > self.redundant;
         let weakest = if is_singular { shares.iter().enumerate().fold(Weakest::NONE, least) } else { kept };
-        Verdict { weakest, kept: kept.share, is_left_out }
+        RankVerdict { weakest, kept: kept.share, is_left_out }
     }
 }
 
@@ -116,7 +116,7 @@ fn is_dependent(share: f64) -> bool {
     share.is_nan() || share < DROPPED
 }
 
-impl Verdict {
+impl RankVerdict {
     /// The least share.
     pub fn share(&self) -> f64 {
         self.weakest.share
@@ -160,16 +160,16 @@ impl ConstraintEquation {
     /// Its levers, angles in rad; `size` \[m\] bounds what nothing else does.
     pub fn levers(&self, size: f64) -> Levers {
         let square = size * size;
-        if let Some(Way::Span(span, _)) = self.push.as_ref().map(|push| &push.way) {
+        if let Some(ForceDirection::Span(span, _)) = self.push.as_ref().map(|push| &push.way) {
             let carried =
                 span.shifts.iter().flat_map(|&(x, share)| [(x, share * share), (x + 1, share * share)]);
             return span.terms.iter().map(|&(k, gamma)| (k, gamma.norm_squared())).chain(carried).collect();
         }
         let place = match &self.measure {
-            Measure::Angle { body, base } => {
+            RowMeasure::Angle { body, base } => {
                 return std::iter::once(*body).chain(*base).map(|k| (k, 1.0)).collect();
             }
-            Measure::Place(place) => place,
+            RowMeasure::Place(place) => place,
         };
         let mut levers: Levers =
             self.aim.iter().flat_map(|aim| aim.coordinates()).map(|k| (k, 1.0)).collect();

@@ -11,7 +11,7 @@
 //! whichever of the two is the ground.
 
 use super::compile::Joint;
-use super::constraint::{ConstraintEquation, Posture};
+use super::constraint::{ConstraintArguments, ConstraintEquation};
 use super::energy::moment;
 use super::forest::turning_acceleration;
 use super::kernel::Kernel;
@@ -23,7 +23,7 @@ impl<C: Real> ConstraintEquation<C> {
     pub(super) fn add_force<T: Over<C>>(
         &self,
         time: T,
-        at: Posture<T>,
+        at: ConstraintArguments<T>,
         multiplier: T,
         needed: &mut [Complex<T>],
     ) {
@@ -97,7 +97,7 @@ impl Mechanism {
         needed: &mut [Complex<f64>],
         forces: &mut Vec<Complex<f64>>,
     ) {
-        let at = Posture { phi, z: &kernel.z, omega };
+        let at = ConstraintArguments { phi, z: &kernel.z, omega };
         self.turn_into_needed(t, at, needed);
         for ((friction, _), &tau) in self.sliding().zip(&kernel.friction) {
             friction.tangent.add_force(moment(t), at, tau, needed);
@@ -107,15 +107,20 @@ impl Mechanism {
     }
 
     /// The force \[N\] that every body needs from its joints and constraints at these accelerations.
-    pub(super) fn needed_forces<T: Real>(&self, t: Time, at: Posture<T>, alpha: &[T]) -> Vec<Complex<T>> {
+    pub(super) fn needed_forces<T: Real>(
+        &self,
+        t: Time,
+        at: ConstraintArguments<T>,
+        alpha: &[T],
+    ) -> Vec<Complex<T>> {
         let mut needed = self.centre_accelerations(at.z, at.omega, alpha);
         self.turn_into_needed(t, at, &mut needed);
         needed
     }
 
     /// Replaces the acceleration of the centre of every body by the force that it needs.
-    fn turn_into_needed<T: Real>(&self, t: Time, at: Posture<T>, needed: &mut [Complex<T>]) {
-        let Posture { z, omega, .. } = at;
+    fn turn_into_needed<T: Real>(&self, t: Time, at: ConstraintArguments<T>, needed: &mut [Complex<T>]) {
+        let ConstraintArguments { z, omega, .. } = at;
         for (needed, body) in needed.iter_mut().zip(&self.bodies) {
             *needed = (*needed - Complex::of(self.gravity)).times(T::of(body.mass));
         }
@@ -149,7 +154,7 @@ impl Mechanism {
     pub(super) fn transmitted<T: Real>(
         &self,
         t: Time,
-        at: Posture<T>,
+        at: ConstraintArguments<T>,
         multipliers: &[T],
         mut needed: Vec<Complex<T>>,
     ) -> Vec<Complex<T>> {
@@ -162,7 +167,7 @@ impl Mechanism {
     fn transmit<T: Real>(
         &self,
         t: Time,
-        at: Posture<T>,
+        at: ConstraintArguments<T>,
         multipliers: &[T],
         carried: &mut [Complex<T>],
         forces: &mut Vec<Complex<T>>,

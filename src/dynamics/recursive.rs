@@ -168,7 +168,7 @@ fn carried(links: &[Link]) -> Vec<Complex<DoubleDouble>> {
 
 /// A body at one moment: what its motion alone asks for.
 #[derive(Clone, Copy, Debug, Default)]
-struct Place<T> {
+struct BodyTerms<T> {
     /// z.
     z: Complex<T>,
     /// u \[m\].
@@ -187,7 +187,7 @@ struct Place<T> {
 
 /// A coordinate after the inward pass.
 #[derive(Clone, Copy, Debug, Default)]
-struct Joint<T> {
+struct JointResponse<T> {
     /// h \[kg·m\]; of the x of an origin what its y takes along, as a number without unit in `re`.
     moment: Complex<T>,
     /// 1/d \[1/(kg·m²); 1/kg for an origin\].
@@ -211,11 +211,18 @@ impl<T: Scalar> Symmetric<T> {
     }
 
     /// Its two pivots, and the ratio between them: an origin.
-    fn factors(self) -> [Joint<T>; 2] {
+    fn factors(self) -> [JointResponse<T>; 2] {
         let pivot = T::ONE / self.xx;
         let ratio = self.xy * pivot;
-        let x = Joint { moment: Complex::new(ratio, T::ZERO), pivot, excess: T::ZERO };
-        [x, Joint { moment: Complex::ZERO, pivot: T::ONE / (self.yy - self.xy * ratio), excess: T::ZERO }]
+        let x = JointResponse { moment: Complex::new(ratio, T::ZERO), pivot, excess: T::ZERO };
+        [
+            x,
+            JointResponse {
+                moment: Complex::ZERO,
+                pivot: T::ONE / (self.yy - self.xy * ratio),
+                excess: T::ZERO,
+            },
+        ]
     }
 }
 
@@ -255,9 +262,9 @@ impl<T: Scalar> Outer<T> {
 #[derive(Clone, Debug)]
 pub struct Recursive<T> {
     /// The ground, then the bodies.
-    places: Vec<Place<T>>,
+    places: Vec<BodyTerms<T>>,
     /// Of each coordinate.
-    joints: Vec<Joint<T>>,
+    joints: Vec<JointResponse<T>>,
     /// Sums over the bodies that hang on a fork; zero between evaluations.
     forks: Vec<Outer<T>>,
     /// a \[m/s²\], the ground's and the bodies'.
@@ -269,8 +276,8 @@ impl<T: Real> Recursive<T> {
     pub fn new(links: &Links) -> Self {
         let (bodies, n) = (links.bodies(), links.coordinates);
         Self {
-            places: vec![Place::default(); bodies + 1],
-            joints: vec![Joint::default(); n],
+            places: vec![BodyTerms::default(); bodies + 1],
+            joints: vec![JointResponse::default(); n],
             forks: vec![Outer::default(); bodies + 1],
             hinge: vec![Complex::ZERO; bodies + 1],
         }
@@ -283,11 +290,11 @@ impl<T: Real> Recursive<T> {
         let places = &mut self.places[..all.len()];
         let (mut z, mut square) = (Complex::new(T::ONE, T::ZERO), T::ZERO);
         let mut drift = -Complex::of(links.gravity);
-        places[0] = Place { z, square, drift, ..Place::default() };
+        places[0] = BodyTerms { z, square, drift, ..BodyTerms::default() };
         for k in 1..all.len() {
             let link = &all[k];
             if link.parent + 1 != k {
-                Place { z, square, drift, .. } = places[link.parent];
+                BodyTerms { z, square, drift, .. } = places[link.parent];
             }
             let lever = z.turn(link.hinge).left();
             drift += lever.left().times(square);
@@ -295,7 +302,7 @@ impl<T: Real> Recursive<T> {
             (z, square) = (elements[link.body], w * w);
             let moment = z.turn(link.moment);
             let force = drift.times(T::of(link.mass)) + moment.left().times(square);
-            places[k] = Place { z, square, lever, drift, moment, force, torque: -moment.dot(drift) };
+            places[k] = BodyTerms { z, square, lever, drift, moment, force, torque: -moment.dot(drift) };
         }
     }
 
@@ -333,7 +340,7 @@ impl<T: Real> Recursive<T> {
             let rigid = mass.times(u);
             let (inertia, across, torque) = (u.dot(rigid), moment.dot(u), u.dot(force));
             let share = moment.times(pivot);
-            joints[link.body] = Joint { moment, pivot, excess };
+            joints[link.body] = JointResponse { moment, pivot, excess };
             let felt = Outer {
                 mass: Symmetric {
                     xx: mass.xx - share.re * moment.re,
@@ -353,8 +360,9 @@ impl<T: Real> Recursive<T> {
             outer = Outer::default();
             if link.origin_point != 0 {
                 let ([x, y], excess) = (felt.mass.factors(), -felt.force);
-                joints[link.origin_point] = Joint { excess: excess.re, ..x };
-                joints[link.origin_point + 1] = Joint { excess: excess.im - x.moment.re * excess.re, ..y };
+                joints[link.origin_point] = JointResponse { excess: excess.re, ..x };
+                joints[link.origin_point + 1] =
+                    JointResponse { excess: excess.im - x.moment.re * excess.re, ..y };
             }
         }
     }

@@ -14,7 +14,7 @@
 //! are left out in the same way.
 
 use super::Mechanism;
-use super::constraint::{ConstraintEquation, Measure};
+use super::constraint::{ConstraintEquation, RowMeasure};
 use super::kernel::dot;
 use super::rank::Metric;
 use super::tree::{self, Tree, size};
@@ -75,7 +75,7 @@ pub fn is_deep<T: Real>(pivot: &[T], diagonal: impl Iterator<Item = f64>) -> boo
     pivot.iter().zip(diagonal).any(|(pivot, diagonal)| pivot.value() * diagonal > DEEP)
 }
 
-impl Measure {
+impl RowMeasure {
     /// Σ |g_k|² `free`_k: what S has at most on a row's place without other rows, up to a factor of the
     /// number of bodies \[1/kg, 1/(kg·m²)\], where element k alone would give way by `free`(k) to a force of
     /// one.

@@ -55,14 +55,14 @@ use self::aim::AimSeries;
 use self::bodywise::Bodywise;
 pub use self::coefficient::{Coefficient, Constants, FrictionTerms, SeriesNumber, Terms};
 pub use self::drive::powers;
-use self::factors::{Factors, Scale};
+use self::factors::{BodyFactors, Scale};
 use self::friction::FrictionSeries;
 pub use self::friction::Slides;
 use self::polynomial::{Fractions, zeros};
 use self::rows::RowSeries;
 use self::spring::SpringSeries;
 pub use self::user::FormulaSeries;
-use self::user::{At, UserSeries};
+use self::user::{PowersAt, UserSeries};
 use super::Coordinates;
 use super::constraint::Aim;
 use super::force::UserForce;
@@ -126,7 +126,7 @@ pub struct Series<T: SeriesNumber> {
     /// then.
     bodywise: Option<Box<Bodywise<T>>>,
     /// The bodies' series as factors, where series are multiplied so.
-    factors: Factors<T>,
+    factors: BodyFactors<T>,
     /// Limbs that powers of the rates are kept to; none where numbers have none.
     limbs: Vec<usize>,
 }
@@ -139,7 +139,7 @@ impl<T: SeriesNumber> Series<T> {
         series: &'a mut FormulaSeries<T>,
         (time, phi): (T, &[T]),
     ) -> &'a [T] {
-        let at = At { time, phi, z: &self.z, omega: &self.omega, n: self.elements };
+        let at = PowersAt { time, phi, z: &self.z, omega: &self.omega, n: self.elements };
         series.values(formula, self.order, at)
     }
 
@@ -147,7 +147,7 @@ impl<T: SeriesNumber> Series<T> {
     pub fn aim(&self, aim: &Arc<Aim<T::Constant>>) -> Vec<T> {
         let n = self.elements.max(1);
         let order = (self.z.len() / n).saturating_sub(1);
-        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        let at = PowersAt { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
         AimSeries::new(aim, self.angles, order).values(order, at).to_vec()
     }
 
@@ -166,7 +166,7 @@ impl<T: SeriesNumber> Series<T> {
         let is_bodywise = !T::HAS_CONSTANTS && !partition.driven();
         let bodywise = is_bodywise.then(|| Bodywise::new(mechanism, order)).flatten().map(Box::new);
         let matrix = |size: usize| zeros(if bodywise.is_some() { 0 } else { size });
-        let mut factors = Factors::new(mechanism.bodies.len(), partition.driven(), order);
+        let mut factors = BodyFactors::new(mechanism.bodies.len(), partition.driven(), order);
         factors.couple(terms.tree);
         Self {
             order,
@@ -325,7 +325,7 @@ impl<T: SeriesNumber> Series<T> {
             self.omega[i] = dependent_angle.base.map_or(T::ZERO, |base| u_rate[base]);
         }
         self.rows.begin(t);
-        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        let at = PowersAt { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
         self.rows.advance_aims(0, at, &self.factors.scale, &mut self.load);
     }
 

@@ -199,7 +199,7 @@ fn slow(mechanism: &Mechanism, time: Time, omega: &[f64]) -> f64 {
 }
 
 /// A spring's own motion.
-struct Mode {
+struct SpringMode {
     name: String,
     /// \[rad/s\]
     rate: f64,
@@ -208,7 +208,7 @@ struct Mode {
 }
 
 /// The fastest of the springs, each by itself.
-fn fastest_spring(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Option<Mode> {
+fn fastest_spring(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Option<SpringMode> {
     let n = phi.len();
     if n > NAMED
         || !mechanism.tree.is_dense()
@@ -226,7 +226,7 @@ fn fastest_spring(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64])
         let rate = root(-damper, spring).norm_squared().sqrt();
         let speed = dot(along, omega);
         let energy = 0.5 * stiffness * stretch * stretch + 0.5 * speed * speed / mobility;
-        modes.push(Mode { name: name.into(), rate, energy });
+        modes.push(SpringMode { name: name.into(), rate, energy });
     };
     for spring in &mechanism.springs {
         let span = spring.span.position(&z);

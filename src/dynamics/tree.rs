@@ -11,7 +11,7 @@
 //! Loops run over `N` bodies where `N > 0`, so that small sizes are unrolled, and over the number at hand
 //! where `N = 0`.
 
-use super::force::Spring;
+use super::force::CompiledSpring;
 use crate::arithmetic::{Complex, Over, Scalar};
 
 /// `N`, or the number at hand where `N` is 0.
@@ -52,14 +52,14 @@ impl Tree {
     ///
     /// Stretched, the chain has the least inertia against bending: the trace of M⁻¹ W there is about the
     /// square of its fastest rate, and that of M⁻¹ K at most k (Σ |gamma_i| (M⁻¹)_ii^(1/2))² for each spring.
-    pub fn fastest_rate(&self, springs: &[Spring]) -> f64 {
+    pub fn fastest_rate(&self, springs: &[CompiledSpring]) -> f64 {
         let mobility = self.mobility();
         let gravity: f64 = self.weight[..self.angles]
             .iter()
             .zip(&mobility)
             .map(|(weight, mobility)| weight.norm_squared().sqrt() * mobility)
             .sum();
-        let moved = |spring: &Spring| {
+        let moved = |spring: &CompiledSpring| {
             spring
                 .span
                 .terms

@@ -16,7 +16,7 @@ const ORDERS: usize = 4;
 
 /// A column to be packed.
 #[derive(Clone, Debug, Default)]
-pub struct Column {
+pub struct PackedColumn {
     /// Name.
     pub name: String,
     /// Unit, empty where there is none.
@@ -41,7 +41,7 @@ pub(super) struct Packing {
 }
 
 /// Packs a column; its planes are appended to `bytes`.
-pub(super) fn pack(column: &Column, bytes: &mut Vec<u8>) -> Packing {
+pub(super) fn pack(column: &PackedColumn, bytes: &mut Vec<u8>) -> Packing {
     let finite = || column.values.iter().copied().filter(|value| value.is_finite());
     let [low, high] = finite().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
     let offset = if low.is_finite() { low } else { 0.0 };
@@ -121,8 +121,8 @@ mod tests {
         whole.iter().map(number).collect()
     }
 
-    fn column(values: Vec<f64>, quantum: f64) -> Column {
-        Column { values, quantum, ..Column::default() }
+    fn column(values: Vec<f64>, quantum: f64) -> PackedColumn {
+        PackedColumn { values, quantum, ..PackedColumn::default() }
     }
 
     #[test]

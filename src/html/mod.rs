@@ -7,7 +7,7 @@
 
 mod columns;
 
-pub use columns::Column;
+pub use columns::PackedColumn;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -31,7 +31,7 @@ pub struct Document {
     /// What `page.js` reads, but for the packing of the tables, which is added as `tables`.
     pub data: Value,
     /// Tables, each with columns of one length.
-    pub tables: Vec<Vec<Column>>,
+    pub tables: Vec<Vec<PackedColumn>>,
 }
 
 impl Document {
@@ -78,7 +78,7 @@ impl Document {
 }
 
 /// A column as the script finds it; its bytes are appended.
-fn described(column: &Column, bytes: &mut Vec<u8>) -> Value {
+fn described(column: &PackedColumn, bytes: &mut Vec<u8>) -> Value {
     let begin = bytes.len();
     let packing = pack(column, bytes);
     json!({
@@ -121,7 +121,7 @@ mod tests {
     fn no_text_leaves_its_place() {
         let hostile = "</title></script><script>alert(1)</script>{{script}}\"'&";
         let data = json!({"runs": [{"title": hostile, hostile: 1}]});
-        let column = Column { name: hostile.into(), values: vec![1.0], ..Column::default() };
+        let column = PackedColumn { name: hostile.into(), values: vec![1.0], ..PackedColumn::default() };
         let page = Document { title: hostile.into(), data, tables: vec![vec![column]] };
         let html = String::from_utf8(page.html().expect("memory")).expect("text");
         assert_eq!(html.matches("alert(1)</script>").count(), 0);

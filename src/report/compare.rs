@@ -8,7 +8,7 @@ pub use charts::{CompareChart, chart_data, draw};
 
 use super::page::{Page, figure, magnitude, rough};
 use crate::dynamics::Mechanism;
-use crate::run::compare::{Advice, Comparison, Entry, Fate, Found, LOST};
+use crate::run::compare::{Advice, Comparison, Entry, Fate, LOST, RunMeasurement};
 use crate::run::{Drift, MethodId, Plan, Stabilization};
 use crate::scene::Scene;
 use serde_json::{Value, json};
@@ -186,8 +186,8 @@ pub fn csv(comparison: &Comparison) -> String {
     let mut text = HEAD.to_owned();
     for (k, entry) in comparison.entries.iter().enumerate() {
         let found = entry.found.as_ref().filter(|_| entry.fate == Fate::Done);
-        let of = |what: &dyn Fn(&Found) -> Option<f64>| number(found.and_then(what));
-        let count = |what: &dyn Fn(&Found) -> u64| {
+        let of = |what: &dyn Fn(&RunMeasurement) -> Option<f64>| number(found.and_then(what));
+        let count = |what: &dyn Fn(&RunMeasurement) -> u64| {
             entry.found.as_ref().map_or(String::new(), |found| what(found).to_string())
         };
         let cells = [

@@ -2,9 +2,9 @@
 
 use super::page::{Page, counted, figure, magnitude};
 use crate::arithmetic::Real;
-use crate::arithmetic::digits::Layout as Decimals;
+use crate::arithmetic::digits::NumberLayout;
 use crate::dynamics::Mechanism;
-use crate::run::digits::{Forecast, LongEvent, LongHold, LongTurn, Pair, Row, Source, Wide};
+use crate::run::digits::{DigitsPair, DigitsSource, Forecast, LongEvent, LongHold, LongTurn, ShownRow, Wide};
 use crate::run::drift;
 use crate::run::files::sha256;
 use crate::stepping::StepError;
@@ -20,7 +20,7 @@ const BEYOND: usize = 3;
 
 /// How rows are laid out.
 #[derive(Clone, Debug)]
-pub struct Layout {
+pub struct RowLayout {
     names: Vec<String>,
     /// Digits shown, where they were asked for.
     shown: Option<usize>,
@@ -30,7 +30,7 @@ pub struct Layout {
     has_friction: bool,
 }
 
-impl Layout {
+impl RowLayout {
     /// Of a mechanism; `is_proved` where two runs are compared.
     pub fn new(mechanism: &Mechanism, shown: Option<usize>, carried: usize, is_proved: bool) -> Self {
         let names = mechanism.own_bodies().iter().map(|body| body.name.clone()).collect();
@@ -59,12 +59,12 @@ impl Layout {
 
 /// Numbers as decimal text.
 fn decimal(number: &Wide, digits: usize) -> String {
-    number.to_decimal(digits, Decimals::Free)
+    number.to_decimal(digits, NumberLayout::Free)
 }
 
 /// All events as a table, with their numbers to as many digits as runs agree to.
-pub fn events(shown: &Shown) -> String {
-    let Shown { source, layout, events, within, .. } = shown;
+pub fn events(shown: &DigitsReport) -> String {
+    let DigitsReport { source, layout, events, within, .. } = shown;
     let mut text = super::events::header(&source.mechanism);
     text += if within.is_some() { ",agreement [digits]\n" } else { "\n" };
     for (event, agreement) in *events {
@@ -80,29 +80,29 @@ pub fn events(shown: &Shown) -> String {
 }
 
 /// The trajectory as CSV.
-pub struct Table<W: Write> {
-    layout: Layout,
+pub struct DigitsTable<W: Write> {
+    layout: RowLayout,
     writer: BufWriter<W>,
 }
 
-impl<W: Write> Table<W> {
+impl<W: Write> DigitsTable<W> {
     /// With its header.
     ///
     /// # Errors
     /// What the writer says.
-    pub fn new(layout: Layout, writer: W) -> io::Result<Self> {
+    pub fn new(layout: RowLayout, writer: W) -> io::Result<Self> {
         let mut table = Self::going_on(layout, writer);
         writeln!(table.writer, "{}", table.layout.header())?;
         Ok(table)
     }
 
     /// One whose header is there.
-    pub fn going_on(layout: Layout, writer: W) -> Self {
+    pub fn going_on(layout: RowLayout, writer: W) -> Self {
         Self { layout, writer: BufWriter::new(writer) }
     }
 
     /// Its layout.
-    pub fn layout(&self) -> &Layout {
+    pub fn layout(&self) -> &RowLayout {
         &self.layout
     }
 
@@ -110,7 +110,7 @@ impl<W: Write> Table<W> {
     ///
     /// # Errors
     /// What the writer says.
-    pub fn write(&mut self, row: &Row, agreement: Option<f64>) -> io::Result<()> {
+    pub fn write(&mut self, row: &ShownRow, agreement: Option<f64>) -> io::Result<()> {
         let digits = self.layout.digits(agreement);
         let bodies = row.bodies.iter().take(self.layout.names.len()).flatten();
         let mut cells = vec![decimal(&row.t, self.layout.carried)];
@@ -172,7 +172,7 @@ pub struct Summary {
 
 impl Summary {
     /// Takes a row.
-    pub fn take(&mut self, row: &Row, agreement: Option<f64>) {
+    pub fn take(&mut self, row: &ShownRow, agreement: Option<f64>) {
         (self.t, self.rows) = (row.time(), self.rows + 1);
         self.drift = self.drift.max(row.drift.abs());
         let [kinetic, _, work] = row.energy.map(|energy| energy.value().abs());
@@ -188,7 +188,7 @@ impl Summary {
     }
 
     /// Takes the row at which runs part.
-    pub fn parts(&mut self, row: &Row, agreement: f64) {
+    pub fn parts(&mut self, row: &ShownRow, agreement: f64) {
         (self.parted, self.agreement) = (Some(row.time()), Some(agreement));
     }
 
@@ -199,13 +199,13 @@ impl Summary {
 }
 
 /// What is reported.
-pub struct Shown<'a> {
+pub struct DigitsReport<'a> {
     /// The scene.
-    pub source: &'a Source,
+    pub source: &'a DigitsSource,
     /// The runs.
-    pub pair: &'a Pair,
+    pub pair: &'a DigitsPair,
     /// How numbers are laid out.
-    pub layout: &'a Layout,
+    pub layout: &'a RowLayout,
     /// What the rows amount to.
     pub summary: &'a Summary,
     /// How near runs must be \[rad\].
@@ -214,7 +214,7 @@ pub struct Shown<'a> {
     pub events: &'a [(LongEvent, Option<f64>)],
 }
 
-impl Shown<'_> {
+impl DigitsReport<'_> {
     /// The event that has ended the run.
     fn ended_by(&self) -> Option<&str> {
         self.pair.runs().last().and_then(|run| run.ended_by())
@@ -236,8 +236,8 @@ pub fn forecast(forecast: &Forecast, until: f64) -> String {
 }
 
 /// The report as one JSON object; numbers of many digits are texts.
-pub fn object(shown: &Shown) -> Value {
-    let Shown { source, pair, layout, summary, within, events } = shown;
+pub fn object(shown: &DigitsReport) -> Value {
+    let DigitsReport { source, pair, layout, summary, within, events } = shown;
     let digits = layout.digits(summary.agreement);
     let bodies: Map<String, Value> = (layout.names.iter().zip(summary.last()))
         .map(|(name, numbers)| {
@@ -297,7 +297,7 @@ pub fn object(shown: &Shown) -> Value {
 }
 
 /// The times that points stayed on their walls, where any did.
-fn holds(pair: &Pair, layout: &Layout) -> Option<Value> {
+fn holds(pair: &DigitsPair, layout: &RowLayout) -> Option<Value> {
     let holds = Some(pair.holds()).filter(|holds| !holds.is_empty())?;
     let first: Vec<Value> = (holds.iter().take(super::events::NAMED))
         .map(|(LongHold { wall, t, until }, agreement)| {
@@ -310,7 +310,7 @@ fn holds(pair: &Pair, layout: &Layout) -> Option<Value> {
 }
 
 /// What dry friction took, and its transitions, where there is any.
-fn friction(shown: &Shown) -> Option<Value> {
+fn friction(shown: &DigitsReport) -> Option<Value> {
     let lost = Wide::from_words(shown.summary.friction.as_ref()?)?;
     let turns = shown.pair.turns();
     let first: Vec<Value> = (turns.iter().take(super::friction::NAMED))
@@ -324,7 +324,7 @@ fn friction(shown: &Shown) -> Option<Value> {
 }
 
 /// The record of a run: the report, the scene, versions; what depends on the clock stands apart.
-pub fn record(shown: &Shown, trajectory: &str) -> Value {
+pub fn record(shown: &DigitsReport, trajectory: &str) -> Value {
     let mut object = object(shown);
     let wall = object.as_object_mut().and_then(|members| members.remove("wall_s"));
     let scene = json!(shown.source.scene);
@@ -339,8 +339,8 @@ pub fn record(shown: &Shown, trajectory: &str) -> Value {
 }
 
 /// The report as a page.
-pub fn text(shown: &Shown) -> String {
-    let Shown { source, pair, layout, summary, within, events } = shown;
+pub fn text(shown: &DigitsReport) -> String {
+    let DigitsReport { source, pair, layout, summary, within, events } = shown;
     let mut page = Page::new(&source.scene.name, &source.scene.description);
     for run in pair.runs() {
         let ([steps, impacts], precision) = (run.counts(), run.precision());

@@ -12,7 +12,7 @@ use crate::scene::{Load, NamedPoint, Place, Scene, Wall};
 
 /// A mechanism to draw.
 #[derive(Clone, Copy)]
-pub(super) struct Drawing<'a> {
+pub(super) struct MechanismDrawing<'a> {
     /// Its scene.
     pub scene: &'a Scene,
     /// Its equations.
@@ -20,7 +20,7 @@ pub(super) struct Drawing<'a> {
 }
 
 #[cfg(feature = "charts")]
-impl Drawing<'_> {
+impl MechanismDrawing<'_> {
     /// What the paths are of; none where there are none.
     pub fn title(&self) -> Option<String> {
         let names = self.names();
@@ -101,7 +101,7 @@ impl Drawing<'_> {
     }
 }
 
-impl Drawing<'_> {
+impl MechanismDrawing<'_> {
     /// A point and the normal of every wall, drawn once for all poses: where it is at the start; of none that
     /// a body or a formula of places moves \[m\].
     pub fn walls(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
@@ -216,7 +216,7 @@ mod tests {
     fn the_travel_of_a_slider_is_that_of_the_closed_form() {
         let scene = read_scene("examples/scenes/slider_crank_driven.json".as_ref(), &[]).expect("shipped");
         let mechanism = Mechanism::new(&scene).expect("a mechanism");
-        let drawing = Drawing { scene: &scene, mechanism: &mechanism };
+        let drawing = MechanismDrawing { scene: &scene, mechanism: &mechanism };
         for crank in [0.0_f64, 0.4, 1.7, 4.0] {
             let rod = -(0.5 * crank.sin()).asin();
             let phi = vec![crank, rod, 0.0];
@@ -232,7 +232,7 @@ mod tests {
             let path = format!("examples/scenes/{name}.json");
             let scene = read_scene(path.as_ref(), &[]).expect("shipped");
             let mechanism = Mechanism::new(&scene).expect("a mechanism");
-            Drawing { scene: &scene, mechanism: &mechanism }.names()
+            MechanismDrawing { scene: &scene, mechanism: &mechanism }.names()
         };
         assert_eq!(traced("andrews"), ["FE", "BED"], "GE and HE end at the end of FE");
         assert_eq!(traced("four_bar_motor"), ["coupler"], "where the rocker ends as well");

@@ -3,14 +3,14 @@
 
 use crate::arithmetic::Complex;
 use crate::dynamics::Mechanism;
-use crate::report::drawing::Drawing;
+use crate::report::drawing::MechanismDrawing;
 use crate::scene::{Place, Scene};
 use serde_json::{Value, json};
 
 /// The geometry: a place is `[body, x, y]`, counted from the body's centre of mass in its frame, or
 /// `[-1, x, y]` on the ground \[m\].
 pub fn geometry(scene: &Scene, mechanism: &Mechanism) -> Value {
-    let drawing = Drawing { scene, mechanism };
+    let drawing = MechanismDrawing { scene, mechanism };
     let place = |place: &Place| at(place.bar, local(mechanism, place));
     let bodies: Vec<Value> = (mechanism.own_bodies().iter())
         .map(|body| {

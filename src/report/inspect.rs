@@ -24,7 +24,7 @@ mod text;
 
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::Joint;
-use crate::dynamics::constraint::{ConstraintEquation, Measure, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation, RowMeasure};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion};
@@ -52,7 +52,7 @@ pub struct Inspection {
     /// What energies are divided by in reports \[J\].
     pub energy_scale: f64,
     /// Each wall with what happens there at the start.
-    pub walls: Vec<Contact>,
+    pub walls: Vec<ReportedContact>,
     /// Places with dry friction: what they do, whether it is a torque \[N·m\] or a force \[N\], it and the
     /// force \[N\] that presses them.
     pub frictions: Vec<(String, &'static str, bool, [f64; 2])>,
@@ -97,7 +97,7 @@ pub struct Reaction {
 
 /// A wall.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Contact {
+pub struct ReportedContact {
     /// Name of the wall.
     pub name: String,
     /// Distance of the point from it \[m\].
@@ -105,12 +105,12 @@ pub struct Contact {
     /// Rate of that \[m/s\].
     pub approach: f64,
     /// The impact, where the point is on the wall and moving into it.
-    pub impact: Option<Impact>,
+    pub impact: Option<ReportedImpact>,
 }
 
 /// An impact.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Impact {
+pub struct ReportedImpact {
     /// Impulse on the point along the normal \[N·s\].
     pub impulse: f64,
     /// Energy lost, work of the motors not counted \[J\].
@@ -209,7 +209,7 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
 /// The body a row's force or torque acts on, and the one it comes from.
 fn sides(row: &ConstraintEquation) -> [Option<usize>; 2] {
     match (&row.measure, &row.push) {
-        (Measure::Angle { body, base }, _) => [Some(*body), *base],
+        (RowMeasure::Angle { body, base }, _) => [Some(*body), *base],
         (_, None) if row.is_in_radians() => {
             let angles = row.aim.as_ref().map_or(&[][..], |aim| &aim.angles);
             [angles.first().copied(), angles.get(1).copied()]
@@ -226,12 +226,12 @@ fn contacts(
     phi: &[f64],
     mut omega: Vec<f64>,
     kernel: &Kernel<f64>,
-) -> Vec<Contact> {
+) -> Vec<ReportedContact> {
     let mut contacts = Vec::new();
     for (number, contact) in mechanism.contacts.iter().enumerate() {
         let gap = contact.distance(start.time, phi, &kernel.z);
         let mut jacobian = vec![0.0; phi.len()];
-        let at = Posture { phi, z: &kernel.z, omega: &omega };
+        let at = ConstraintArguments { phi, z: &kernel.z, omega: &omega };
         let drive = contact.row.differentiate(start.time, at, &mut jacobian).drive;
         let approach = crate::dynamics::kernel::dot(&jacobian, &omega) + drive;
         let is_held = mechanism.held.contains(&number);
@@ -243,9 +243,14 @@ fn contacts(
         let impact = jump.map(|jump| {
             omega.clone_from(&jump.omega);
             let energy_lost = jump.motor_work - jump.energy_change;
-            Impact { impulse: jump.impulse, energy_lost, motor_work: jump.motor_work, omega: jump.omega }
+            ReportedImpact {
+                impulse: jump.impulse,
+                energy_lost,
+                motor_work: jump.motor_work,
+                omega: jump.omega,
+            }
         });
-        contacts.push(Contact { name: contact.row.name.clone(), gap, approach, impact });
+        contacts.push(ReportedContact { name: contact.row.name.clone(), gap, approach, impact });
     }
     contacts
 }

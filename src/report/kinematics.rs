@@ -1,7 +1,7 @@
 //! What `kinematics` found, as a page, a JSON object, a table and charts.
 
 #[cfg(feature = "charts")]
-use super::drawing::Drawing;
+use super::drawing::MechanismDrawing;
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{
@@ -197,7 +197,7 @@ pub fn table(found: &Kinematics) -> Vec<u8> {
 /// Drawing or encoding fails.
 #[cfg(feature = "charts")]
 pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartError> {
-    let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
+    let drawing = MechanismDrawing { scene: &found.scene, mechanism: &found.mechanism };
     let mut caption = vec![format!("scene {}", plain(&found.scene.name))];
     if let (Some(first), Some(last)) = (found.positions.first(), found.positions.last()) {
         let [from, to] = [first, last].map(|at| figure(at.drive).replace('-', "−"));
@@ -238,7 +238,7 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
 
 /// Eight poses at equal distances, the first of the range last and in full.
 #[cfg(feature = "charts")]
-fn poses(found: &Kinematics, drawing: &Drawing<'_>) -> Vec<Pose> {
+fn poses(found: &Kinematics, drawing: &MechanismDrawing<'_>) -> Vec<Pose> {
     let count = found.positions.len();
     let ghosts = (1..8).map(|k| k * count / 8).rev().chain([0]);
     ghosts.filter_map(|k| found.positions.get(k)).map(|at| drawing.pose(&at.phi, &at.omega)).collect()

@@ -1,7 +1,7 @@
 //! Equilibria and modes, as a page, a JSON object and charts.
 
 #[cfg(feature = "charts")]
-use super::drawing::Drawing;
+use super::drawing::MechanismDrawing;
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Picture, plain};
@@ -134,7 +134,7 @@ pub fn text(found: &Modes) -> String {
 pub fn charts(found: &Modes) -> Result<Charts, ChartError> {
     let first = found.equilibria.iter().find(|one| one.from_start).or(found.equilibria.first());
     let Some(one) = first else { return Ok(Default::default()) };
-    let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
+    let drawing = MechanismDrawing { scene: &found.scene, mechanism: &found.mechanism };
     let still = vec![0.0; one.phi.len()];
     let (mut pictures, mut motions) = (Vec::new(), Vec::new());
     for (k, mode) in one.modes.iter().enumerate().take(DRAWN.len()) {

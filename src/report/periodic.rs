@@ -1,7 +1,7 @@
 //! Periodic motions with their Floquet multipliers, as a page, a JSON object and charts.
 
 #[cfg(feature = "charts")]
-use super::drawing::Drawing;
+use super::drawing::MechanismDrawing;
 #[cfg(feature = "charts")]
 use super::modes::Charts;
 use super::page::{Page, counted, figure};
@@ -132,7 +132,7 @@ pub fn text(found: &PeriodicMotions) -> String {
 pub fn charts(found: &PeriodicMotions) -> Result<Charts, ChartError> {
     let first = found.motions.iter().find(|one| one.from_start).or(found.motions.first());
     let Some(one) = first else { return Ok(Default::default()) };
-    let drawing = Drawing { scene: &found.scene, mechanism: &found.mechanism };
+    let drawing = MechanismDrawing { scene: &found.scene, mechanism: &found.mechanism };
     let mut states = found.course(one, PLACES).unwrap_or_default();
     states.extend(states.first().cloned());
     let pose = |[phi, omega]: &[Vec<f64>; 2]| drawing.pose(phi, omega);

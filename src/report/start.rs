@@ -1,6 +1,6 @@
 //! The start of a scene as a chart, or what comes closest to it.
 
-use super::drawing::Drawing;
+use super::drawing::MechanismDrawing;
 use super::page::figure;
 use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, Picture, plain};
 use crate::dynamics::assembly::Closest;
@@ -46,7 +46,7 @@ fn drawn(
     title: &str,
     caption: Vec<String>,
 ) -> Result<Picture, ChartError> {
-    let drawing = Drawing { scene, mechanism };
+    let drawing = MechanismDrawing { scene, mechanism };
     let chart = MechanismChart {
         title: title.to_owned(),
         caption: std::iter::once(format!("scene {}", plain(&scene.name))).chain(caption).collect(),

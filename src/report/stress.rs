@@ -2,14 +2,14 @@
 
 use super::page::{Page, magnitude};
 #[cfg(feature = "charts")]
-use crate::chart::{self, ChartError, FILE_RESOLUTION, Map, MapAxis, Matrix, Picture, plain};
+use crate::chart::{self, ChartError, FILE_RESOLUTION, Map, MapAxis, OutcomeMatrix, Picture, plain};
 #[cfg(feature = "charts")]
 use crate::run::stress::StabilityMap;
-use crate::run::stress::{Cell, Line, Stress, Verdict};
+use crate::run::stress::{Stress, StressCell, StressLine, Verdict};
 use serde_json::{Value, json};
 
 /// The report as one JSON object.
-pub fn object(plan: &Stress, lines: &[Line]) -> Value {
+pub fn object(plan: &Stress, lines: &[StressLine]) -> Value {
     let count = |verdict| cells(lines).filter(|cell| cell.verdict == verdict).count();
     json!({
         "methods": names(plan),
@@ -23,7 +23,7 @@ pub fn object(plan: &Stress, lines: &[Line]) -> Value {
 }
 
 /// The cells as lines of comma-separated values.
-pub fn csv(lines: &[Line]) -> String {
+pub fn csv(lines: &[StressLine]) -> String {
     let number = |value: Option<f64>| value.map_or(String::new(), |value| format!("{value:e}"));
     let mut text = "scene,method,verdict,tolerance [rad],setting,error [rad],estimate [rad],\
                     energy drift [1],evaluations,runs,cause\n"
@@ -48,7 +48,7 @@ pub fn csv(lines: &[Line]) -> String {
 }
 
 /// The report as a page: a letter a cell, then what is wrong.
-pub fn text(plan: &Stress, lines: &[Line]) -> String {
+pub fn text(plan: &Stress, lines: &[StressLine]) -> String {
     let mut page = Page::new("stress", "Stiff and extreme scenes by every method.");
     for (number, name) in names(plan).iter().enumerate() {
         page.entry(if number == 0 { "methods" } else { "" }, &format!("{} {name}", letter(number)));
@@ -82,7 +82,7 @@ pub fn text(plan: &Stress, lines: &[Line]) -> String {
     page.into_text()
 }
 
-fn cells(lines: &[Line]) -> impl Iterator<Item = &Cell> {
+fn cells(lines: &[StressLine]) -> impl Iterator<Item = &StressCell> {
     lines.iter().flat_map(|line| &line.cells)
 }
 
@@ -117,20 +117,20 @@ fn word(verdict: Verdict) -> &'static str {
 /// # Errors
 /// Drawing fails.
 #[cfg(feature = "charts")]
-pub fn matrix(plan: &Stress, lines: &[Line]) -> Result<Picture, ChartError> {
-    let outcome = |cell: &Cell| match cell.verdict {
-        Verdict::Right => chart::Outcome::Right,
-        Verdict::Refused => chart::Outcome::Refused,
-        Verdict::Stopped => chart::Outcome::Stopped,
-        Verdict::Wrong => chart::Outcome::Wrong,
+pub fn matrix(plan: &Stress, lines: &[StressLine]) -> Result<Picture, ChartError> {
+    let outcome = |cell: &StressCell| match cell.verdict {
+        Verdict::Right => chart::CellOutcome::Right,
+        Verdict::Refused => chart::CellOutcome::Refused,
+        Verdict::Stopped => chart::CellOutcome::Stopped,
+        Verdict::Wrong => chart::CellOutcome::Wrong,
     };
-    let said = |cell: &Cell| match (cell.error, cell.verdict) {
+    let said = |cell: &StressCell| match (cell.error, cell.verdict) {
         (Some(error), Verdict::Right | Verdict::Wrong) => short(error),
         (None, Verdict::Right) if cell.refusal.is_some() => "refused".into(),
         (None, Verdict::Right) if cell.stop.is_some() => "stops".into(),
         _ => String::new(),
     };
-    let chart = Matrix {
+    let chart = OutcomeMatrix {
         title: "Stiff and extreme scenes by every method".into(),
         caption: vec![
             "errors of the end in rad, or of rates over themselves".into(),
@@ -155,8 +155,8 @@ fn short(error: f64) -> String {
 /// Drawing fails.
 #[cfg(feature = "charts")]
 pub fn stability(map: &StabilityMap) -> Result<Picture, ChartError> {
-    let ends = |value: fn(&crate::run::stress::Stability) -> f64| {
-        let of = |cell: Option<&crate::run::stress::Stability>| cell.map_or(1.0, value);
+    let ends = |value: fn(&crate::run::stress::StepStability) -> f64| {
+        let of = |cell: Option<&crate::run::stress::StepStability>| cell.map_or(1.0, value);
         [of(map.cells.first()), of(map.cells.last())]
     };
     let [softest, stiffest] = ends(|cell| cell.stiffness);

@@ -2,14 +2,14 @@
 
 use super::page::{Page, counted, figure, magnitude};
 #[cfg(feature = "charts")]
-use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Picture, Profile, plain};
+use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Picture, ProfileChart, plain};
 use crate::run::files::sha256;
 use crate::run::sweep::table::columns;
 #[cfg(feature = "charts")]
-use crate::run::sweep::table::{Layout, numbers};
+use crate::run::sweep::table::{SweepLayout, numbers};
 use crate::run::trust::{HORIZON, Level};
 #[cfg(feature = "charts")]
-use crate::run::{Point, Status};
+use crate::run::{Status, SweepPoint};
 use crate::run::{Sweep, Totals};
 use serde_json::{Value, json};
 
@@ -158,10 +158,10 @@ const MOST: u64 = 1 << 22;
 /// The chart of a sweep over one or two values, as its points come in.
 #[cfg(feature = "charts")]
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-pub struct Curve {
+pub struct SweepChart {
     /// Which of the numbers of a row.
     column: Option<usize>,
-    layout: Layout,
+    layout: SweepLayout,
     /// The numbers of all points so far; not a number where there is none.
     seen: Vec<f64>,
     failed: Vec<bool>,
@@ -204,7 +204,7 @@ pub enum NoChart {
 }
 
 #[cfg(feature = "charts")]
-impl Curve {
+impl SweepChart {
     /// A chart of this column of the table, its unit left out or not, or of the flip times.
     ///
     /// # Errors
@@ -231,14 +231,14 @@ impl Curve {
                     .ok_or_else(|| NoChart::Column(wanted.to_owned(), listed(sweep)))?,
             ),
         };
-        Ok(Self { column, layout: Layout::of(sweep), seen: Vec::new(), failed: Vec::new() })
+        Ok(Self { column, layout: SweepLayout::of(sweep), seen: Vec::new(), failed: Vec::new() })
     }
 
     /// Whether it can be the chart of so many points of a sweep.
     pub fn fits(&self, sweep: &Sweep, points: u64) -> bool {
         let sizes = [self.seen.len(), self.failed.len()];
         let is_known = self.column.is_none_or(|column| column < results(sweep).len());
-        is_known && self.layout == Layout::of(sweep) && sizes.iter().all(|&size| size as u64 == points)
+        is_known && self.layout == SweepLayout::of(sweep) && sizes.iter().all(|&size| size as u64 == points)
     }
 
     /// With the points of the part that follows.
@@ -248,7 +248,7 @@ impl Curve {
     }
 
     /// Takes a point.
-    pub fn see(&mut self, point: &Point) {
+    pub fn see(&mut self, point: &SweepPoint) {
         let numbers = numbers(point, self.layout);
         let column = self.column.map_or(numbers.len() - 1, |column| column + point.values.len());
         self.seen.push(numbers[column]);
@@ -351,7 +351,15 @@ impl Curve {
                 let values = (0..sweep.grid().count()).map(|index| sweep.grid().values(index)[0]).collect();
                 let x_name = axes.first().map(|axis| axis.name.clone()).unwrap_or_default();
                 chart::profile(
-                    &Profile { title, caption, x_name, y_name: name, x: values, y: self.seen.clone(), log },
+                    &ProfileChart {
+                        title,
+                        caption,
+                        x_name,
+                        y_name: name,
+                        x: values,
+                        y: self.seen.clone(),
+                        log,
+                    },
                     FILE_RESOLUTION,
                 )
             }

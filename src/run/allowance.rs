@@ -52,7 +52,7 @@ pub(super) struct Allowance {
 }
 
 /// A moment of a run, as far as its allowance goes.
-pub(super) struct Moment<'a> {
+pub(super) struct AllowanceMoment<'a> {
     /// Rates of all coordinates \[rad/s, m/s\].
     pub omega: &'a [f64],
     /// Coordinates that are positions \[m\].
@@ -96,7 +96,7 @@ impl Allowance {
     }
 
     /// What errors at the tolerance in every unknown come to in the energy at most, over the largest.
-    fn share(&self, moment: &Moment) -> f64 {
+    fn share(&self, moment: &AllowanceMoment) -> f64 {
         let ([relative, absolute], [length, time], largest) = (self.tolerance, self.units, moment.largest);
         let unit = |k: usize| if k < self.angles { 1.0 / time } else { length / time };
         let rates = || self.inertia.iter().zip(moment.omega);
@@ -136,7 +136,7 @@ impl Default for EnergyLimit {
 
 impl EnergyLimit {
     /// Goes on to another moment.
-    pub fn see(&mut self, allowance: &Allowance, moment: &Moment) {
+    pub fn see(&mut self, allowance: &Allowance, moment: &AllowanceMoment) {
         let share = allowance.share(moment);
         self.share = if share.is_nan() { f64::INFINITY } else { share.max(self.share) };
         let explained = GENEROUS * (moment.steps as f64 + FIRST_STEPS) * self.share;

@@ -1,7 +1,7 @@
 //! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is
 //! measured before the first step.
 
-use super::driver::{Driver, Halt, Watch, driver};
+use super::driver::{Driver, Halt, StepWatch, driver};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
@@ -214,7 +214,7 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     driver.allow(plan.max_evaluations);
     let rows = plan.rows.min(20);
     for row in 1..=rows {
-        match driver.advance(plan.time(row), plan.time(plan.rows), Watch::default(), &mut || false) {
+        match driver.advance(plan.time(row), plan.time(plan.rows), StepWatch::default(), &mut || false) {
             Ok(Halt::Until | Halt::Pause) => {}
             Ok(Halt::Contact(_) | Halt::Cut) => break,
             Err(stop) if stop.cause == Cause::RestingContact => break,

@@ -16,7 +16,7 @@ pub(super) use jumps::{Jump, JumpLog, Switch};
 pub(super) use rest::{Flight, come_to_rest};
 pub(super) use state::ContactDriverState;
 
-use super::driver::{Driver, Halt, Pause, Watch};
+use super::driver::{Driver, Halt, Pause, StepWatch};
 use super::event::{EventDetector, EventMemory};
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
@@ -254,7 +254,7 @@ impl ContactDriver {
                 observer: observer.as_deref_mut(),
             };
             let steps = watchers.is_asked().then_some(&mut watchers as &mut dyn StepWatcher);
-            let watch = Watch { flips: self.flips.as_mut(), monitor: lent(&mut monitor), steps };
+            let watch = StepWatch { flips: self.flips.as_mut(), monitor: lent(&mut monitor), steps };
             let halt = self.driver.advance(until, horizon, watch, pause);
             self.record_events(outcome);
             let impacts_before = outcome.impact_count;

@@ -4,7 +4,7 @@
 //! Memory does not grow with the run: the horizon is divided into a fixed number of intervals, and the record
 //! for charts is kept at times that grow by a constant factor.
 
-use super::allowance::{Allowance, EnergyLimit, Moment};
+use super::allowance::{Allowance, AllowanceMoment, EnergyLimit};
 use super::plan::Plan;
 use super::sample::Sample;
 use crate::arithmetic::sum::larger;
@@ -287,7 +287,7 @@ impl Drift {
             let translations = &sample.phi[sample.centre.len()..];
             self.limit.see(
                 allowance,
-                &Moment {
+                &AllowanceMoment {
                     omega: &sample.omega,
                     translations,
                     work: sample.work,

@@ -30,7 +30,7 @@ pub(super) enum Halt {
 
 /// What looks at a driver's steps.
 #[derive(Default)]
-pub(super) struct Watch<'a> {
+pub(super) struct StepWatch<'a> {
     /// Looks for bars that turn over.
     pub flips: Option<&'a mut FlipDetector>,
     /// Is shown the motion when it is due.
@@ -47,7 +47,7 @@ pub(super) trait Driver: Send {
         &mut self,
         until: Time,
         horizon: Time,
-        watch: Watch,
+        watch: StepWatch,
         pause: &mut Pause,
     ) -> Result<Halt, StepError>;
     fn read(&mut self, motion: &mut Motion);
@@ -122,10 +122,10 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
         &mut self,
         until: Time,
         horizon: Time,
-        watch: Watch,
+        watch: StepWatch,
         pause: &mut Pause,
     ) -> Result<Halt, StepError> {
-        let Watch { flips, mut monitor, mut steps } = watch;
+        let StepWatch { flips, mut monitor, mut steps } = watch;
         let mut flips = flips.filter(|flips| flips.flip.is_none());
         let (is_dense, target) = (self.is_dense, if self.is_dense { horizon } else { until });
         let is_there = |own: &Self| match is_dense {

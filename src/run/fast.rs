@@ -5,7 +5,7 @@
 //! that damps it away returns a wrong one, smoothly. Past 1e8 radians that wants to be asked for.
 
 use super::methods::MethodId;
-use super::plan::{Refusal, Request};
+use super::plan::{Request, RequestRefusal};
 use crate::dynamics::Stiffness;
 
 /// How much faster than all else a mode must be to be worth a note.
@@ -71,7 +71,7 @@ impl FastMode {
     ///
     /// # Errors
     /// More than 1e8 rad, no effort stated.
-    pub fn check(&self, method: MethodId, request: &Request, until: f64) -> Result<(), Refusal> {
+    pub fn check(&self, method: MethodId, request: &Request, until: f64) -> Result<(), RequestRefusal> {
         let is_asked_for = request.max_evaluations.is_some()
             || !method.is_adaptive()
             || matches!(method, MethodId::Radau(_));
@@ -79,7 +79,7 @@ impl FastMode {
             return Ok(());
         }
         let (rate, periods) = (self.rate, self.periods);
-        Err(Refusal {
+        Err(RequestRefusal {
             is_usage: false,
             what: format!("{} over {until} s", self.name()),
             reason: format!(

@@ -11,7 +11,7 @@ mod names;
 mod stream;
 
 pub use names::*;
-pub use stream::{Cursor, Stream};
+pub use stream::{Stream, StreamPosition};
 
 use self::stream::hashed;
 use super::checkpoint;
@@ -177,7 +177,7 @@ impl Folder {
     ///
     /// # Errors
     /// It cannot be opened, or is not the one the cursor was in.
-    pub fn take_up(&self, name: &'static str, cursor: &Cursor) -> Result<Stream, FileError> {
+    pub fn take_up(&self, name: &'static str, cursor: &StreamPosition) -> Result<Stream, FileError> {
         let path = self.unfinished(name);
         // A run that was over may have fallen between giving the table its name and writing its record.
         let place = if path.exists() { path.clone() } else { self.path.join(name) };

@@ -7,9 +7,9 @@
 use super::contact::ContactDriver;
 use super::running::Outcome;
 use crate::arithmetic::Complex;
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::friction::modes::{HINT, JAMS, Modes};
-use crate::dynamics::friction::{Friction, Mode, Moment, Transition};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, FrictionMoment, Transition};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, StepError};
@@ -66,7 +66,7 @@ impl FrictionWatch {
     }
 
     /// The place a function is of; `None` for the regularity.
-    pub fn place(&self, function: usize) -> Option<&Friction> {
+    pub fn place(&self, function: usize) -> Option<&CompiledFriction> {
         self.mechanism.frictions.get(function)
     }
 
@@ -78,9 +78,9 @@ impl FrictionWatch {
     /// Relative velocities of what slides, which take no forces.
     fn sliding(&self, t: Time, phi: &[f64], omega: &[f64]) -> Vec<f64> {
         let z = self.mechanism.elements(phi);
-        let (at, mut row) = (Posture { phi, z: &z, omega }, vec![0.0; phi.len()]);
-        let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
-            Mode::Slip(_) | Mode::Strained(_) => {
+        let (at, mut row) = (ConstraintArguments { phi, z: &z, omega }, vec![0.0; phi.len()]);
+        let of_place = |(number, (friction, mode)): (usize, (&CompiledFriction, &FrictionMode))| match mode {
+            FrictionMode::Slip(_) | FrictionMode::Strained(_) => {
                 row.fill(0.0);
                 friction.tangent.differentiate(t, at, &mut row);
                 self.velocity(number, *mode, &row, omega)
@@ -92,10 +92,10 @@ impl FrictionWatch {
 
     /// The relative velocity of a place that slides, and what is left to one that motors hold of what counts
     /// as rest; `row` is the place's Jacobian.
-    fn velocity(&self, place: usize, mode: Mode, row: &[f64], omega: &[f64]) -> f64 {
+    fn velocity(&self, place: usize, mode: FrictionMode, row: &[f64], omega: &[f64]) -> f64 {
         match mode {
-            Mode::Slip(sign) => sign * dot(row, omega),
-            Mode::Strained(0.0) => {
+            FrictionMode::Slip(sign) => sign * dot(row, omega),
+            FrictionMode::Strained(0.0) => {
                 let parts: f64 = row.iter().zip(omega).map(|(d, omega)| (d * omega).abs()).sum();
                 let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time;
                 AT_REST * parts.max(own) - dot(row, omega).abs()
@@ -128,12 +128,12 @@ impl FrictionWatch {
             Vec::new()
         };
         let mut rows = kernel.friction_rows.chunks_exact(n);
-        let of_place = |(number, (friction, mode)): (usize, (&Friction, &Mode))| match mode {
-            Mode::Open => 1.0,
-            Mode::Slip(_) | Mode::Strained(_) => {
+        let of_place = |(number, (friction, mode)): (usize, (&CompiledFriction, &FrictionMode))| match mode {
+            FrictionMode::Open => 1.0,
+            FrictionMode::Slip(_) | FrictionMode::Strained(_) => {
                 rows.next().map_or(0.0, |row| self.velocity(number, *mode, row, &omega))
             }
-            Mode::Stick(_) => {
+            FrictionMode::Stick(_) => {
                 let [tau, pressing] = forces[number];
                 let most = friction.stiction * pressing;
                 most * most - tau * tau
@@ -169,12 +169,12 @@ impl FrictionWatch {
     fn transition(&self, function: usize, motion: &Motion) -> Option<Transition> {
         let mode = self.mechanism.modes.get(function)?;
         Some(match mode {
-            Mode::Stick(_) => {
+            FrictionMode::Stick(_) => {
                 let sign = if self.breaking_force(function, motion) < 0.0 { -1.0 } else { 1.0 };
                 Transition { arrived: None, breaks: Some((function, sign)) }
             }
             // It moves already.
-            Mode::Strained(_) => Transition::default(),
+            FrictionMode::Strained(_) => Transition::default(),
             _ => Transition { arrived: Some(function), breaks: None },
         })
     }
@@ -205,7 +205,7 @@ impl ContactDriver {
         let motion = self.motion();
         let [phi, omega] = motion.rounded();
         let z: Vec<Complex<f64>> = self.free.elements(&phi);
-        let at = Moment { t: motion.time, phi: &phi, z: &z, omega: &omega };
+        let at = FrictionMoment { t: motion.time, phi: &phi, z: &z, omega: &omega };
         let found = self.free.modes_at(at, &self.mechanism.modes, [&staying, touching], transition);
         found.map_err(|paradox| {
             let places: Vec<&str> =
@@ -227,7 +227,7 @@ impl ContactDriver {
     }
 
     /// Counts the places that begin to stick, to slide, or are apart.
-    pub(super) fn record_modes(&self, modes: &[Mode], t: f64, outcome: &mut Outcome) {
+    pub(super) fn record_modes(&self, modes: &[FrictionMode], t: f64, outcome: &mut Outcome) {
         for (number, (mode, before)) in modes.iter().zip(&self.mechanism.modes).enumerate() {
             let mode = mode.word();
             if mode == before.word() {

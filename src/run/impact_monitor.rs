@@ -19,7 +19,7 @@ mod several;
 pub(super) use several::check_several;
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::constraint::{Measure, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, RowMeasure};
 use crate::dynamics::contact::scale::magnitudes;
 use crate::dynamics::forest::BodyOrigin;
 use crate::dynamics::impact::{AWAY, Contact};
@@ -200,7 +200,7 @@ fn beyond(value: f64, bound: f64) -> bool {
 
 /// n·through of a wall \[m\].
 fn offset(contact: &Contact) -> f64 {
-    let Measure::Place(place) = &contact.row.measure else { return 0.0 };
+    let RowMeasure::Place(place) = &contact.row.measure else { return 0.0 };
     contact.normal.dot(contact.point.root) - place.constant
 }
 
@@ -239,7 +239,7 @@ impl Contact {
 
     /// Angles of the mechanism; translational coordinates come after them.
     fn angles(&self) -> usize {
-        let Measure::Place(place) = &self.row.measure else { return 0 };
+        let RowMeasure::Place(place) = &self.row.measure else { return 0 };
         place.angles
     }
 }
@@ -322,7 +322,7 @@ fn slips(mechanism: &Mechanism, before: &Motion, after: &Motion) -> Result<[f64;
         let mut jacobian = vec![DoubleDouble::ZERO; before.phi.len()];
         let here = row.differentiate(
             before.time,
-            Posture { phi: &before.phi, z: &z, omega: &before.omega },
+            ConstraintArguments { phi: &before.phi, z: &z, omega: &before.omega },
             &mut jacobian,
         );
         let sides = [before, after].map(|motion| {

@@ -21,15 +21,15 @@ mod transmission;
 mod walk;
 
 pub(super) use drive::left_out;
-pub use drive::{Drive, KinematicsError};
+pub use drive::{KinematicDrive, KinematicsError};
 pub use transmission::Transmission;
 
 use crate::dynamics::Mechanism;
 use crate::scene::Scene;
-use drive::Driven;
+use drive::DrivenScene;
 use serde::Serialize;
 use std::sync::Arc;
-use walk::{IN_LINE, Solved, Walk};
+use walk::{DriveWalk, IN_LINE, SolvedPosition};
 
 /// Relative width at which a searched time is taken for found.
 const FOUND: f64 = 1e-13;
@@ -149,18 +149,22 @@ pub struct Kinematics {
 ///
 /// # Errors
 /// There is nothing to drive, or more moves than the drive gives; the scene with the drive does not compile.
-pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinematics, KinematicsError> {
-    let Driven { scene, mechanism, start, row, name, label, unit, rate, range, is_turn } =
-        Driven::new(scene, drive)?;
+pub fn kinematics(
+    scene: &Scene,
+    drive: &KinematicDrive,
+    count: usize,
+) -> Result<Kinematics, KinematicsError> {
+    let DrivenScene { scene, mechanism, start, row, name, label, unit, rate, range, is_turn } =
+        DrivenScene::new(scene, drive)?;
     let transmissions = transmission::of(&scene, &name);
     let lines = transmission::lines(&scene);
-    let walk = Walk::at_start(&mechanism, &scene, row, [start, rate], [&transmissions, &lines])?;
+    let walk = DriveWalk::at_start(&mechanism, &scene, row, [start, rate], [&transmissions, &lines])?;
     let count = count.max(1);
     let value = |k: usize| range[0] + (range[1] - range[0]) * (k as f64 / count as f64);
     let time = |value: f64| (value - start) / rate;
     // The positions on either side of the start, each from there outwards.
     let mut limits = Vec::new();
-    let mut sides: [Vec<Solved>; 2] = Default::default();
+    let mut sides: [Vec<SolvedPosition>; 2] = Default::default();
     let mut here = walk.clone();
     for (side, is_below) in sides.iter_mut().zip([true, false]) {
         let mut values: Vec<f64> = (0..=count).map(value).filter(|v| (*v < start) == is_below).collect();
@@ -179,7 +183,7 @@ pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinemati
         }
     }
     let [below, above] = sides;
-    let all: Vec<Solved> = below.into_iter().rev().chain(above).collect();
+    let all: Vec<SolvedPosition> = below.into_iter().rev().chain(above).collect();
     let mut found = Kinematics {
         branches: mechanism.other_assemblies(&scene, ATTEMPTS),
         left_out: left_out(&scene),
@@ -205,14 +209,14 @@ pub fn kinematics(scene: &Scene, drive: &Drive, count: usize) -> Result<Kinemati
 
 impl Kinematics {
     /// Looks between positions for dead centres, change points and extremes.
-    fn search(&mut self, all: &[Solved], walk: &mut Walk) {
+    fn search(&mut self, all: &[SolvedPosition], walk: &mut DriveWalk) {
         let coordinates = self.mechanism.coordinates();
         let own = self.mechanism.own_bodies().len();
         let shown: Vec<usize> = (0..own).chain(self.mechanism.bodies.len()..coordinates).collect();
         let fastest = |k: usize| all.iter().map(|one| one.position.omega[k].abs()).fold(0.0, f64::max);
         let most = shown.iter().map(|&k| fastest(k)).fold(0.0, f64::max);
         let moving: Vec<usize> = shown.into_iter().filter(|&k| fastest(k) > STILL * most).collect();
-        for [before, after] in all.windows(2).filter_map(|pair| <&[Solved; 2]>::try_from(pair).ok()) {
+        for [before, after] in all.windows(2).filter_map(|pair| <&[SolvedPosition; 2]>::try_from(pair).ok()) {
             for &k in &moving {
                 let rates = [before, after].map(|one| one.position.omega[k]);
                 if (rates[0] * rates[1] < 0.0 || rates[1] == 0.0)
@@ -227,7 +231,7 @@ impl Kinematics {
                 }
             }
             if before.orientation.zip(after.orientation).is_some_and(|(before, after)| before * after < 0.0) {
-                let sign = |walk: &Walk| walk.orientation().unwrap_or(0.0);
+                let sign = |walk: &DriveWalk| walk.orientation().unwrap_or(0.0);
                 self.change_points.extend(walk.root([before, after], sign).map(|found| found.drive));
             }
         }

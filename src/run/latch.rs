@@ -12,8 +12,8 @@
 
 use super::contact::{ContactDriver, in_modes};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::contact::metric::Metric;
-use crate::dynamics::friction::{Mode, Normal};
+use crate::dynamics::contact::metric::ContactMetric;
+use crate::dynamics::friction::{FrictionMode, Normal};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Form, Mechanism, Motion};
@@ -82,7 +82,7 @@ pub(super) fn close(
             return Err((what, "let the event be where it meets"));
         }
     }
-    let open = vec![Mode::Open; after.frictions.len()];
+    let open = vec![FrictionMode::Open; after.frictions.len()];
     let free = Arc::new(after.clone());
     loop {
         let mechanism = in_modes(&free, held, &open);
@@ -106,11 +106,12 @@ pub(super) fn close(
 }
 
 /// Modes of places with friction where only these contacts are held.
-pub(super) fn modes(mechanism: &Mechanism, modes: &[Mode], held: &[usize]) -> Vec<Mode> {
-    let mode = |(place, &mode): (&crate::dynamics::friction::Friction, &Mode)| match place.normal {
-        Normal::Contact(contact) if !held.contains(&contact) => Mode::Open,
-        _ => mode,
-    };
+pub(super) fn modes(mechanism: &Mechanism, modes: &[FrictionMode], held: &[usize]) -> Vec<FrictionMode> {
+    let mode =
+        |(place, &mode): (&crate::dynamics::friction::CompiledFriction, &FrictionMode)| match place.normal {
+            Normal::Contact(contact) if !held.contains(&contact) => FrictionMode::Open,
+            _ => mode,
+        };
     mechanism.frictions.iter().zip(modes).map(mode).collect()
 }
 
@@ -147,7 +148,7 @@ fn residuals(mechanism: &Mechanism, motion: &Motion) -> Vec<f64> {
 /// Rates after all rows have taken hold, their impulses, and the work of motors and walls \[J\].
 pub(super) fn plastic(mechanism: &Mechanism, motion: &Motion) -> Option<(Vec<f64>, Vec<f64>, f64)> {
     let [phi, omega] = motion.rounded();
-    let metric = Metric::at(mechanism, motion.time, &phi, &omega)?;
+    let metric = ContactMetric::at(mechanism, motion.time, &phi, &omega)?;
     let before = metric.velocity(&omega);
     let change = metric.kept(&before) - &before;
     let impulses = metric.multipliers(&-&change);

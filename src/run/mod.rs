@@ -102,14 +102,14 @@ pub use event::{Action, Change, Direction, Event, EventRecord};
 pub use extremes::Extremes;
 pub use fast::FastMode;
 #[cfg(feature = "files")]
-pub use files::{Cursor, FileError, Folder, Stream};
+pub use files::{FileError, Folder, Stream, StreamPosition};
 pub use flip::Flip;
 pub use friction::FrictionRecord;
 pub use inside::{Observer, Step};
 pub use kinematics::{Kinematics, kinematics};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use modes::{Modes, modes};
-pub use plan::{Plan, Refusal, Request};
+pub use plan::{Plan, Request, RequestRefusal};
 pub use reference::{Reference, reference};
 pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integrate, simulate};
 pub use sample::{Sample, Sampler};
@@ -119,7 +119,8 @@ pub use sensitivity::{
 #[cfg(feature = "files")]
 pub use sweep::table::SweepTable;
 pub use sweep::{
-    Grid, Point, PointObserver, Shard, Status, Sweep, SweepError, Totals, Vary, VaryError, sweep, sweep_on,
+    Grid, PointObserver, Shard, Status, Sweep, SweepError, SweepPoint, Totals, Vary, VaryError, sweep,
+    sweep_on,
 };
 pub use trace::Trace;
 pub use trajectory::Recorder;

@@ -21,7 +21,7 @@ mod search;
 pub use self::periodic::{PeriodicMotion, PeriodicMotions, periodic};
 
 pub(super) use self::local::Local;
-use self::search::Search;
+use self::search::EquilibriumSearch;
 use super::kinematics::left_out;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{Mechanism, Time};
@@ -196,7 +196,7 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     let [first, _] = start.rounded();
     let others = mechanism.other_assemblies(scene, starts);
     let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST) } else { Vec::new() };
-    let mut search = Search::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
+    let mut search = EquilibriumSearch::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
     if search.local.depends_on_time(&first) {
         return Err(ModesError::Forced);
     }

@@ -93,7 +93,7 @@ pub struct Plan {
 /// Why a request was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{what}: {reason}\nhint: {alternative}")]
-pub struct Refusal {
+pub struct RequestRefusal {
     /// True where the options contradict one another whatever the scene.
     pub is_usage: bool,
     /// The pairing or option.
@@ -135,7 +135,7 @@ impl Plan {
     ///
     /// # Errors
     /// Options out of range, or a pairing of scene, method and stabilization that makes no sense.
-    pub fn new(scene: &Scene, mechanism: &Mechanism, request: &Request) -> Result<Self, Refusal> {
+    pub fn new(scene: &Scene, mechanism: &Mechanism, request: &Request) -> Result<Self, RequestRefusal> {
         check_numbers(request)?;
         let until = request.until.unwrap_or(scene.until);
         let mut every = request.every.unwrap_or(scene.every).min(until);
@@ -356,7 +356,7 @@ fn rows(until: f64, every: f64) -> f64 {
 }
 
 /// Every number asked for must be positive and finite; steps and tolerances must suit one another.
-fn check_numbers(request: &Request) -> Result<(), Refusal> {
+fn check_numbers(request: &Request) -> Result<(), RequestRefusal> {
     let positive = [
         ("--step", request.step, LONGEST),
         ("--until", request.until, LONGEST),
@@ -414,7 +414,7 @@ fn check_numbers(request: &Request) -> Result<(), Refusal> {
 }
 
 /// Tolerances must be such as the method makes use of.
-fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Result<(), Refusal> {
+fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Result<(), RequestRefusal> {
     let least = least_tolerance(method, extended);
     for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
         if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
@@ -429,10 +429,10 @@ fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Resu
     Ok(())
 }
 
-fn usage(what: &str, reason: String, alternative: &str) -> Refusal {
-    Refusal { is_usage: true, what: what.into(), reason, alternative: alternative.into() }
+fn usage(what: &str, reason: String, alternative: &str) -> RequestRefusal {
+    RequestRefusal { is_usage: true, what: what.into(), reason, alternative: alternative.into() }
 }
 
-fn mismatch(what: String, reason: &str, alternative: &str) -> Refusal {
-    Refusal { is_usage: false, what, reason: reason.into(), alternative: alternative.into() }
+fn mismatch(what: String, reason: &str, alternative: &str) -> RequestRefusal {
+    RequestRefusal { is_usage: false, what, reason: reason.into(), alternative: alternative.into() }
 }

@@ -8,7 +8,7 @@
 
 use super::build::{build, exact};
 use super::contact::ContactDriver;
-use super::driver::{Driver, Halt, Pause, Watch};
+use super::driver::{Driver, Halt, Pause, StepWatch};
 use super::methods::MethodId;
 use super::plan::Plan;
 use super::running::Outcome;
@@ -93,7 +93,8 @@ pub(super) fn reference_while(
     }
     let horizon = times.last().copied().unwrap_or_default();
     if mechanism.contacts.is_empty() && !mechanism.is_switched() && !mechanism.has_aims() {
-        let walks = EXACT.map(|(order, tolerance)| Walk::exact(mechanism, start, order, tolerance, horizon));
+        let walks =
+            EXACT.map(|(order, tolerance)| ReferenceWalk::exact(mechanism, start, order, tolerance, horizon));
         return Ok(side_by_side(mechanism, walks, times, 0.0, pause));
     }
     let (method, tolerances, floor) = match mechanism.has_series() {
@@ -101,7 +102,7 @@ pub(super) fn reference_while(
         false => (MethodId::Dp8, STEPPED, STEPPED_TO),
     };
     let [fine, coarse] =
-        tolerances.map(|tolerance| Walk::in_doubles(mechanism, start, method, tolerance, horizon));
+        tolerances.map(|tolerance| ReferenceWalk::in_doubles(mechanism, start, method, tolerance, horizon));
     Ok(side_by_side(mechanism, [fine?, coarse?], times, floor, pause))
 }
 
@@ -109,7 +110,7 @@ pub(super) fn reference_while(
 /// least: as far as both get, and what stopped them.
 pub(super) fn side_by_side(
     mechanism: &Mechanism,
-    mut walks: [Walk; 2],
+    mut walks: [ReferenceWalk; 2],
     times: &[Time],
     floor: f64,
     pause: &mut Pause,
@@ -133,14 +134,14 @@ pub(super) fn side_by_side(
 }
 
 /// A motion that is read at one time after another.
-pub(super) enum Walk {
+pub(super) enum ReferenceWalk {
     /// By the series in double-double, on its way to a horizon.
     Exact(Box<dyn Driver>, Time),
     /// By a method in doubles, through impacts and holds.
     InDoubles(Box<(ContactDriver, Outcome)>),
 }
 
-impl Walk {
+impl ReferenceWalk {
     fn exact(
         mechanism: &Arc<Mechanism>,
         start: &Motion,
@@ -174,7 +175,7 @@ impl Walk {
     pub(super) fn to(&mut self, time: Time, pause: &mut Pause) -> Result<Option<Motion>, StepError> {
         match self {
             Self::Exact(driver, horizon) => {
-                if driver.advance(time, *horizon, Watch::default(), pause)? == Halt::Pause {
+                if driver.advance(time, *horizon, StepWatch::default(), pause)? == Halt::Pause {
                     return Ok(None);
                 }
                 let mut motion = Motion::default();

@@ -23,14 +23,14 @@ mod finer;
 mod side;
 mod together;
 
-pub(super) use finer::{Difference, Level, agreeing};
+pub(super) use finer::{Difference, DistanceLevel, agreeing};
 pub(super) use side::Side;
 
 use super::contact::{Flight, Jump, Switch, come_to_rest};
 use super::event::SwitchFunction;
 use super::friction::FrictionWatch;
 use super::latch::plastic;
-use crate::dynamics::friction::Mode;
+use crate::dynamics::friction::FrictionMode;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;
 
@@ -47,7 +47,7 @@ const SHARE: f64 = 0.05;
 pub(super) type Weighted = (f64, Arc<Mechanism>);
 
 /// Such mechanisms at distances that become finer.
-pub(super) type Levels = Vec<Level<Weighted>>;
+pub(super) type Levels = Vec<DistanceLevel<Weighted>>;
 
 /// The neighbours of a column, by number, as they are after a jump.
 type Follow<'a> = dyn Fn(usize, &Jump) -> Result<Levels, String> + 'a;
@@ -56,19 +56,19 @@ type Follow<'a> = dyn Fn(usize, &Jump) -> Result<Levels, String> + 'a;
 type Function<'a> = &'a dyn Fn(&Arc<Mechanism>, &Motion) -> Option<Vec<f64>>;
 
 /// Small differences of all coordinates and rates, beside which the mechanism may be another.
-pub(super) struct Column<'a> {
+pub(super) struct Delta<'a> {
     /// Coordinates, then rates.
     pub entries: &'a mut [f64],
     pub neighbours: Levels,
 }
 
-impl Column<'_> {
+impl Delta<'_> {
     /// The derivative of what a function tells of the neighbours beside what it tells `here`, where there are
     /// any and it tells of all.
     fn moved(&self, here: &[f64], value: impl Fn(&Arc<Mechanism>) -> Option<Vec<f64>>) -> Option<Vec<f64>> {
         let of = |(weight, neighbour): &Weighted| Some((*weight, value(neighbour)?));
         agreeing(self.neighbours.len(), |level| {
-            let Level { far, list } = self.neighbours.get(level)?;
+            let DistanceLevel { far, list } = self.neighbours.get(level)?;
             let values: Option<Vec<_>> = list.iter().map(of).collect();
             Some(Difference::of(values?, here, *far))
         })
@@ -77,7 +77,7 @@ impl Column<'_> {
 }
 
 /// What happens at one moment.
-pub(super) struct Passage<'a> {
+pub(super) struct Discontinuity<'a> {
     /// With what acts, sticks and is held before it.
     pub mechanism: &'a Arc<Mechanism>,
     pub jumps: &'a [Jump],
@@ -92,7 +92,7 @@ pub(super) struct Passage<'a> {
 
 /// What came of it beside the columns.
 #[derive(Default)]
-pub(super) struct Passed {
+pub(super) struct Crossed {
     /// The walls that were met, and how much later \[s\] for each column.
     pub walls: Vec<(usize, Vec<f64>)>,
     /// How much later \[s\] it happens, for each column.
@@ -141,7 +141,7 @@ pub(super) fn event_value(mechanism: &Mechanism, at: SwitchFunction, motion: &Mo
 fn derivative(
     mechanism: &Arc<Mechanism>,
     side: &Side,
-    column: &Column,
+    column: &Delta,
     [late, share]: [f64; 2],
     value: Function,
 ) -> Option<Vec<f64>> {
@@ -169,12 +169,12 @@ fn shift(column: &mut [f64], late: f64, side: &Side) {
 ///
 /// # Errors
 /// Why neighbours do not go the same way.
-pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed, String> {
-    let Passage { mechanism, jumps, .. } = *passage;
+pub(super) fn cross(passage: &Discontinuity, columns: &mut [Delta]) -> Result<Crossed, String> {
+    let Discontinuity { mechanism, jumps, .. } = *passage;
     if together::is_at_several(jumps) {
         return together::cross(passage, columns);
     }
-    let mut passed = Passed::default();
+    let mut passed = Crossed::default();
     let is_cause = |jump: &&Jump| jump.contact.is_some() || jump.switch.is_some() || jump.friction.is_some();
     let (Some(cause), Some(last)) = (jumps.iter().find(is_cause), jumps.last()) else { return Ok(passed) };
     if jumps.iter().filter(|jump| jump.switch.is_some()).count() > 1 {
@@ -219,7 +219,7 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
 }
 
 /// Takes the neighbours of a column on to what they are after a jump.
-fn follow(passage: &Passage, k: usize, jump: &Jump, column: &mut Column) -> Result<(), String> {
+fn follow(passage: &Discontinuity, k: usize, jump: &Jump, column: &mut Delta) -> Result<(), String> {
     if !column.neighbours.is_empty() && !Arc::ptr_eq(&jump.mechanism, passage.mechanism) {
         column.neighbours = (passage.follow)(k, jump)?;
     }
@@ -231,7 +231,7 @@ fn late_at_wall(
     mechanism: &Mechanism,
     contact: usize,
     here: &Side,
-    columns: &[Column],
+    columns: &[Delta],
 ) -> Result<Vec<f64>, String> {
     if !mechanism.frictions.is_empty() && !mechanism.held.is_empty() {
         return Err("an impact beside a contact with dry friction is not followed".into());
@@ -248,10 +248,10 @@ fn late_at_wall(
 
 /// How much later \[s\] an event happens that switches parts or branches, column by column.
 fn late_at_switch(
-    passage: &Passage,
+    passage: &Discontinuity,
     switch: &Switch,
     here: &Side,
-    columns: &[Column],
+    columns: &[Delta],
 ) -> Result<Vec<f64>, String> {
     if !switch.keeps_motion {
         return Err("an event from outside sets the motion, which is not followed".into());
@@ -263,10 +263,10 @@ fn late_at_switch(
 
 /// How much later \[s\] a place with friction begins to stick or to slide, column by column.
 fn late_at_friction(
-    passage: &Passage,
+    passage: &Discontinuity,
     place: Option<usize>,
     here: &Side,
-    columns: &[Column],
+    columns: &[Delta],
 ) -> Result<Vec<f64>, String> {
     let own = FrictionWatch::new(passage.mechanism);
     late_with(passage, here, columns, &|of, motion| {
@@ -281,12 +281,12 @@ fn late_at_friction(
 /// How much later \[s\] a function of the motion is zero, or a jump at this moment has taken it across,
 /// column by column.
 fn late_with(
-    passage: &Passage,
+    passage: &Discontinuity,
     here: &Side,
-    columns: &[Column],
+    columns: &[Delta],
     value: Function,
 ) -> Result<Vec<f64>, String> {
-    let Passage { mechanism, earlier, .. } = *passage;
+    let Discontinuity { mechanism, earlier, .. } = *passage;
     if let (Some(earlier), Some(off)) = (earlier, value(mechanism, &here.motion)) {
         let rate = here.slope(&here.ahead(), 1.0, f64::INFINITY, &mut |motion| value(mechanism, motion));
         let passed = rate.map_or(0.0, |rate| SUDDEN * mechanism.units.time * rate[0].abs());
@@ -304,7 +304,7 @@ fn late_with(
 pub(super) fn late_at_zero(
     mechanism: &Arc<Mechanism>,
     here: &Side,
-    columns: &[Column],
+    columns: &[Delta],
     value: Function,
 ) -> Result<Vec<f64>, String> {
     let unknown = "what happens here is not known to the scene";
@@ -313,7 +313,7 @@ pub(super) fn late_at_zero(
     if rate == 0.0 || !rate.is_finite() {
         return Err("an event function only touches zero, which neighbouring motions may miss".into());
     }
-    let late = |column: &Column| {
+    let late = |column: &Delta| {
         let change = derivative(mechanism, here, column, [0.0, f64::INFINITY], value).ok_or(unknown)?;
         Ok(-change[0] / rate)
     };
@@ -322,13 +322,13 @@ pub(super) fn late_at_zero(
 
 /// What an event, so much later \[s\], sets otherwise along a column; `None` where it sets nothing.
 fn set_at(
-    passage: &Passage,
+    passage: &Discontinuity,
     switch: &Switch,
     here: &Side,
     late: f64,
-    column: &Column,
+    column: &Delta,
 ) -> Result<Option<Vec<f64>>, String> {
-    let Passage { mechanism, set, .. } = *passage;
+    let Discontinuity { mechanism, set, .. } = *passage;
     let sets = |event: usize| {
         let events = mechanism.laws.as_ref().map(|laws| &laws.formulas.events);
         events.is_some_and(|events| events[event].parameters().next().is_some())
@@ -350,7 +350,7 @@ fn set_at(
 /// A mechanism that holds these contacts, in which nothing sticks or slides: friction in hinges and sliders
 /// takes no part in impacts.
 fn striking(mechanism: &Arc<Mechanism>, held: &[usize]) -> Arc<Mechanism> {
-    let open = vec![Mode::Open; mechanism.frictions.len()];
+    let open = vec![FrictionMode::Open; mechanism.frictions.len()];
     match mechanism.held == held && mechanism.modes == open {
         true => Arc::clone(mechanism),
         false => Arc::new(mechanism.moving(held, &open)),
@@ -358,7 +358,7 @@ fn striking(mechanism: &Arc<Mechanism>, held: &[usize]) -> Arc<Mechanism> {
 }
 
 /// The rates of a column after an impact.
-fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut Column) -> Result<(), String> {
+fn impact_at(jump: &Jump, contact: usize, late: f64, column: &mut Delta) -> Result<(), String> {
     strike(&striking(&jump.mechanism, &jump.mechanism.held), &jump.before, contact, late, column)
 }
 
@@ -368,7 +368,7 @@ fn strike(
     before: &Motion,
     contact: usize,
     late: f64,
-    column: &mut Column,
+    column: &mut Delta,
 ) -> Result<(), String> {
     let side = Side::resting(before);
     let rates = |of: &Arc<Mechanism>, motion: &Motion| {
@@ -384,7 +384,7 @@ fn strike(
 
 /// The differences at which the point of a wall still moves along its normal as it does, for a column that is
 /// there so much later \[s\].
-fn reach(mechanism: &Arc<Mechanism>, contact: usize, side: &Side, late: f64, column: &Column) -> f64 {
+fn reach(mechanism: &Arc<Mechanism>, contact: usize, side: &Side, late: f64, column: &Delta) -> f64 {
     let speed =
         |motion: &Motion| Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()]);
     let most = column.entries.iter().fold(late.abs(), |most, entry| most.max(entry.abs()));
@@ -398,7 +398,7 @@ fn reach(mechanism: &Arc<Mechanism>, contact: usize, side: &Side, late: f64, col
 }
 
 /// The rates of a column after what closes or engages.
-fn close_at(jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
+fn close_at(jump: &Jump, late: f64, column: &mut Delta) -> Result<(), String> {
     let held = &jump.mechanism.held;
     let closing = striking(&jump.mechanism, held);
     let rates =
@@ -413,7 +413,7 @@ fn is_hold(jump: &Jump) -> bool {
 }
 
 /// The rates of a column after contacts are held, which takes off what speed the last impact has left.
-fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Column) -> Result<(), String> {
+fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Delta) -> Result<(), String> {
     let (mechanism, side) = (&jump.mechanism, Side::resting(&jump.before));
     let new: Vec<usize> =
         mechanism.held.iter().copied().filter(|contact| !before.held.contains(contact)).collect();
@@ -439,7 +439,7 @@ fn change(
     mechanism: &Arc<Mechanism>,
     side: &Side,
     size: [f64; 2],
-    column: &mut Column,
+    column: &mut Delta,
     rates: Function,
 ) -> Option<()> {
     let after = derivative(mechanism, side, column, size, rates)?;

@@ -4,7 +4,7 @@
 //! not the rounding of its measurement.
 
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::constraint::{ConstraintEquation, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation};
 use crate::dynamics::energy::Energy;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
@@ -215,7 +215,7 @@ impl Sampler {
         });
         for (r, row) in mechanism.constraints.iter().enumerate() {
             self.jacobian.fill(DoubleDouble::ZERO);
-            let posture = Posture { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };
+            let posture = ConstraintArguments { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };
             let here = row.linearise(motion.time, posture, &mut self.jacobian);
             let rate = self.jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
             sample.constraints[r] = [here.position.hi, rate.hi];

@@ -13,9 +13,9 @@
 //! Mechanisms whose springs are too far from their places for that are integrated without.
 
 use crate::arithmetic::Complex;
-use crate::dynamics::force::Spring;
+use crate::dynamics::force::CompiledSpring;
 use crate::dynamics::{BodyAngles, Mechanism};
-use crate::stepping::search::{Chebyshev, Crossing, Curve, Part, crossing, interpolated};
+use crate::stepping::search::{Chebyshev, Crossing, Curve, IntervalBounds, crossing, interpolated};
 use crate::stepping::{Cause, StepError};
 
 /// A length below this share of the free length is none.
@@ -26,7 +26,7 @@ const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-9;
 
 /// True where the two ends of a spring can meet.
-fn can_shrink(spring: &Spring) -> bool {
+fn can_shrink(spring: &CompiledSpring) -> bool {
     let parts = std::iter::once(&spring.span.root).chain(spring.span.terms.iter().map(|term| &term.1));
     let lengths: Vec<f64> = parts.map(|part| part.norm_squared().sqrt()).collect();
     let (all, most) = (lengths.iter().sum::<f64>(), lengths.iter().copied().fold(0.0, f64::max));
@@ -38,7 +38,7 @@ fn can_shrink(spring: &Spring) -> bool {
 /// Watches the springs that can lose their length.
 #[derive(Default)]
 pub(super) struct SpringGuard {
-    springs: Vec<Spring>,
+    springs: Vec<CompiledSpring>,
     /// Number of bodies of the mechanism.
     bodies: usize,
     /// The beginning of the step to come.
@@ -56,7 +56,12 @@ pub(super) struct WithoutLength {
 }
 
 /// D and D' of a spring of a mechanism \[m, m/s\].
-fn ends(spring: &Spring, bodies: usize, at: &BodyAngles, z: &mut Vec<Complex<f64>>) -> [Complex<f64>; 2] {
+fn ends(
+    spring: &CompiledSpring,
+    bodies: usize,
+    at: &BodyAngles,
+    z: &mut Vec<Complex<f64>>,
+) -> [Complex<f64>; 2] {
     z.clear();
     z.extend(at.phi[..bodies].iter().map(|&phi| Complex::unit(phi)));
     // The translational coordinates of bodies that hang on nothing are where the first of their coordinates
@@ -77,13 +82,13 @@ impl Curve for Length {
         [x[0] * x[0] + y[0] * y[0] - NONE * NONE, 2.0 * (x[0] * x[1] + y[0] * y[1])]
     }
 
-    fn about(&self, centre: f64, radius: f64) -> Part {
+    fn about(&self, centre: f64, radius: f64) -> IntervalBounds {
         let [x, y] = [self.0[0].about(centre, radius), self.0[1].about(centre, radius)];
         let [value, slope] = self.at(centre);
         let bend = libm::hypot(x.bend, y.bend);
         let speed = libm::hypot(x.slope, y.slope) + bend * radius;
         let length = libm::hypot(x.value, y.value) + speed * radius;
-        Part {
+        IntervalBounds {
             value,
             slope,
             bend: 2.0 * (speed * speed + length * bend),
@@ -104,7 +109,7 @@ fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> bool {
 impl SpringGuard {
     /// One for the springs of a mechanism; `None` where none of them can lose its length.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
-        let springs: Vec<Spring> =
+        let springs: Vec<CompiledSpring> =
             mechanism.springs.iter().filter(|spring| can_shrink(spring)).cloned().collect();
         (!springs.is_empty()).then(|| Self { springs, bodies: mechanism.bodies.len(), ..Self::default() })
     }
@@ -113,7 +118,7 @@ impl SpringGuard {
     /// after its beginning.
     pub fn step(&mut self, span: f64, at: &mut dyn FnMut(f64) -> BodyAngles) -> Option<WithoutLength> {
         let Self { springs, bodies, before, now, z } = self;
-        let mut first: Option<(f64, &Spring)> = None;
+        let mut first: Option<(f64, &CompiledSpring)> = None;
         for spring in &*springs {
             let [a, b] = [&*before, &*now].map(|at| ends(spring, *bodies, at, z));
             let found = if can_meet(a, b, span) { searched(spring, *bodies, span, at, z) } else { None };
@@ -127,7 +132,7 @@ impl SpringGuard {
 
 /// How long after the beginning of a step a spring loses its length, by the motion inside it \[s\].
 fn searched(
-    spring: &Spring,
+    spring: &CompiledSpring,
     bodies: usize,
     span: f64,
     at: &mut dyn FnMut(f64) -> BodyAngles,

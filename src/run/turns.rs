@@ -4,7 +4,7 @@
 use super::methods::Stabilization;
 use super::plan::Plan;
 use super::sample::Sample;
-use crate::dynamics::constraint::Measure;
+use crate::dynamics::constraint::RowMeasure;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::scene::Law;
 use crate::stepping::{Cause, StepError};
@@ -40,7 +40,7 @@ impl Turns {
         // A motor that may be switched off has no law any more then.
         let rows = mechanism.constraints.iter().filter(|row| is_kept && !mechanism.may_be_off(&row.name));
         let angles = rows.filter_map(|row| {
-            let (Measure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
+            let (RowMeasure::Angle { body, base }, Some(law)) = (&row.measure, &row.law) else { return None };
             let mut angle = Angle { name: row.name().into(), body: *body, base: *base, off: 0.0 };
             angle.off = angle.off(law, start.time, |k| start.unwrapped(k));
             Some(angle)

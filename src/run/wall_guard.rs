@@ -47,7 +47,7 @@ impl WallGuard {
         mechanism: &Mechanism,
         t: f64,
         body_angles: &BodyAngles,
-    ) -> Result<Option<usize>, Box<Passed>> {
+    ) -> Result<Option<usize>, Box<PassedWall>> {
         self.look(mechanism, t, body_angles)?;
         let (h, now) = (t - self.t, gaps(mechanism, t, body_angles));
         let candidate =
@@ -65,8 +65,8 @@ impl WallGuard {
         mechanism: &Mechanism,
         contact: usize,
         mut at: impl FnMut(f64) -> (f64, BodyAngles),
-    ) -> Result<(), Box<Passed>> {
-        let mut gap_at = |share: f64| -> Result<f64, Box<Passed>> {
+    ) -> Result<(), Box<PassedWall>> {
+        let mut gap_at = |share: f64| -> Result<f64, Box<PassedWall>> {
             let (t, body_angles) = at(share);
             self.look(mechanism, t, &body_angles)?;
             Ok(gap(&mechanism.contacts[contact], mechanism.bodies.len(), t, &body_angles.phi).0)
@@ -85,13 +85,18 @@ impl WallGuard {
     ///
     /// # Errors
     /// A wall that has been passed, or that a held point has left.
-    pub fn look(&self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Result<(), Box<Passed>> {
+    pub fn look(
+        &self,
+        mechanism: &Mechanism,
+        t: f64,
+        body_angles: &BodyAngles,
+    ) -> Result<(), Box<PassedWall>> {
         for (c, contact) in mechanism.contacts.iter().enumerate() {
             let (gap, rounding) = gap(contact, mechanism.bodies.len(), t, &body_angles.phi);
             let is_held = mechanism.held.contains(&c);
             let off = if is_held { gap.abs() } else { -gap };
             if off.is_nan() || off > self.closed + rounding {
-                return Err(Box::new(Passed {
+                return Err(Box::new(PassedWall {
                     t,
                     wall: contact.row.name.clone(),
                     gap: gap * contact.length,
@@ -132,14 +137,14 @@ fn cubic([a, a_rate]: &[f64; 2], [b, b_rate]: &[f64; 2], h: f64, share: f64) -> 
 
 /// A wall that has been passed.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Passed {
+pub(super) struct PassedWall {
     t: f64,
     wall: String,
     gap: f64,
     is_held: bool,
 }
 
-impl Passed {
+impl PassedWall {
     /// The stop of a method.
     pub fn stop(self, method: &str) -> StepError {
         let Self { t, wall, gap, is_held } = self;

@@ -5,14 +5,14 @@
 //! as `pi/2` that a command line may state, defaults, and the times of the output, `until` and `every`.
 
 use super::error::SceneError;
-use super::locate::{Node, Source, Value, push_index, push_key};
+use super::locate::{Located, Texts, Value, push_index, push_key};
 use super::read::put_together;
 use super::set::name;
-use super::template::{Template, Walk};
+use super::template::{FormatWalk, Template};
 
 /// A number of a scene with what its digits leave open.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Written {
+pub struct WrittenNumber {
     /// Its whole path: `start.bar1.phi`.
     pub path: String,
     /// Its unit: `rad`; empty for a pure number.
@@ -33,24 +33,24 @@ impl Template {
     ///
     /// # Errors
     /// As [`parse_scene`](super::parse_scene) where the text is no JSON or an override does not fit it.
-    pub fn written_numbers(&self, typed: &[String]) -> Result<Vec<Written>, SceneError> {
+    pub fn written_numbers(&self, typed: &[String]) -> Result<Vec<WrittenNumber>, SceneError> {
         let (text, source, overrides) = self.parts();
         let (source, tree) = put_together(text, source, overrides)?;
-        let mut search = Search { source: &source, tree: &tree, typed, found: Vec::new() };
+        let mut search = DigitSearch { source: &source, tree: &tree, typed, found: Vec::new() };
         search.visit(&tree, "");
         Ok(search.found)
     }
 }
 
-struct Search<'a> {
-    source: &'a Source,
-    tree: &'a Node,
+struct DigitSearch<'a> {
+    source: &'a Texts,
+    tree: &'a Located,
     typed: &'a [String],
-    found: Vec<Written>,
+    found: Vec<WrittenNumber>,
 }
 
-impl Search<'_> {
-    fn visit(&mut self, node: &Node, path: &str) {
+impl DigitSearch<'_> {
+    fn visit(&mut self, node: &Located, path: &str) {
         match &node.value {
             Value::Object(members) => {
                 for member in members {
@@ -70,18 +70,18 @@ impl Search<'_> {
                 }
             }
             Value::Number(value) if !OUTPUT.contains(&path) => {
-                let Ok(unit) = Walk { tree: self.tree }.unit(path) else { return };
+                let Ok(unit) = FormatWalk { tree: self.tree }.unit(path) else { return };
                 let Some(uncertainty) = half_unit(self.digits(node)).filter(|half| half.is_finite()) else {
                     return;
                 };
-                self.found.push(Written { path: path.to_owned(), unit, value: *value, uncertainty });
+                self.found.push(WrittenNumber { path: path.to_owned(), unit, value: *value, uncertainty });
             }
             _ => {}
         }
     }
 
     /// What a number was written as.
-    fn digits(&self, node: &Node) -> &str {
+    fn digits(&self, node: &Located) -> &str {
         let (text, digits, is_all) = self.source.text(node.span);
         let typed = text
             .checked_sub(1)

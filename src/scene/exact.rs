@@ -11,7 +11,7 @@ mod parts;
 
 use super::error::SceneError;
 use super::formula::Formula;
-use super::locate::{Node, Source, Span, Value, push_index, push_key};
+use super::locate::{Located, Span, Texts, Value, push_index, push_key};
 use super::number::Decimal;
 pub use super::number::exact_number;
 use super::read::put_together;
@@ -36,7 +36,7 @@ impl Template {
     /// As [`Template::scene`]; a number whose digits do not tell all of it, or a part that is not known
     /// exactly.
     pub fn exact<C: Decimal>(&self, typed: &[String]) -> Result<(Scene<C>, Times<C>), SceneError> {
-        self.exact_with(typed, &[], Watched::Here)
+        self.exact_with(typed, &[], Watcher::Here)
     }
 
     /// The same where the numbers at some paths are these.
@@ -47,7 +47,7 @@ impl Template {
         &self,
         typed: &[String],
         known: &[(&str, C)],
-        watched: Watched,
+        watched: Watcher,
     ) -> Result<(Scene<C>, Times<C>), SceneError> {
         let plain = self.scene()?;
         let (text, source, overrides) = self.parts();
@@ -56,7 +56,7 @@ impl Template {
         let mut reader = Reader {
             source: &source,
             plain: &plain,
-            root: Cursor { node: &tree, path: String::new() },
+            root: TreeCursor { node: &tree, path: String::new() },
             typed,
             known: places.collect(),
             is_read: RefCell::new(vec![false; known.len()]),
@@ -81,7 +81,7 @@ impl Template {
 
 /// Who watches for the events of a scene, for the corners of its formulas and for walls that move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Watched {
+pub enum Watcher {
     /// Whoever runs the scene: they are part of it.
     Here,
     /// Another run, which this one goes beside: events are left out, what changes the equations is refused.
@@ -98,57 +98,57 @@ fn shortest<C: Decimal>(value: f64) -> C {
 
 /// A value of the tree with its path.
 #[derive(Clone)]
-struct Cursor<'a> {
-    node: &'a Node,
+struct TreeCursor<'a> {
+    node: &'a Located,
     path: String,
 }
 
-impl<'a> Cursor<'a> {
-    fn child(&self, key: &str) -> Option<Cursor<'a>> {
+impl<'a> TreeCursor<'a> {
+    fn child(&self, key: &str) -> Option<TreeCursor<'a>> {
         let Value::Object(members) = &self.node.value else { return None };
         let member = members.iter().find(|member| member.key == key)?;
         let mut path = self.path.clone();
         push_key(&mut path, key);
-        Some(Cursor { node: &member.node, path })
+        Some(TreeCursor { node: &member.node, path })
     }
 
-    fn items(&self, key: &str) -> Vec<Cursor<'a>> {
+    fn items(&self, key: &str) -> Vec<TreeCursor<'a>> {
         let Some(list) = self.child(key) else { return Vec::new() };
         let Value::List(nodes) = &list.node.value else { return Vec::new() };
-        let item = |(number, node): (usize, &'a Node)| {
+        let item = |(number, node): (usize, &'a Located)| {
             let mut path = list.path.clone();
             match super::set::name(node) {
                 Some(name) => push_key(&mut path, name),
                 None => push_index(&mut path, number),
             }
-            Cursor { node, path }
+            TreeCursor { node, path }
         };
         nodes.iter().enumerate().map(item).collect()
     }
 }
 
 struct Reader<'a, C> {
-    source: &'a Source,
+    source: &'a Texts,
     /// The scene in doubles.
     plain: &'a Scene,
-    root: Cursor<'a>,
+    root: TreeCursor<'a>,
     typed: &'a [String],
     /// Numbers that stand for those at some places of the text, and which of them were read.
     known: Vec<(Span, C)>,
     is_read: RefCell<Vec<bool>>,
-    watched: Watched,
+    watched: Watcher,
     parameters: Vec<(String, C)>,
     tables: Vec<PointTable<C>>,
 }
 
 impl<'a, C: Decimal> Reader<'a, C> {
-    fn refuse(&self, at: &Cursor, problem: &str, hint: &str) -> SceneError {
+    fn refuse(&self, at: &TreeCursor, problem: &str, hint: &str) -> SceneError {
         let allowed = "must be known exactly for runs in many digits: decimals, and formulas of parameters";
         self.source.refusal(at.node.span, &at.path, problem, allowed, hint)
     }
 
     /// An error about a part that has no series in many digits.
-    fn refuse_part(&self, at: &Cursor, why: &str) -> SceneError {
+    fn refuse_part(&self, at: &TreeCursor, why: &str) -> SceneError {
         let problem = format!("cannot be carried in many digits: {why}");
         let allowed = "parts are carried whose numbers are constant, or formulas of time and state";
         let hint = "without --digits it runs in doubles, and --trust estimates the error";
@@ -157,7 +157,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// Parts that are not carried in many digits.
     fn refuse_parts(&self, scene: &Scene) -> Result<(), SceneError> {
-        let is_watched = self.watched == Watched::Here;
+        let is_watched = self.watched == Watcher::Here;
         let parts = [
             ("events", scene.events.iter().any(SceneEvent::changes), "events change what acts"),
             ("inactive", !scene.inactive.is_empty(), "events change what acts"),
@@ -226,7 +226,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     /// The number at a place; `None` where a formula has a name that is not among those known.
-    fn evaluated(&self, at: &Cursor, known: &[(String, C)]) -> Result<Option<C>, SceneError> {
+    fn evaluated(&self, at: &TreeCursor, known: &[(String, C)]) -> Result<Option<C>, SceneError> {
         match &at.node.value {
             Value::Number(value) => Ok(Some(self.literal(at.node, *value))),
             Value::Text(text) => {
@@ -244,7 +244,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     /// What a number was written as.
-    fn literal(&self, node: &Node, value: f64) -> C {
+    fn literal(&self, node: &Located, value: f64) -> C {
         if let Some(number) = self.known_at(node) {
             return number;
         }
@@ -256,7 +256,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     /// What is known to stand for the number at a place; of several numbers, all derivatives count.
-    fn known_at(&self, node: &Node) -> Option<C> {
+    fn known_at(&self, node: &Located) -> Option<C> {
         let here = self.known.iter().enumerate().filter(|(_, (span, _))| *span == node.span);
         let numbers = here.map(|(number, (_, value))| {
             self.is_read.borrow_mut()[number] = true;
@@ -265,7 +265,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         numbers.reduce(|sum, number| sum + number.moved_to(0.0))
     }
 
-    fn number(&self, at: &Cursor, key: &str, absent: f64) -> Result<C, SceneError> {
+    fn number(&self, at: &TreeCursor, key: &str, absent: f64) -> Result<C, SceneError> {
         let Some(at) = at.child(key) else { return Ok(shortest(absent)) };
         match self.evaluated(&at, &self.parameters)? {
             Some(value) => Ok(value),
@@ -273,14 +273,14 @@ impl<'a, C: Decimal> Reader<'a, C> {
         }
     }
 
-    fn pair(&self, at: &Cursor, key: &str, absent: [f64; 2]) -> Result<[C; 2], SceneError> {
+    fn pair(&self, at: &TreeCursor, key: &str, absent: [f64; 2]) -> Result<[C; 2], SceneError> {
         let Some(list) = at.child(key) else { return Ok(absent.map(shortest)) };
         let Value::List(nodes) = &list.node.value else { return Ok(absent.map(shortest)) };
         let mut pair = [C::ZERO; 2];
         for (number, (place, node)) in pair.iter_mut().zip(nodes).enumerate() {
             let mut path = list.path.clone();
             push_index(&mut path, number);
-            let at = Cursor { node, path };
+            let at = TreeCursor { node, path };
             let value = self.evaluated(&at, &self.parameters)?;
             *place = value.ok_or_else(|| {
                 self.refuse(&at, "has a name whose value is not known exactly", "give the number")
@@ -290,7 +290,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     /// The same along a pair, of length one.
-    fn direction(&self, at: &Cursor, key: &str, absent: [f64; 2]) -> Result<[C; 2], SceneError> {
+    fn direction(&self, at: &TreeCursor, key: &str, absent: [f64; 2]) -> Result<[C; 2], SceneError> {
         let [x, y] = self.pair(at, key, absent)?;
         let length = (x * x + y * y).sqrt();
         Ok([x / length, y / length])

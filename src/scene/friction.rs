@@ -37,7 +37,7 @@ pub enum FrictionPlace<C = f64> {
 
 /// A kind of part that may have friction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum FrictionPart {
     Hinge,
     Slider,
     Wall,
@@ -45,11 +45,11 @@ pub(super) enum Part {
 
 impl<C> FrictionPlace<C> {
     /// The part by its kind and number.
-    pub(super) fn part(&self) -> (Part, usize) {
+    pub(super) fn part(&self) -> (FrictionPart, usize) {
         match *self {
-            Self::Hinge { hinge, .. } => (Part::Hinge, hinge),
-            Self::Slider(slider) => (Part::Slider, slider),
-            Self::Wall { wall, .. } => (Part::Wall, wall),
+            Self::Hinge { hinge, .. } => (FrictionPart::Hinge, hinge),
+            Self::Slider(slider) => (FrictionPart::Slider, slider),
+            Self::Wall { wall, .. } => (FrictionPart::Wall, wall),
         }
     }
 }

@@ -20,7 +20,7 @@ const FEW: usize = 16;
 const SHOWN: usize = 60;
 
 /// All texts a scene was put together from: the file first, then one for each `--set`.
-pub(super) struct Source {
+pub(super) struct Texts {
     /// Name of the file for messages.
     pub file: String,
     /// Text 0 is the file.
@@ -45,7 +45,7 @@ pub(super) struct Span {
 
 /// A value and its place.
 #[derive(Clone, Debug)]
-pub(super) struct Node {
+pub(super) struct Located {
     pub span: Span,
     pub value: Value,
 }
@@ -57,7 +57,7 @@ pub(super) enum Value {
     Truth,
     Number(f64),
     Text(String),
-    List(Vec<Node>),
+    List(Vec<Located>),
     Object(Vec<Member>),
 }
 
@@ -66,7 +66,7 @@ pub(super) enum Value {
 pub(super) struct Member {
     pub key: String,
     pub span: Span,
-    pub node: Node,
+    pub node: Located,
 }
 
 impl Span {
@@ -82,9 +82,9 @@ impl Span {
     }
 }
 
-impl Source {
+impl Texts {
     /// Reads text number `text` of this source.
-    pub fn tree(&self, text: usize) -> Result<Node, SceneError> {
+    pub fn tree(&self, text: usize) -> Result<Located, SceneError> {
         let json = &self.texts[text].json;
         if json.trim().is_empty() {
             let span = self.span(text, 0, 0);
@@ -259,7 +259,7 @@ pub(super) fn clipped(text: &str) -> String {
 }
 
 struct Locator<'a> {
-    source: &'a Source,
+    source: &'a Texts,
     text: usize,
     json: &'a str,
     at: usize,
@@ -267,7 +267,7 @@ struct Locator<'a> {
 }
 
 impl Locator<'_> {
-    fn value(&mut self, depth: usize) -> Result<Node, SceneError> {
+    fn value(&mut self, depth: usize) -> Result<Located, SceneError> {
         self.skip_space();
         let start = self.at;
         let value = match self.peek() {
@@ -285,7 +285,7 @@ impl Locator<'_> {
             Some(b'n') => self.word(4, Value::Null),
             _ => self.number()?,
         };
-        Ok(Node { span: self.span(start, self.at), value })
+        Ok(Located { span: self.span(start, self.at), value })
     }
 
     fn object(&mut self, depth: usize) -> Result<Value, SceneError> {

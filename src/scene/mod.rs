@@ -29,7 +29,7 @@ mod template;
 mod write;
 
 pub use build::{SceneBuilder, ground, on};
-pub use digits::Written;
+pub use digits::WrittenNumber;
 pub use error::{Refusal, SceneError};
 pub use friction::{Friction, FrictionPlace};
 pub use law::{Direction, Integral, Load, LoadLaw, NamedPoint, Parameter, PointTable, SceneEvent, Signal};

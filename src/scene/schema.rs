@@ -1,6 +1,6 @@
 //! The JSON Schema of scene files, from the same tables that the reader uses.
 
-use super::format::{LONGEST_NAME, LONGEST_TEXT, PLACE, Quantity, SCENE, Shape, Table};
+use super::format::{FieldShape, KeyTable, LONGEST_NAME, LONGEST_TEXT, PLACE, QuantityRange, SCENE};
 use super::formula::{LONGEST, POINTS};
 use serde_json::{Map, Value, json};
 
@@ -16,7 +16,7 @@ pub fn schema() -> Value {
     schema
 }
 
-fn object(table: &Table) -> Value {
+fn object(table: &KeyTable) -> Value {
     let mut properties = Map::new();
     for field in table.fields {
         let mut property = shape(&field.shape);
@@ -41,14 +41,14 @@ fn object(table: &Table) -> Value {
     })
 }
 
-fn described(about: &str, shape: &Shape) -> String {
+fn described(about: &str, shape: &FieldShape) -> String {
     match shape {
-        Shape::Number(quantity)
-        | Shape::Pair(quantity)
-        | Shape::Inertia(quantity)
-        | Shape::LawNumber(quantity)
-        | Shape::LawPair(quantity)
-        | Shape::Formula(quantity)
+        FieldShape::Number(quantity)
+        | FieldShape::Pair(quantity)
+        | FieldShape::Inertia(quantity)
+        | FieldShape::LawNumber(quantity)
+        | FieldShape::LawPair(quantity)
+        | FieldShape::Formula(quantity)
             if !quantity.unit.is_empty() =>
         {
             format!("{about} [{}]", quantity.unit)
@@ -57,26 +57,26 @@ fn described(about: &str, shape: &Shape) -> String {
     }
 }
 
-fn shape(of: &Shape) -> Value {
+fn shape(of: &FieldShape) -> Value {
     match of {
-        Shape::Number(quantity) | Shape::LawNumber(quantity) => number(quantity),
-        Shape::Pair(quantity) | Shape::LawPair(quantity) => {
+        FieldShape::Number(quantity) | FieldShape::LawNumber(quantity) => number(quantity),
+        FieldShape::Pair(quantity) | FieldShape::LawPair(quantity) => {
             json!({"type": "array", "items": number(quantity), "minItems": 2, "maxItems": 2})
         }
-        Shape::Formula(_) => formula(),
-        Shape::Parameters => {
+        FieldShape::Formula(_) => formula(),
+        FieldShape::Parameters => {
             let number = json!({"anyOf": [{"type": "number"}, formula()]});
             json!({"type": "object", "propertyNames": identifier(), "additionalProperties": number})
         }
-        Shape::Signals => {
+        FieldShape::Signals => {
             let number = json!({"type": ["number", "string"], "maxLength": LONGEST});
             json!({"type": "object", "propertyNames": identifier(), "additionalProperties": number})
         }
-        Shape::Outputs => {
+        FieldShape::Outputs => {
             let list = json!({"type": "array", "items": formula()});
             json!({"anyOf": [{"type": "object", "additionalProperties": formula()}, list]})
         }
-        Shape::Tables => {
+        FieldShape::Tables => {
             let [least, most] = POINTS;
             let point = json!({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2});
             let text = json!({"type": "string", "minLength": 1, "maxLength": LONGEST_TEXT});
@@ -86,25 +86,29 @@ fn shape(of: &Shape) -> Value {
             json!({"type": "object", "propertyNames": identifier(),
                 "additionalProperties": {"anyOf": [points, text, columns]}})
         }
-        Shape::Names => json!({"type": "array", "items": shape(&Shape::Name)}),
-        Shape::Name => json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")}),
-        Shape::FolderName => {
+        FieldShape::Names => json!({"type": "array", "items": shape(&FieldShape::Name)}),
+        FieldShape::Name => {
+            json!({"type": "string", "pattern": format!("^[A-Za-z0-9_-]{{1,{LONGEST_NAME}}}$")})
+        }
+        FieldShape::FolderName => {
             json!({"type": "string",
                 "pattern": format!("^[A-Za-z0-9_][A-Za-z0-9_-]{{0,{}}}$", LONGEST_NAME - 1)})
         }
-        Shape::Text => json!({"type": "string", "maxLength": LONGEST_TEXT}),
-        Shape::Word(words) => json!({"enum": words}),
-        Shape::SliderName => shape(&Shape::Name),
-        Shape::Body { .. } => json!({"type": "string", "maxLength": LONGEST_NAME}),
-        Shape::Inertia(quantity) => json!({"anyOf": [{"enum": ["full", "slender"]}, number(quantity)]}),
-        Shape::Between => json!({"type": "array", "items": object(&PLACE), "minItems": 2, "maxItems": 2}),
-        Shape::Object(table) => object(table),
-        Shape::Law(table, _) => {
+        FieldShape::Text => json!({"type": "string", "maxLength": LONGEST_TEXT}),
+        FieldShape::Word(words) => json!({"enum": words}),
+        FieldShape::SliderName => shape(&FieldShape::Name),
+        FieldShape::Body { .. } => json!({"type": "string", "maxLength": LONGEST_NAME}),
+        FieldShape::Inertia(quantity) => json!({"anyOf": [{"enum": ["full", "slender"]}, number(quantity)]}),
+        FieldShape::Between => {
+            json!({"type": "array", "items": object(&PLACE), "minItems": 2, "maxItems": 2})
+        }
+        FieldShape::Object(table) => object(table),
+        FieldShape::Law(table, _) => {
             let mut law = object(table);
             law["type"] = json!(["object", "string"]);
             law
         }
-        Shape::List { of: tables, least, most } => {
+        FieldShape::List { of: tables, least, most } => {
             let kinds: Vec<_> = tables.iter().map(|table| object(table)).collect();
             let items = if let [one] = kinds.as_slice() { one.clone() } else { json!({"oneOf": kinds}) };
             let mut list = json!({"type": "array", "items": items, "minItems": least});
@@ -113,16 +117,16 @@ fn shape(of: &Shape) -> Value {
             }
             list
         }
-        Shape::ByBar(table) => json!({
+        FieldShape::ByBar(table) => json!({
             "type": "object",
-            "propertyNames": shape(&Shape::Name),
+            "propertyNames": shape(&FieldShape::Name),
             "additionalProperties": object(table),
         }),
     }
 }
 
 /// A number, or a formula that comes to one.
-fn number(quantity: &Quantity) -> Value {
+fn number(quantity: &QuantityRange) -> Value {
     let mut number =
         json!({"type": ["number", "string"], "minimum": quantity.least, "maximum": quantity.most});
     number["maxLength"] = json!(LONGEST);

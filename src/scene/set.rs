@@ -1,7 +1,7 @@
 //! Values set from outside: `--set walls.wall.restitution=0.5`.
 
 use super::error::SceneError;
-use super::locate::{Member, Node, Source, Text, Value, push_index, push_key};
+use super::locate::{Located, Member, Text, Texts, Value, push_index, push_key};
 use super::number;
 use super::read::nearest;
 use super::template::{is_number, whole};
@@ -65,41 +65,41 @@ impl Override {
 }
 
 /// One step of a path.
-pub(super) enum Step<'a> {
+pub(super) enum PathStep<'a> {
     Key(&'a str),
     Index(usize),
 }
 
-impl Node {
+impl Located {
     /// What stands at a whole path in it.
-    pub(super) fn at(&self, path: &str) -> Option<&Node> {
+    pub(super) fn at(&self, path: &str) -> Option<&Located> {
         steps(path)?.iter().try_fold(self, |node, step| match (step, &node.value) {
-            (Step::Key(key), Value::Object(members)) => {
+            (PathStep::Key(key), Value::Object(members)) => {
                 members.iter().find(|member| member.key == *key).map(|member| &member.node)
             }
-            (Step::Key(key), Value::List(nodes)) => nodes.iter().find(|node| name(node) == Some(key)),
-            (Step::Index(index), Value::List(nodes)) => nodes.get(*index),
+            (PathStep::Key(key), Value::List(nodes)) => nodes.iter().find(|node| name(node) == Some(key)),
+            (PathStep::Index(index), Value::List(nodes)) => nodes.get(*index),
             _ => None,
         })
     }
 }
 
 /// `bars[1].length` to its steps; `None` where it is no path.
-pub(super) fn steps(path: &str) -> Option<Vec<Step<'_>>> {
+pub(super) fn steps(path: &str) -> Option<Vec<PathStep<'_>>> {
     let mut steps = Vec::new();
     for part in path.split('.') {
         let (key, indices) = part.split_once('[').map_or((part, ""), |(key, _)| (key, &part[key.len()..]));
         if key.is_empty() {
             return None;
         }
-        steps.push(Step::Key(key));
+        steps.push(PathStep::Key(key));
         let mut rest = indices;
         while !rest.is_empty() {
             let (index, after) = rest.strip_prefix('[')?.split_once(']')?;
             if !index.bytes().all(|digit| digit.is_ascii_digit()) {
                 return None;
             }
-            steps.push(Step::Index(index.parse().ok()?));
+            steps.push(PathStep::Index(index.parse().ok()?));
             rest = after;
         }
     }
@@ -107,7 +107,12 @@ pub(super) fn steps(path: &str) -> Option<Vec<Step<'_>>> {
 }
 
 /// Puts `value` into `tree` at the path of `set`, written out or short.
-pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node) -> Result<(), SceneError> {
+pub(super) fn put(
+    source: &Texts,
+    tree: &mut Located,
+    set: &Override,
+    value: Located,
+) -> Result<(), SceneError> {
     let path = match whole(&set.path, tree) {
         Ok(path) => path,
         Err(hint) if hint.starts_with(SEVERAL) => {
@@ -126,7 +131,7 @@ pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node)
     let span = value.span;
     place(source, tree, &path, value)?;
     match typed.filter(|_| is_number(&path, tree)) {
-        Some(number) => place(source, tree, &path, Node { span, value: Value::Number(number) }),
+        Some(number) => place(source, tree, &path, Located { span, value: Value::Number(number) }),
         None => Ok(()),
     }
 }
@@ -135,7 +140,7 @@ pub(super) fn put(source: &Source, tree: &mut Node, set: &Override, value: Node)
 pub(super) const SEVERAL: &str = "several things are called";
 
 /// Puts `value` into `tree` at a whole path.
-fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<(), SceneError> {
+fn place(source: &Texts, tree: &mut Located, path: &str, value: Located) -> Result<(), SceneError> {
     let span = value.span;
     let refused = |path: &str, problem: &str, allowed: &str, hint: &str| {
         source.refusal(span, path, problem, allowed, hint)
@@ -151,7 +156,7 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
     for (number, step) in steps.iter().enumerate() {
         let holder = path.clone();
         match (step, &mut at.value) {
-            (Step::Key(key), Value::Object(members)) => {
+            (PathStep::Key(key), Value::Object(members)) => {
                 push_key(&mut path, key);
                 let found = members.iter().position(|member| member.key == *key);
                 match found {
@@ -164,14 +169,14 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                         members.push(Member {
                             key: (*key).to_owned(),
                             span,
-                            node: Node { span, value: Value::Object(Vec::new()) },
+                            node: Located { span, value: Value::Object(Vec::new()) },
                         });
                         let Some(added) = members.last_mut() else { return Ok(()) };
                         at = &mut added.node;
                     }
                     None => {
                         let known: Vec<&str> = match steps[..number] {
-                            [Step::Key("start")] => bars.iter().map(String::as_str).collect(),
+                            [PathStep::Key("start")] => bars.iter().map(String::as_str).collect(),
                             _ => members.iter().map(|member| member.key.as_str()).collect(),
                         };
                         let hint = hint(key, &known);
@@ -184,7 +189,7 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                     }
                 }
             }
-            (Step::Key(key), Value::List(nodes)) => {
+            (PathStep::Key(key), Value::List(nodes)) => {
                 let known: Vec<&str> = nodes.iter().filter_map(name).collect();
                 let Some(index) = nodes.iter().position(|node| name(node) == Some(key)) else {
                     push_key(&mut path, key);
@@ -203,7 +208,7 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                 push_index(&mut path, index);
                 at = &mut nodes[index];
             }
-            (Step::Index(index), Value::List(nodes)) => {
+            (PathStep::Index(index), Value::List(nodes)) => {
                 push_index(&mut path, *index);
                 let count = nodes.len();
                 let Some(node) = nodes.get_mut(*index) else {
@@ -217,7 +222,7 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                 };
                 at = node;
             }
-            (Step::Index(_), _) => {
+            (PathStep::Index(_), _) => {
                 return Err(refused(
                     &path,
                     "is not a list",
@@ -225,7 +230,7 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
                     "use a key, as in start.bar1.phi",
                 ));
             }
-            (Step::Key(key), _) => {
+            (PathStep::Key(key), _) => {
                 let allowed = format!("it has no `{key}` to set");
                 return Err(refused(&path, "is a single value", &allowed, "set the value itself"));
             }
@@ -237,17 +242,17 @@ fn place(source: &Source, tree: &mut Node, path: &str, value: Node) -> Result<()
 
 /// Objects that a scene may do without and that a path may begin: the start, that of a bar, the law of a
 /// force or torque.
-fn may_be_added(steps: &[Step], bars: &[String]) -> bool {
+fn may_be_added(steps: &[PathStep], bars: &[String]) -> bool {
     match steps {
-        [Step::Key("start")] => true,
-        [Step::Key("start"), Step::Key(bar)] => bars.iter().any(|known| known == bar),
-        [Step::Key("forces" | "torques"), _, Step::Key("law")] => true,
+        [PathStep::Key("start")] => true,
+        [PathStep::Key("start"), PathStep::Key(bar)] => bars.iter().any(|known| known == bar),
+        [PathStep::Key("forces" | "torques"), _, PathStep::Key("law")] => true,
         _ => false,
     }
 }
 
 /// The names of the bars.
-fn names(tree: &Node) -> Vec<String> {
+fn names(tree: &Located) -> Vec<String> {
     let Value::Object(members) = &tree.value else { return Vec::new() };
     match members.iter().find(|member| member.key == "bars").map(|member| &member.node.value) {
         Some(Value::List(nodes)) => nodes.iter().filter_map(name).map(str::to_owned).collect(),
@@ -255,7 +260,7 @@ fn names(tree: &Node) -> Vec<String> {
     }
 }
 
-pub(super) fn name(node: &Node) -> Option<&str> {
+pub(super) fn name(node: &Located) -> Option<&str> {
     let Value::Object(members) = &node.value else { return None };
     members.iter().find(|member| member.key == "name").and_then(|member| match &member.node.value {
         Value::Text(name) => Some(name.as_str()),

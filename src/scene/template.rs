@@ -7,12 +7,12 @@
 
 mod walk;
 
-pub(super) use walk::Walk;
+pub(super) use walk::FormatWalk;
 
 use super::error::SceneError;
 use super::format::{LAW, SCENE, START};
 use super::formula::Formula;
-use super::locate::{Node, Value};
+use super::locate::{Located, Value};
 use super::read::{parse_scene, put_together, read_text, source_name};
 use super::set::{Override, SEVERAL, hint, name};
 use super::{Output, Scene};
@@ -158,8 +158,9 @@ impl Template {
         let allowed = "must be a path to a number, as start.bar1.phi or springs.spring.stiffness";
         let path =
             whole(name, &tree).map_err(|hint| refused("nothing has that name".into(), allowed, hint))?;
-        let unit =
-            Walk { tree: &tree }.unit(&path).map_err(|(problem, hint)| refused(problem, allowed, hint))?;
+        let unit = FormatWalk { tree: &tree }
+            .unit(&path)
+            .map_err(|(problem, hint)| refused(problem, allowed, hint))?;
         let start = self.start_of(&path)?;
         Ok(Variable { path, unit, start })
     }
@@ -206,7 +207,7 @@ impl Template {
 }
 
 /// A short name written out; else a hint at what is near.
-pub(super) fn whole(short: &str, tree: &Node) -> Result<String, String> {
+pub(super) fn whole(short: &str, tree: &Located) -> Result<String, String> {
     let first = short.split(['.', '[']).next().unwrap_or("");
     if SCENE.field(first).is_some() {
         return Ok(short.to_owned());
@@ -241,11 +242,11 @@ pub(super) fn whole(short: &str, tree: &Node) -> Result<String, String> {
 }
 
 /// True where a whole path leads to a number of the format.
-pub(super) fn is_number(path: &str, tree: &Node) -> bool {
-    Walk { tree }.unit(path).is_ok()
+pub(super) fn is_number(path: &str, tree: &Located) -> bool {
+    FormatWalk { tree }.unit(path).is_ok()
 }
 
-fn member<'a>(node: &'a Node, key: &str) -> Option<&'a Node> {
+fn member<'a>(node: &'a Located, key: &str) -> Option<&'a Located> {
     let Value::Object(members) = &node.value else { return None };
     members.iter().find(|member| member.key == key).map(|member| &member.node)
 }

@@ -2,7 +2,7 @@
 
 use super::fit::written_starts;
 use super::format::GROUND;
-use super::friction::Part;
+use super::friction::FrictionPart;
 use super::{
     Coupled, Coupling, Force, Friction, FrictionPlace, Given, Law, Load, LoadLaw, NamedPoint, Place, Scene,
     SceneEvent, Slider, Torque,
@@ -27,7 +27,7 @@ impl Scene {
             .enumerate()
             .map(|(i, hinge)| {
                 let said = json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)});
-                with(said, "friction", &self.friction((Part::Hinge, i)))
+                with(said, "friction", &self.friction((FrictionPart::Hinge, i)))
             })
             .collect();
         let sliders: Vec<_> = (self.sliders.iter().enumerate())
@@ -39,7 +39,7 @@ impl Scene {
                         "direction": rail.direction},
                     "angle": if *locked { "locked" } else { "free" },
                 });
-                with(said, "friction", &self.friction((Part::Slider, i)))
+                with(said, "friction", &self.friction((FrictionPart::Slider, i)))
             })
             .collect();
         let welds: Vec<_> = self
@@ -124,7 +124,7 @@ impl Scene {
                 });
                 let said = with(said, "law", &wall.law);
                 let said = with(said, "law", &wall.aim);
-                with(said, "friction", &self.friction((Part::Wall, i)))
+                with(said, "friction", &self.friction((FrictionPart::Wall, i)))
             })
             .collect();
         let mut said = json!({
@@ -246,7 +246,7 @@ fn event(event: &SceneEvent) -> Value {
 /// An object with one key more, where that has a value.
 impl Scene {
     /// The friction of a part, as the input says it.
-    fn friction(&self, part: (Part, usize)) -> Option<Value> {
+    fn friction(&self, part: (FrictionPart, usize)) -> Option<Value> {
         let Friction { at, kinetic, stiction } =
             self.frictions.iter().find(|friction| friction.at.part() == part)?;
         let mut said = json!({"kinetic": kinetic, "static": stiction});

@@ -12,7 +12,7 @@
 
 mod natural;
 
-use self::natural::Natural;
+use self::natural::NaturalProjection;
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::{larger, two_sum};
 use crate::dynamics::kernel::Kernel;
@@ -208,13 +208,14 @@ const LOST: f64 = 1e-3;
 #[derive(Clone, Debug)]
 struct Projector {
     kernel: Kernel<f64>,
-    natural: Option<Natural>,
+    natural: Option<NaturalProjection>,
 }
 
 impl Projector {
     fn new<P: Form + ?Sized>(problem: &P) -> Self {
         let mechanism = problem.mechanism();
-        let natural = problem.reduced().map(|reduced| Natural::new(reduced, 1.0 / mechanism.units.time));
+        let natural =
+            problem.reduced().map(|reduced| NaturalProjection::new(reduced, 1.0 / mechanism.units.time));
         Self { kernel: Kernel::new(mechanism), natural }
     }
 
@@ -223,7 +224,7 @@ impl Projector {
         mechanism: &Mechanism,
         state: &mut State,
         tolerance: f64,
-    ) -> Result<Landing, (String, f64)> {
+    ) -> Result<Corrected, (String, f64)> {
         match self.project_naturally(mechanism, state) {
             Some(landing) => Ok(landing),
             None => project(mechanism, &mut self.kernel, state, tolerance),
@@ -231,7 +232,7 @@ impl Projector {
     }
 
     /// `None`, and nothing done, where there are no natural coordinates or the position is nearly singular.
-    fn project_naturally(&mut self, mechanism: &Mechanism, state: &mut State) -> Option<Landing> {
+    fn project_naturally(&mut self, mechanism: &Mechanism, state: &mut State) -> Option<Corrected> {
         let Self { kernel, natural: Some(natural) } = self else { return None };
         let n = mechanism.coordinates();
         natural.unit_vectors(state, &mut kernel.z);
@@ -250,7 +251,7 @@ impl Projector {
         let fastest = state.y[n..2 * n]
             .iter()
             .fold(1.0 / mechanism.units.time, |most: f64, omega| most.max(omega.abs()));
-        Some(Landing {
+        Some(Corrected {
             has_moved: turn.max(change / fastest) > ROUNDING,
             balance,
             energy_change,
@@ -261,7 +262,7 @@ impl Projector {
 
 /// What a projection found and did.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landing {
+pub struct Corrected {
     /// True where something moved by more than rounding.
     pub has_moved: bool,
     /// Energy less work and less what stabilizers put in \[J\]; the projection leaves it as it is.
@@ -281,7 +282,7 @@ pub fn project(
     kernel: &mut Kernel<f64>,
     state: &mut State,
     tolerance: f64,
-) -> Result<Landing, (String, f64)> {
+) -> Result<Corrected, (String, f64)> {
     match mechanism.size() {
         1 => project_sized::<1>(mechanism, kernel, state, tolerance),
         2 => project_sized::<2>(mechanism, kernel, state, tolerance),
@@ -296,7 +297,7 @@ fn project_sized<const N: usize>(
     kernel: &mut Kernel<f64>,
     state: &mut State,
     tolerance: f64,
-) -> Result<Landing, (String, f64)> {
+) -> Result<Corrected, (String, f64)> {
     let n = tree::size::<N>(mechanism.coordinates());
     let rows = mechanism.constraints.len();
     kernel.unit_vectors::<N>(mechanism, &state.y[..n]);
@@ -363,7 +364,7 @@ fn project_sized<const N: usize>(
             - energy_before;
         state.y[2 * n + 1] += energy_change;
     }
-    Ok(Landing { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.is_near })
+    Ok(Corrected { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.is_near })
 }
 
 /// The unit of coordinate `k` \[rad, m\].

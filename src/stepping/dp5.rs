@@ -8,7 +8,7 @@
 //! (1980), table 2; the interpolation is L. F. Shampine's, as printed in Hairer, Nørsett, Wanner I, section
 //! II.6.
 
-use super::explicit::{Explicit, NESTED, Pair, Row};
+use super::explicit::{EmbeddedPair, Explicit, NESTED, Row};
 
 /// The coefficients of Dormand–Prince 5(4).
 #[derive(Clone, Copy, Debug)]
@@ -55,7 +55,7 @@ const DENSE: Row = &[
     (6, 69_997_945.0 / 29_380_423.0),
 ];
 
-impl Pair for DormandPrince5 {
+impl EmbeddedPair for DormandPrince5 {
     const NAME: &'static str = "dp5";
     const ORDER: u32 = 5;
     const STAGES: usize = 6;

@@ -8,7 +8,7 @@
 //! (1981); coefficients, error estimate and interpolation of order 7 as in Hairer, Nørsett, Wanner I,
 //! sections II.5 and II.6 (DOP853).
 
-use super::explicit::{Explicit, NESTED, Pair, Row};
+use super::explicit::{EmbeddedPair, Explicit, NESTED, Row};
 
 /// The coefficients of Dormand–Prince 8(5,3).
 #[derive(Clone, Copy, Debug)]
@@ -224,7 +224,7 @@ const B3: Row = &[
     (11, 0.022_058_823_529_411_764_705_882_352_94),
 ];
 
-impl Pair for DormandPrince8 {
+impl EmbeddedPair for DormandPrince8 {
     const NAME: &'static str = "dp8";
     const ORDER: u32 = 8;
     const STAGES: usize = 12;

@@ -6,7 +6,8 @@
 //! is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
 use super::search::{
-    Chebyshev, Crossing, Curve, Part, ROUNDING, TOUCH, crossing, doubtful, interpolated, root, shift, value,
+    Chebyshev, Crossing, Curve, IntervalBounds, ROUNDING, TOUCH, crossing, doubtful, interpolated, root,
+    shift, value,
 };
 use super::{Statistics, finest};
 use crate::dynamics::{Along, OdeSystem, State};
@@ -92,7 +93,7 @@ pub(super) trait Stride<F: OdeSystem + ?Sized> {
     fn end(&self) -> (&[f64], &[f64]);
 
     /// Scratch space of the search.
-    fn search(&mut self) -> &mut Search;
+    fn search(&mut self) -> &mut SearchScratch;
 
     /// Looks for events in the step just made, where there are any to look for.
     fn meet(&mut self, field: &mut F, state: &State, h: f64, statistics: &mut Statistics) -> Met
@@ -111,7 +112,7 @@ pub(super) trait Stride<F: OdeSystem + ?Sized> {
 
 /// What a step holds first, as shares of it, or after so long \[s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Found {
+pub(super) enum FirstEvent {
     Nothing,
     /// Event number, and where it is.
     At(usize, f64),
@@ -121,7 +122,7 @@ pub(super) enum Found {
     Inside(f64),
 }
 
-impl Found {
+impl FirstEvent {
     /// Where it is; the end of the `whole` where it is nothing.
     pub fn end(self, whole: f64) -> f64 {
         match self {
@@ -156,7 +157,7 @@ pub(super) enum Met {
 }
 
 /// What became of a step that was to end on an event.
-enum Landing {
+enum EndingStep {
     /// It could not be made.
     Failed,
     /// It ends with the event, after so long \[s\].
@@ -167,7 +168,7 @@ enum Landing {
 
 /// Scratch space of the search.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search {
+pub(super) struct SearchScratch {
     dense: Dense,
     room: RefCell<[Vec<f64>; 2]>,
     gaps: Vec<f64>,
@@ -199,17 +200,17 @@ impl<F: OdeSystem + ?Sized> Curve for Gap<'_, F> {
         [value, slope]
     }
 
-    fn about(&self, centre: f64, radius: f64) -> Part {
+    fn about(&self, centre: f64, radius: f64) -> IntervalBounds {
         let [value, slope, size] = self.along(centre);
         let [first, second] = &mut *self.room.borrow_mut();
         self.dense.bounds(centre, radius, first, second);
         let time = self.state.time.hi.abs() + self.h;
         let bend = self.field.gap_bend(self.event, time, self.h, first, second);
-        Part { value, slope, bend, rounding: ROUNDING * size }
+        IntervalBounds { value, slope, bend, rounding: ROUNDING * size }
     }
 }
 
-impl Search {
+impl SearchScratch {
     /// Looks through the step just made, and makes it anew to end on the first event in it, or where more is
     /// to be seen.
     pub fn meet<F: OdeSystem + ?Sized, S: Stride<F>>(
@@ -225,19 +226,21 @@ impl Search {
             let found = self.first(field, step, state, h, round < ROUNDS, statistics);
             let shorter = found.end(1.0) * h;
             match found {
-                Found::Nothing => break,
-                Found::At(event, _) => match self.land(field, step, state, shorter, event, statistics) {
-                    Landing::Failed => return Met::Failed,
-                    Landing::At(h) => return Met::Event(h, event),
-                    Landing::Opens => h = shorter,
+                FirstEvent::Nothing => break,
+                FirstEvent::At(event, _) => match self.land(field, step, state, shorter, event, statistics) {
+                    EndingStep::Failed => return Met::Failed,
+                    EndingStep::At(h) => return Met::Event(h, event),
+                    EndingStep::Opens => h = shorter,
                 },
-                Found::Inside(_) if shorter <= finest(state, field.time_unit()) => return Met::AtRest,
-                Found::Inside(_) | Found::Near(_) => {
+                FirstEvent::Inside(_) if shorter <= finest(state, field.time_unit()) => {
+                    return Met::AtRest;
+                }
+                FirstEvent::Inside(_) | FirstEvent::Near(_) => {
                     if !step.repeat(field, state, shorter, statistics) {
                         return Met::Failed;
                     }
                     h = shorter;
-                    if matches!(found, Found::Inside(_)) {
+                    if matches!(found, FirstEvent::Inside(_)) {
                         break;
                     }
                 }
@@ -256,14 +259,14 @@ impl Search {
         h: f64,
         asked: bool,
         statistics: &mut Statistics,
-    ) -> Found {
+    ) -> FirstEvent {
         step.dense(field, state, h, &mut self.dense, statistics);
         let count = self.dense.off.len();
         for room in self.room.get_mut() {
             room.resize(count, 0.0);
         }
         let Self { dense, room, opaque, .. } = self;
-        let (mut found, time) = (Found::Nothing, state.time.hi.abs() + h);
+        let (mut found, time) = (FirstEvent::Nothing, state.time.hi.abs() + h);
         let none = vec![0.0; count];
         // Of its beginning the side is known, whatever rounding makes of a slope there.
         let begin = finest(state, field.time_unit()) / h;
@@ -286,8 +289,8 @@ impl Search {
         field: &mut F,
         state: &State,
         h: f64,
-        mut found: Found,
-    ) -> Found {
+        mut found: FirstEvent,
+    ) -> FirstEvent {
         let Self { dense, room, gaps, opaque, .. } = self;
         gaps.resize(field.events(), 0.0);
         let [y, slope] = room.get_mut();
@@ -317,8 +320,8 @@ impl Search {
             for (curve, &event) in curves.iter().zip(&*opaque) {
                 let end = ((found.end(1.0) - begin) / span).min(1.0);
                 match crossing(curve, end) {
-                    Crossing::At(share) => found = Found::At(event, begin + share * span),
-                    Crossing::Inside(share) => found = Found::Inside(begin + share * span),
+                    Crossing::At(share) => found = FirstEvent::At(event, begin + share * span),
+                    Crossing::Inside(share) => found = FirstEvent::Inside(begin + share * span),
                     Crossing::Nothing => {}
                 }
             }
@@ -337,13 +340,13 @@ impl Search {
         h: f64,
         event: usize,
         statistics: &mut Statistics,
-    ) -> Landing {
+    ) -> EndingStep {
         self.gaps.resize(field.events(), 0.0);
         let (mut best, mut low, mut high) = (h, 0.0, 1.1 * h);
         let (mut before, mut gap_before) = (0.0, f64::NAN);
         for attempt in 1..=LANDINGS {
             if !step.repeat(field, state, best, statistics) {
-                return Landing::Failed;
+                return EndingStep::Failed;
             }
             let (y, slope) = step.end();
             let known = field.gap(event, Along { time: state.time + best, step_size: 1.0, y, slope });
@@ -365,7 +368,7 @@ impl Search {
                 None => (gap - gap_before) / (best - before),
             };
             if attempt == 1 && gap > 0.0 && slope > 0.0 {
-                return Landing::Opens;
+                return EndingStep::Opens;
             }
             (before, gap_before) = (best, gap);
             // Where it opens again the passage lies behind.
@@ -377,7 +380,7 @@ impl Search {
             }
             best = moved;
         }
-        Landing::At(best)
+        EndingStep::At(best)
     }
 
     /// Rate of an event function at the end of the step just made.
@@ -401,13 +404,13 @@ impl Search {
 /// What comes first: that which was found, or what this event function, off by `zone` at most, has to say;
 /// minima up to `begin` are none.
 fn earlier(
-    found: Found,
+    found: FirstEvent,
     event: usize,
     curve: &impl Curve,
     zone: f64,
     off: impl Fn(f64) -> f64,
     begin: f64,
-) -> Found {
+) -> FirstEvent {
     let end = found.end(1.0);
     // Below, it is known as well as zero is.
     if zone < 0.1 * TOUCH {
@@ -419,13 +422,13 @@ fn earlier(
     }
     let crosses = found.or_earlier(event, curve, 1.0);
     let passes = match crosses {
-        Found::At(by, share) if by == event => Some(share),
+        FirstEvent::At(by, share) if by == event => Some(share),
         _ => None,
     };
     match (crosses, doubtful(curve, zone, |share| zone * off(share), [begin, end], passes)) {
-        (Found::Inside(share), Some(near)) if near < share => Found::Near(near),
-        (Found::Inside(_), _) | (_, None) => crosses,
-        (_, Some(near)) => Found::Near(near),
+        (FirstEvent::Inside(share), Some(near)) if near < share => FirstEvent::Near(near),
+        (FirstEvent::Inside(_), _) | (_, None) => crosses,
+        (_, Some(near)) => FirstEvent::Near(near),
     }
 }
 

@@ -20,7 +20,7 @@ mod dense;
 mod stages;
 use self::dense::{highest, nest};
 use self::stages::{combine, sum_up};
-use super::event::{Met, Search, Stride};
+use super::event::{Met, SearchScratch, Stride};
 use super::{Cause, Integrator, Statistics, StepError};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{DoubleDouble, Scalar};
@@ -31,7 +31,7 @@ use std::marker::PhantomData;
 pub type Row = &'static [(usize, f64)];
 
 /// The coefficients of an embedded pair with interpolation.
-pub trait Pair {
+pub trait EmbeddedPair {
     /// Name in reports.
     const NAME: &'static str;
     /// Order p of the solution that is carried on.
@@ -92,7 +92,7 @@ pub struct Explicit<P> {
     units: Vec<f64>,
     next: Vec<f64>,
     next_low: Vec<f64>,
-    search: Search,
+    search: SearchScratch,
     /// The step proposed \[s\], where there is one, and where the rate at the state is.
     wanted: Option<f64>,
     rate: Rate,
@@ -121,7 +121,7 @@ enum Rate {
 /// Steps in a row that come out not finite before the method stops.
 const MOST_CUTS: u32 = 10;
 
-impl<P: Pair> Explicit<P> {
+impl<P: EmbeddedPair> Explicit<P> {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
         Self {
@@ -132,7 +132,7 @@ impl<P: Pair> Explicit<P> {
             units: Vec::new(),
             next: Vec::new(),
             next_low: Vec::new(),
-            search: Search::default(),
+            search: SearchScratch::default(),
             wanted: None,
             rate: Rate::Unknown,
             length: 0.0,
@@ -306,7 +306,7 @@ impl<P: Pair> Explicit<P> {
     }
 }
 
-impl<P: Pair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
+impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
     fn name(&self) -> &'static str {
         P::NAME
     }

@@ -48,13 +48,13 @@ mod tableau;
 
 use super::{Cause, Integrator, Statistics, StepError};
 use crate::dynamics::{OdeSystem, State, Time};
-use lanes::Scratch;
+use lanes::GaussScratch;
 use newton::Newton;
 use std::sync::OnceLock;
-use tableau::Tableau;
+use tableau::GaussTableau;
 
 /// The tableau of 2, 3, … stages and the largest mode of its A, once somebody asked for it.
-static MADE: [OnceLock<(Tableau, f64)>; 7] = [const { OnceLock::new() }; 7];
+static MADE: [OnceLock<(GaussTableau, f64)>; 7] = [const { OnceLock::new() }; 7];
 
 const NAMES: [&str; 7] = ["gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "gauss14", "gauss16"];
 
@@ -87,7 +87,7 @@ const WHOLE: f64 = 1e-9;
 
 /// Nodes c, weights b and coefficients a, row by row, of collocation at so many Gauss points.
 pub fn collocation(stages: usize) -> [Vec<f64>; 3] {
-    let tableau = Tableau::new(stages);
+    let tableau = GaussTableau::new(stages);
     let entries = (0..stages * stages).map(|k| tableau.entry(k / stages, k % stages)).collect();
     [
         tableau.nodes.iter().map(|node| node.hi).collect(),
@@ -100,8 +100,8 @@ pub fn collocation(stages: usize) -> [Vec<f64>; 3] {
 #[derive(Clone, Debug)]
 pub struct Gauss {
     step: f64,
-    tableau: &'static Tableau,
-    scratch: Scratch,
+    tableau: &'static GaussTableau,
+    scratch: GaussScratch,
     portable: bool,
     exact: u32,
     newton: Option<Box<Newton>>,
@@ -122,7 +122,7 @@ impl Gauss {
             .and_then(|place| MADE.get(place))
             .filter(|_| step.is_finite() && step != 0.0)?;
         let (tableau, largest_mode) = made.get_or_init(|| {
-            let tableau = Tableau::new(stages);
+            let tableau = GaussTableau::new(stages);
             let largest_mode = newton::largest_mode(&tableau);
             (tableau, largest_mode)
         });
@@ -130,7 +130,7 @@ impl Gauss {
             step: step.abs(),
             slow: SLOW.min(FAST_RADIANS * largest_mode),
             tableau,
-            scratch: Scratch::default(),
+            scratch: GaussScratch::default(),
             portable: false,
             exact: MOST_EXACT_SWEEPS,
             newton: None,
@@ -157,7 +157,7 @@ impl Gauss {
 
     /// The same method, which knows nothing yet.
     pub(crate) fn another(&self) -> Self {
-        Self { scratch: Scratch::default(), newton: None, spare: None, ..*self }
+        Self { scratch: GaussScratch::default(), newton: None, spare: None, ..*self }
     }
 
     /// Number of stages s.

@@ -11,7 +11,7 @@ use crate::arithmetic::{Complex, Scalar};
 use std::ops::{Mul, Sub};
 
 /// An entry of a matrix.
-pub trait Entry: Copy + Mul<Output = Self> + Sub<Output = Self> {
+pub trait MatrixEntry: Copy + Mul<Output = Self> + Sub<Output = Self> {
     /// Zero.
     const ZERO: Self;
 
@@ -28,7 +28,7 @@ pub trait Entry: Copy + Mul<Output = Self> + Sub<Output = Self> {
     fn times(self, factor: f64) -> Self;
 }
 
-impl Entry for f64 {
+impl MatrixEntry for f64 {
     const ZERO: Self = 0.0;
 
     fn of(value: f64) -> Self {
@@ -48,7 +48,7 @@ impl Entry for f64 {
     }
 }
 
-impl Entry for Complex<f64> {
+impl MatrixEntry for Complex<f64> {
     const ZERO: Self = Complex { re: 0.0, im: 0.0 };
 
     fn of(value: f64) -> Self {
@@ -79,7 +79,7 @@ impl Entry for Complex<f64> {
 
 /// L and U of one matrix (d × d).
 #[derive(Clone, Debug, Default)]
-pub struct Factors<T> {
+pub struct LuFactors<T> {
     entries: Vec<T>,
     /// The reciprocals of U's diagonal (d).
     pivot: Vec<T>,
@@ -87,7 +87,7 @@ pub struct Factors<T> {
     exchange: Vec<usize>,
 }
 
-impl<T: Entry> Factors<T> {
+impl<T: MatrixEntry> LuFactors<T> {
     /// The factors of 1 - factor · matrix, row by row; what is singular solves to what is not finite.
     pub fn of_shifted(&mut self, factor: T, matrix: &[f64], dimension: usize) {
         let d = dimension;
@@ -136,7 +136,7 @@ impl<T: Entry> Factors<T> {
 
 /// Solves L U x = load in place, with reciprocal pivots.
 #[inline(always)]
-pub fn substitute<T: Entry>(rows: usize, factors: &[T], pivot: &[T], load: &mut [T]) {
+pub fn substitute<T: MatrixEntry>(rows: usize, factors: &[T], pivot: &[T], load: &mut [T]) {
     let (factors, pivot, load) = (&factors[..rows * rows], &pivot[..rows], &mut load[..rows]);
     for i in 1..rows {
         for k in 0..i {
@@ -166,14 +166,14 @@ mod tests {
             let mut product: Vec<_> = (0..3)
                 .map(|i| (0..3).fold(x[i], |sum, j| sum - factor.times(matrix[3 * i + j]) * x[j]))
                 .collect();
-            let mut factors = Factors::default();
+            let mut factors = LuFactors::default();
             factors.of_shifted(factor, &matrix, 3);
             factors.solve(&mut product);
             for (found, expected) in product.iter().zip(x) {
                 assert!((*found - expected).size() < 1e-13, "{found:?} {expected:?}");
             }
         }
-        let mut factors = Factors::default();
+        let mut factors = LuFactors::default();
         factors.of_shifted(1.0, &matrix, 3);
         let mut product: Vec<f64> =
             (0..3).map(|i| (0..3).fold(x[i].re, |sum, j| sum - matrix[3 * i + j] * x[j].re)).collect();

@@ -25,10 +25,10 @@ mod dense;
 mod newton;
 mod tableau;
 
-use self::newton::Solved;
-use self::tableau::Tableau;
-use super::event::{Met, Search, Stride};
-use super::linear::Factors;
+use self::newton::NewtonEnd;
+use self::tableau::RadauTableau;
+use super::event::{Met, SearchScratch, Stride};
+use super::linear::LuFactors;
 use super::{Cause, Integrator, Statistics, StepError, Tolerance, scales};
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
@@ -50,8 +50,8 @@ const MOST_CUTS: u32 = 10;
 pub struct Radau {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    tableau: Tableau,
-    work: Work,
+    tableau: RadauTableau,
+    work: RadauScratch,
     control: Control,
     /// True where the step is the first, or the last attempt was rejected.
     is_hard: bool,
@@ -59,13 +59,13 @@ pub struct Radau {
 
 /// Scratch space of d unknowns and s stages.
 #[derive(Clone, Debug, Default)]
-struct Work {
+struct RadauScratch {
     /// J (d × d), and where it was taken.
     jacobian: Vec<f64>,
     place: (Time, Vec<f64>),
     /// Factors of 1 - h mu J, one a mode, for the step `factored`; zero where there are none.
-    real: Factors<f64>,
-    pairs: Vec<Factors<Complex<f64>>>,
+    real: LuFactors<f64>,
+    pairs: Vec<LuFactors<Complex<f64>>>,
     factored: f64,
     /// Stages less y, their changes, their rates (s × d).
     z: Vec<f64>,
@@ -89,7 +89,7 @@ struct Work {
     next_rate: Vec<f64>,
     /// Weights of the polynomial (s).
     weights: Vec<f64>,
-    search: Search,
+    search: SearchScratch,
 }
 
 /// What the next step depends on beside the unknowns, the last polynomial and the Jacobian.
@@ -132,8 +132,8 @@ impl Radau {
     pub fn new(stages: usize, tolerance: Tolerance) -> Option<Self> {
         Some(Self {
             tolerance,
-            tableau: Tableau::new(stages)?,
-            work: Work::default(),
+            tableau: RadauTableau::new(stages)?,
+            work: RadauScratch::default(),
             control: Control::default(),
             is_hard: true,
         })
@@ -206,7 +206,7 @@ impl Radau {
             work.mode[k] = (0..s).fold(0.0, |sum, i| sum + tableau.estimate[i] * work.z[i * d + k]) / h;
             work.error[k] = work.start[k] + work.mode[k];
         }
-        let norm = |error: &mut [f64], work: &Work| {
+        let norm = |error: &mut [f64], work: &RadauScratch| {
             work.real.solve(error);
             let mut sum = 0.0;
             for (error, scale) in error.iter_mut().zip(&work.scale) {
@@ -341,13 +341,13 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
             }
             let solved = self.solve(field, state, h, &mut control.contraction, statistics);
             let (theta, sweeps) = match solved {
-                Solved::Converged(theta, sweeps) => (theta, sweeps),
-                Solved::Slow(factor) => {
+                NewtonEnd::Converged(theta, sweeps) => (theta, sweeps),
+                NewtonEnd::Slow(factor) => {
                     statistics.rejected += 1;
                     (self.is_hard, control.wanted, control.keeps) = (true, h * factor, 0.0);
                     continue;
                 }
-                Solved::NotFinite => (f64::NAN, 0),
+                NewtonEnd::NotFinite => (f64::NAN, 0),
             };
             let error = if sweeps > 0 {
                 self.estimate(field, state, h, self.is_hard, statistics).max(1e-10)

@@ -29,7 +29,7 @@
 mod newton;
 mod substep;
 
-use self::substep::{Failure, Work};
+use self::substep::{SubstepFailure, SubstepScratch};
 use super::composition::Composition;
 use super::{Cause, Integrator, Statistics, StepError};
 use crate::arithmetic::Scalar;
@@ -47,7 +47,7 @@ pub struct Rattle {
     substeps: Vec<f64>,
     /// Time from the start of the step to the end of each substep \[s\].
     ends: Vec<Time>,
-    work: Work,
+    work: SubstepScratch,
     /// Makes shorter steps, once one is asked for.
     spare: Option<Box<Rattle>>,
     /// True where the state was changed since the last step.
@@ -67,7 +67,15 @@ impl Rattle {
         if let Some(last) = ends.last_mut() {
             *last = Time::of(step);
         }
-        Self { composition, step, substeps, ends, work: Work::default(), spare: None, is_stale: false }
+        Self {
+            composition,
+            step,
+            substeps,
+            ends,
+            work: SubstepScratch::default(),
+            spare: None,
+            is_stale: false,
+        }
     }
 }
 
@@ -226,15 +234,15 @@ impl Rattle {
         }
     }
 
-    fn explain(&self, natural: &Natural, t: f64, failure: Failure) -> StepError {
+    fn explain(&self, natural: &Natural, t: f64, failure: SubstepFailure) -> StepError {
         let (cause, what) = match failure {
-            Failure::NotFinite(element) => {
+            SubstepFailure::NotFinite(element) => {
                 (Cause::NotFinite, format!("the force on {} is not finite", natural.element_name(element)))
             }
-            Failure::NotConverged(row) => {
+            SubstepFailure::NotConverged(row) => {
                 (Cause::NotConverged, format!("no multiplier found that keeps the {}", natural.row_name(row)))
             }
-            Failure::TooFar(row) => (
+            SubstepFailure::TooFar(row) => (
                 Cause::NotConverged,
                 format!("a quarter turn or more in one substep of the {}", natural.row_name(row)),
             ),

@@ -7,7 +7,7 @@
 //! else                            both halves, the earlier one first
 //! ```
 //!
-//! An event function is a [`Curve`]: a power series ([`Powers`]), a function of a motion whose unknowns are
+//! An event function is a [`Curve`]: a power series ([`PowerSeries`]), a function of a motion whose unknowns are
 //! polynomials (`event`, and whatever else watches a motion), or a Chebyshev interpolant ([`interpolated`])
 //! where nothing bounds it.  Where all that is left of a part is rounding, there is nothing to be told apart,
 //! and signs at the ends decide.
@@ -44,12 +44,12 @@ pub trait Curve {
     fn at(&self, t: f64) -> [f64; 2];
 
     /// What is known of it at most `radius` away from `centre`.
-    fn about(&self, centre: f64, radius: f64) -> Part;
+    fn about(&self, centre: f64, radius: f64) -> IntervalBounds;
 }
 
 /// A function on a part of a step.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
+pub struct IntervalBounds {
     /// Value in the middle.
     pub value: f64,
     /// Slope there.
@@ -62,25 +62,25 @@ pub struct Part {
 }
 
 /// What bounds tell of a part.
-enum Told {
+enum ZeroBounds {
     NoZero,
     /// At most one, or nothing but rounding: the signs at the ends tell.
     BySigns,
     Open,
 }
 
-impl Part {
-    fn tells(&self, level: f64, radius: f64) -> Told {
+impl IntervalBounds {
+    fn tells(&self, level: f64, radius: f64) -> ZeroBounds {
         let (value, slope) = ((self.value - level).abs(), self.slope.abs());
         let tilt = self.bend * radius;
         let reach = radius * (slope + 0.5 * tilt);
         let most = value + reach;
         if value > reach.max(self.rounding) {
-            Told::NoZero
+            ZeroBounds::NoZero
         } else if slope > tilt || most <= self.rounding || most.is_nan() {
-            Told::BySigns
+            ZeroBounds::BySigns
         } else {
-            Told::Open
+            ZeroBounds::Open
         }
     }
 }
@@ -198,8 +198,8 @@ fn search(curve: &impl Curve, level: f64, from: f64, to: f64) -> (Option<f64>, u
         let (centre, radius) = (0.5 * (low + high), 0.5 * (high - low));
         let part = curve.about(centre, radius);
         match part.tells(level, radius) {
-            Told::NoZero => side = part.value - level,
-            Told::Open if radius >= least && seen < MOST && count + 2 <= parts.len() => {
+            ZeroBounds::NoZero => side = part.value - level,
+            ZeroBounds::Open if radius >= least && seen < MOST && count + 2 <= parts.len() => {
                 (parts[count], parts[count + 1]) = ((centre, high), (low, centre));
                 count += 2;
             }
@@ -253,29 +253,29 @@ fn bracketed(curve: &impl Curve, level: f64, mut low: f64, mut high: f64, falls:
 /// The bound of its second derivative is a sum of magnitudes, and far too large where high powers cancel: on
 /// small parts it is that of the powers a_k about their middle, `Σ k |a_k| r^(k-2)`.
 #[derive(Clone, Copy, Debug)]
-pub struct Powers<'a> {
+pub struct PowerSeries<'a> {
     /// a_0, a_1, …
     pub powers: &'a [f64],
     /// The end of the step.
     pub end: f64,
 }
 
-impl Curve for Powers<'_> {
+impl Curve for PowerSeries<'_> {
     fn at(&self, t: f64) -> [f64; 2] {
         value(self.powers, t)
     }
 
-    fn about(&self, centre: f64, radius: f64) -> Part {
+    fn about(&self, centre: f64, radius: f64) -> IntervalBounds {
         if radius > SMALL * self.end {
             let ([value, slope], bend) = (value(self.powers, centre), bend(self.powers, centre + radius));
-            return Part { value, slope, bend, rounding: 0.0 };
+            return IntervalBounds { value, slope, bend, rounding: 0.0 };
         }
         let mut local = self.powers.to_vec();
         shift(&mut local, centre);
         let steeper = |sum: f64, (m, a): (usize, &f64)| sum * radius + m as f64 * a.abs();
         let bend = local.iter().enumerate().skip(2).rev().fold(0.0, steeper);
         let rounding = ROUNDING * size(self.powers, centre + radius);
-        Part {
+        IntervalBounds {
             value: local.first().copied().unwrap_or(0.0),
             slope: local.get(1).copied().unwrap_or(0.0),
             bend,

@@ -48,8 +48,8 @@ pub use self::batch::Batch;
 use self::expansion::Expansion;
 use self::fast::Fast;
 use self::singular::SingularPassage;
-use super::event::Found;
-use super::search::{self, Powers};
+use super::event::FirstEvent;
+use super::search::{self, PowerSeries};
 use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
@@ -66,7 +66,7 @@ const LANDINGS: usize = 6;
 
 /// Which code expands the motion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Kernel {
+pub enum ExpansionKernel {
     /// Lanes where they fit the mechanism and the order, the series for everything else.
     #[default]
     Fastest,
@@ -86,7 +86,7 @@ pub struct Taylor<T: Coefficient> {
     /// Highest power of the rates.
     pub order: usize,
     /// Which code expands the motion.
-    pub kernel: Kernel,
+    pub kernel: ExpansionKernel,
     /// Carries the first powers in double-double: what is rounded are later ones only, which weigh less than
     /// a thousandth.  Of use with tolerances below 1e-18; no effect on double-double itself.
     pub extended: bool,
@@ -108,7 +108,7 @@ impl<T: Coefficient> Taylor<T> {
         Self {
             tolerance,
             order,
-            kernel: Kernel::default(),
+            kernel: ExpansionKernel::default(),
             extended: false,
             fast: None,
             expansion: None,
@@ -262,10 +262,10 @@ impl<T: Coefficient> Taylor<T> {
                 hint,
             ));
         }
-        let is_portable = self.kernel == Kernel::Portable;
+        let is_portable = self.kernel == ExpansionKernel::Portable;
         let has_friction = !mechanism.frictions.is_empty();
         let (tolerance, order, extended) = (self.tolerance, self.order, self.extended && !has_friction);
-        let is_plain = T::IS_PLAIN && self.kernel != Kernel::Series && !has_friction;
+        let is_plain = T::IS_PLAIN && self.kernel != ExpansionKernel::Series && !has_friction;
         // The lanes know neither walls nor rows that are not eliminated.
         let is_simple = mechanism.contacts.is_empty()
             && (mechanism.constraints.is_empty() || coordinates == Coordinates::Independent);
@@ -334,15 +334,15 @@ impl<T: Coefficient> Taylor<T> {
         h: f64,
     ) -> Result<(f64, Option<usize>), StepError> {
         let Self { expansion: Some(expansion), powers, .. } = self else { return Ok((h, None)) };
-        let mut found = Found::Nothing;
+        let mut found = FirstEvent::Nothing;
         for contact in 0..problem.events() {
             trace(problem, expansion, state.time, contact, powers);
-            let curve = Powers { powers, end: found.end(h) };
+            let curve = PowerSeries { powers, end: found.end(h) };
             found = found.or_earlier(contact, &curve, h);
         }
         match found {
-            Found::At(event, t) => Ok((self.land(problem, state, event, t, h), Some(event))),
-            Found::Inside(t) if t <= super::finest(state, problem.time_unit()) => {
+            FirstEvent::At(event, t) => Ok((self.land(problem, state, event, t, h), Some(event))),
+            FirstEvent::Inside(t) if t <= super::finest(state, problem.time_unit()) => {
                 Err(super::at_rest("taylor", state, h))
             }
             found => Ok((found.end(h), None)),

@@ -23,7 +23,7 @@
 mod rows;
 mod window;
 
-use self::rows::{Rows, begin};
+use self::rows::{WindowRows, begin};
 pub use self::window::Window;
 use super::{Cause, Integrator, Statistics, StepError, Tolerance, interruption};
 use crate::dynamics::{OdeSystem, State, Time};
@@ -42,7 +42,7 @@ pub type Dop853 = Windows<Eighth>;
 pub struct Windows<M> {
     /// Tolerance of a step.
     pub tolerance: Tolerance,
-    rows: Rows,
+    rows: WindowRows,
     method: PhantomData<M>,
 }
 
@@ -55,7 +55,7 @@ const LEAST_KEPT: usize = 64;
 impl<M> Windows<M> {
     /// The method at a tolerance.
     pub fn new(tolerance: Tolerance) -> Self {
-        Self { tolerance, rows: Rows::default(), method: PhantomData }
+        Self { tolerance, rows: WindowRows::default(), method: PhantomData }
     }
 }
 
@@ -135,7 +135,7 @@ type Integrate<'a> = dyn FnMut(Window, &[f64], f64, f64, u32) -> Outcome + 'a;
 
 /// The next step of a window, or the first of a new one; nothing where that was interrupted.
 fn step<F: OdeSystem + ?Sized>(
-    rows: &mut Rows,
+    rows: &mut WindowRows,
     stepper: &Stepper,
     integrate: &mut Integrate,
     field: &mut F,
@@ -147,7 +147,7 @@ fn step<F: OdeSystem + ?Sized>(
         if let Some(failure) = rows.failure.take().filter(|_| rows.until == until) {
             return Err(failure);
         }
-        if Rows::recall(state, until).is_some() {
+        if WindowRows::recall(state, until).is_some() {
             // It was interrupted while it was integrated again.
             begin(rows, stepper, integrate, field, state, until)?;
         } else {
@@ -167,7 +167,7 @@ fn step<F: OdeSystem + ?Sized>(
 /// One call of the crate: to `until`, or to where its rows are as many as may be kept.  Where it is
 /// interrupted there are no rows, and nothing is counted.
 fn part<F: OdeSystem + ?Sized>(
-    kept: &mut Rows,
+    kept: &mut WindowRows,
     stepper: &Stepper,
     integrate: &mut Integrate,
     field: &mut F,
@@ -288,7 +288,7 @@ fn shorter<F: OdeSystem + ?Sized>(
     inside.clone_from(from);
     inside.memory.clear();
     inside.memory.push((time - from.time).hi);
-    let mut rows = Rows { finishes: true, ..Rows::default() };
+    let mut rows = WindowRows { finishes: true, ..WindowRows::default() };
     let outcome = part(&mut rows, stepper, integrate, field, inside, time, &mut Statistics::default());
     if outcome.is_ok() && rows.failure.is_none() && !rows.after.is_empty() {
         rows.last = rows.after.len() - 1;

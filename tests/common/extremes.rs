@@ -5,8 +5,8 @@ use super::random::{self, Draw};
 use driftless::dynamics::Mechanism;
 use driftless::run::trust::{How, Level};
 use driftless::run::{
-    Limits, Outcome, Plan, Point, Request, Run, Sample, Status, Sweep, SweepTable, Totals, Vary, integrate,
-    sweep,
+    Limits, Outcome, Plan, Request, Run, Sample, Status, Sweep, SweepPoint, SweepTable, Totals, Vary,
+    integrate, sweep,
 };
 use driftless::scene::{Scene, Template, parse_scene};
 use std::f64::consts::{PI, TAU};
@@ -109,9 +109,9 @@ pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, max_evaluations: u64
     request.atol = None;
     let Ok(plan) = Sweep::new(&template, vec![vary], &request) else { return found };
     let plan = if draw.chance(30) { plan.ending_at_flips() } else { plan };
-    let mut points: Vec<Point> = Vec::new();
+    let mut points: Vec<SweepPoint> = Vec::new();
     let mut table = SweepTable::new(&plan, Vec::new()).expect("room");
-    let totals: Totals = sweep(&plan, 1, &mut |point: &Point| {
+    let totals: Totals = sweep(&plan, 1, &mut |point: &SweepPoint| {
         points.push(point.clone());
         Ok(table.write(point)?)
     })
@@ -144,7 +144,7 @@ pub fn sweep_of(text: &str, scene: &Scene, draw: &mut Draw, max_evaluations: u64
 ///
 /// # Panics
 /// Where they do not agree.
-fn agrees(template: &Template, plan: &Sweep, point: &Point, request: &Request) -> bool {
+fn agrees(template: &Template, plan: &Sweep, point: &SweepPoint, request: &Request) -> bool {
     let Ok(scene) = template.filled(plan.variables(), &point.values) else { return false };
     let every = plan.plan().until / ROWS;
     let request = Request {

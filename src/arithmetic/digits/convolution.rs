@@ -4,7 +4,7 @@
 //! negative ones; carries are left for the end, and no branch depends on a sign.  The code is made for every
 //! number of limbs up to eight.
 
-use super::{Digits, FARTHEST, Kind, MOST, Scalar};
+use super::{Digits, DigitsKind, FARTHEST, MOST, Scalar};
 
 /// The upper columns of the product of two numbers of `N` limbs each into `found` (N + 2), the first of which
 /// is what is carried out of the first column.
@@ -59,7 +59,7 @@ macro_rules! by_size {
 
 /// a b.
 pub fn product<const W: usize>(a: &Digits<W>, b: &Digits<W>) -> Digits<W> {
-    if a.kind == Kind::NotFinite || b.kind == Kind::NotFinite {
+    if a.kind == DigitsKind::NotFinite || b.kind == DigitsKind::NotFinite {
         return Digits::NAN;
     }
     if a.is_zero() || b.is_zero() {
@@ -87,7 +87,7 @@ pub fn times_whole<const W: usize>(a: &Digits<W>, factor: u64) -> Digits<W> {
     if factor == 0 && a.is_finite() {
         return Digits::ZERO;
     }
-    if matches!(a.kind, Kind::Zero | Kind::NotFinite) || factor == 1 {
+    if matches!(a.kind, DigitsKind::Zero | DigitsKind::NotFinite) || factor == 1 {
         return *a;
     }
     let (limbs, mut carry) = (a.limbs(), 0);
@@ -118,7 +118,7 @@ pub fn sum_of_products<'a, const W: usize>(
         if a.is_zero() || b.is_zero() {
             continue;
         }
-        if a.kind == Kind::NotFinite || b.kind == Kind::NotFinite {
+        if a.kind == DigitsKind::NotFinite || b.kind == DigitsKind::NotFinite {
             return Digits::NAN;
         }
         limbs = limbs.min(a.limbs()).min(b.limbs());

@@ -1,6 +1,6 @@
 //! Decimal text, read exactly and written rounded to nearest.
 
-use super::{Digits, Kind, Scalar};
+use super::{Digits, DigitsKind, Scalar};
 
 /// log2 of 10.
 const BITS: f64 = std::f64::consts::LOG2_10;
@@ -23,7 +23,7 @@ pub fn decimal_places(limbs: usize) -> usize {
 
 /// How a number is laid out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Layout {
+pub enum NumberLayout {
     /// Zeros at the end are left out; exponents below 1e-4 and from 1e16 on, as doubles are written.
     Free,
     /// All digits are there.
@@ -67,10 +67,10 @@ impl<const W: usize> Digits<W> {
     }
 
     /// To so many significant digits, rounded to nearest.
-    pub fn to_decimal(&self, places: usize, layout: Layout) -> String {
+    pub fn to_decimal(&self, places: usize, layout: NumberLayout) -> String {
         match self.kind {
-            Kind::NotFinite => return "NaN".to_owned(),
-            Kind::Zero => return "0.0".to_owned(),
+            DigitsKind::NotFinite => return "NaN".to_owned(),
+            DigitsKind::Zero => return "0.0".to_owned(),
             _ => {}
         }
         let places = places.max(1);
@@ -86,7 +86,7 @@ impl<const W: usize> Digits<W> {
         }
         power += digits.len() as i64 - places as i64;
         digits.truncate(places);
-        if layout == Layout::Free {
+        if layout == NumberLayout::Free {
             digits.truncate(digits.trim_end_matches('0').len().max(1));
         }
         let sign = if self.is_negative() { "-" } else { "" };
@@ -96,7 +96,7 @@ impl<const W: usize> Digits<W> {
     /// |x| 10^power, rounded to a whole number.
     fn rounded(&self, power: i64) -> String {
         let mut size = *self;
-        size.kind = Kind::Positive;
+        size.kind = DigitsKind::Positive;
         // Two limbs more than the number has: the power is then as good as exact, and not as long as the
         // room.
         let ten = Self::whole(10).shortened(self.limbs() + 2).powi(power.unsigned_abs() as i32);

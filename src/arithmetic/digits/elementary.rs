@@ -12,7 +12,7 @@
 //! Source: R. Brent, P. Zimmermann, *Modern Computer Arithmetic* (2010), sections 4.2 to 4.4.
 
 use super::quotient::turns;
-use super::{Digits, FARTHEST, Kind, Real, Scalar};
+use super::{Digits, DigitsKind, FARTHEST, Real, Scalar};
 use std::sync::RwLock;
 
 /// A constant, to as many limbs behind the point as have been asked for.
@@ -96,7 +96,7 @@ pub fn pi<const W: usize>() -> Digits<W> {
 
 /// The quotient by a small whole number.
 pub fn over<const W: usize>(a: Digits<W>, by: u64) -> Digits<W> {
-    if matches!(a.kind, Kind::Zero | Kind::NotFinite) {
+    if matches!(a.kind, DigitsKind::Zero | DigitsKind::NotFinite) {
         return a;
     }
     let limbs = a.limbs();
@@ -225,7 +225,7 @@ pub fn exp<const W: usize>(x: Digits<W>) -> Digits<W> {
 
 /// Natural logarithm; NaN below zero, and of zero.
 pub fn ln<const W: usize>(x: Digits<W>) -> Digits<W> {
-    if x.kind != Kind::Positive {
+    if x.kind != DigitsKind::Positive {
         return Digits::NAN;
     }
     let limbs = x.limbs();

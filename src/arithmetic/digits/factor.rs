@@ -13,7 +13,7 @@
 //! that leaves; columns below those are left out.  A power larger than there is room for makes the room
 //! larger.
 
-use super::{Digits, Kind, Scalar, sum_of_products};
+use super::{Digits, DigitsKind, Scalar, sum_of_products};
 use std::ops::RangeInclusive;
 
 /// Bits of room above the first power that is not zero.
@@ -34,7 +34,7 @@ const FEW: usize = 4;
 
 /// The unit of time of a step's series, and the limbs that sums are formed from.
 #[derive(Clone, Debug, Default)]
-pub struct Scale {
+pub struct TimeScale {
     /// log2 of the unit of time \[s\].
     unit: i32,
     /// Limbs of the factors of sums of this total power, falling.  Empty: products are those of numbers with
@@ -44,7 +44,7 @@ pub struct Scale {
     longest: f64,
 }
 
-impl Scale {
+impl TimeScale {
     /// For series up to power `order` that converge up to 2^`radius` s and make steps of up to 2^`step` s,
     /// kept to so many bits.
     pub fn new(radius: f64, step: f64, order: usize, bits: usize) -> Self {
@@ -106,7 +106,7 @@ impl<const W: usize> Factor<W> {
     }
 
     /// Forgets all powers.
-    pub fn restart(&mut self, scale: &Scale) {
+    pub fn restart(&mut self, scale: &TimeScale) {
         self.powers.clear();
         (self.exponent, self.early, self.is_finite) = (None, None, true);
         if scale.limbs.is_empty() {
@@ -122,14 +122,14 @@ impl<const W: usize> Factor<W> {
     }
 
     /// Takes the next power.
-    pub fn push(&mut self, scale: &Scale, power: Digits<W>) {
+    pub fn push(&mut self, scale: &TimeScale, power: Digits<W>) {
         let m = self.powers.len();
         self.is_finite &= power.is_finite();
         self.powers.push(power);
         if scale.limbs.is_empty() {
             return;
         }
-        if matches!(power.kind, Kind::Positive | Kind::Negative) {
+        if matches!(power.kind, DigitsKind::Positive | DigitsKind::Negative) {
             let bits = 64 * power.exponent - power.limb[0].leading_zeros() as i32;
             let needed = bits + scale.unit * m as i32 + 1;
             if m < EARLY {
@@ -153,7 +153,7 @@ impl<const W: usize> Factor<W> {
     }
 
     /// V_m, and the sum up to it.
-    fn place(&mut self, scale: &Scale, m: usize) {
+    fn place(&mut self, scale: &TimeScale, m: usize) {
         match scale.limbs(m) {
             1 => self.place_in::<1>(scale, m, 1),
             2 => self.place_in::<2>(scale, m, 2),
@@ -165,11 +165,11 @@ impl<const W: usize> Factor<W> {
     }
 
     #[inline(always)]
-    fn place_in<const ROOM: usize>(&mut self, scale: &Scale, m: usize, limbs: usize) {
+    fn place_in<const ROOM: usize>(&mut self, scale: &TimeScale, m: usize, limbs: usize) {
         let power = &self.powers[m];
         let mut found = [0; ROOM];
         let found = &mut found[..limbs];
-        if let (Some(exponent), Kind::Positive | Kind::Negative) = (self.exponent, power.kind) {
+        if let (Some(exponent), DigitsKind::Positive | DigitsKind::Negative) = (self.exponent, power.kind) {
             shifted_down(&power.limb, exponent - 64 * power.exponent - scale.unit * m as i32, found);
             if power.is_negative() {
                 negate(found);
@@ -188,7 +188,13 @@ impl<const W: usize> Factor<W> {
     }
 
     /// Σ_j a_j b_{total-j} over the powers `of` this series, rounded once.
-    pub fn product(&self, other: &Self, scale: &Scale, total: usize, of: RangeInclusive<usize>) -> Digits<W> {
+    pub fn product(
+        &self,
+        other: &Self,
+        scale: &TimeScale,
+        total: usize,
+        of: RangeInclusive<usize>,
+    ) -> Digits<W> {
         let (first, last) = of.into_inner();
         if first > last {
             return Digits::ZERO;

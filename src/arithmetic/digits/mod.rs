@@ -23,9 +23,9 @@ use super::{Real, Scalar};
 use std::cmp::Ordering;
 
 pub use self::convolution::sum_of_products;
-pub use self::decimal::{Layout, decimal_places, limbs_for};
+pub use self::decimal::{NumberLayout, decimal_places, limbs_for};
 pub use self::elementary::pi;
-pub use self::factor::{Factor, Scale};
+pub use self::factor::{Factor, TimeScale};
 
 /// Exponents beyond this many limbs count as infinite.
 const FARTHEST: i32 = 1 << 28;
@@ -41,13 +41,13 @@ pub struct Digits<const W: usize> {
     /// Limbs asked for; those beyond are zero.
     limbs: u32,
     /// Sign and kind.
-    kind: Kind,
+    kind: DigitsKind,
     /// The first one is the most significant.
     limb: [u64; W],
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum DigitsKind {
     Zero,
     Positive,
     Negative,
@@ -55,7 +55,7 @@ enum Kind {
 }
 
 impl<const W: usize> Digits<W> {
-    const NAN: Self = Self { exponent: 0, limbs: W as u32, kind: Kind::NotFinite, limb: [0; W] };
+    const NAN: Self = Self { exponent: 0, limbs: W as u32, kind: DigitsKind::NotFinite, limb: [0; W] };
 
     /// The same kept to so many limbs: the rest is cut off, and what is computed from it has no more.
     #[must_use]
@@ -89,20 +89,20 @@ impl<const W: usize> Digits<W> {
 
     /// True for all but infinities and NaN.
     pub fn is_finite(&self) -> bool {
-        self.kind != Kind::NotFinite
+        self.kind != DigitsKind::NotFinite
     }
 
     /// True for zero.
     #[inline(always)]
     pub fn is_zero(&self) -> bool {
-        self.kind == Kind::Zero
+        self.kind == DigitsKind::Zero
     }
 
     /// log2 of the magnitude, to a few digits; -∞ of zero, NaN of what is not finite.
     pub fn log2(&self) -> f64 {
         match self.kind {
-            Kind::Zero => f64::NEG_INFINITY,
-            Kind::NotFinite => f64::NAN,
+            DigitsKind::Zero => f64::NEG_INFINITY,
+            DigitsKind::NotFinite => f64::NAN,
             _ => {
                 let top = self.limb[0] as f64 + self.limb[1] as f64 / TWO_64;
                 libm::log2(top) + 64.0 * f64::from(self.exponent - 1)
@@ -117,7 +117,7 @@ impl<const W: usize> Digits<W> {
         }
         let mut limb = [0; W];
         limb[0] = value;
-        Self { exponent: 1, limbs: W as u32, kind: Kind::Positive, limb }
+        Self { exponent: 1, limbs: W as u32, kind: DigitsKind::Positive, limb }
     }
 
     /// The exact product with a power of two.
@@ -131,10 +131,10 @@ impl<const W: usize> Digits<W> {
     /// Whole bits and limbs of a checkpoint.
     pub fn to_words(&self) -> Vec<u64> {
         let kind = match self.kind {
-            Kind::Zero => 0,
-            Kind::Positive => 1,
-            Kind::Negative => 2,
-            Kind::NotFinite => 3,
+            DigitsKind::Zero => 0,
+            DigitsKind::Positive => 1,
+            DigitsKind::Negative => 2,
+            DigitsKind::NotFinite => 3,
         };
         let mut words = vec![kind, i64::from(self.exponent) as u64, u64::from(self.limbs)];
         words.extend_from_slice(&self.limb[..self.limbs()]);
@@ -145,14 +145,14 @@ impl<const W: usize> Digits<W> {
     pub fn from_words(words: &[u64]) -> Option<Self> {
         let (&[kind, exponent, limbs], digits) = words.split_first_chunk::<3>()?;
         let kind = match kind {
-            0 => Kind::Zero,
-            1 => Kind::Positive,
-            2 => Kind::Negative,
+            0 => DigitsKind::Zero,
+            1 => DigitsKind::Positive,
+            2 => DigitsKind::Negative,
             _ => return None,
         };
         let exponent = i32::try_from(exponent as i64).ok().filter(|exponent| exponent.abs() < FARTHEST)?;
         let is_sound = (2..=W as u64).contains(&limbs) && digits.len() as u64 == limbs;
-        if !is_sound || (kind == Kind::Zero) != (digits[0] == 0) {
+        if !is_sound || (kind == DigitsKind::Zero) != (digits[0] == 0) {
             return None;
         }
         let mut limb = [0; W];
@@ -181,13 +181,13 @@ impl<const W: usize> Digits<W> {
         } else {
             limb[..count].copy_from_slice(&found[first..first + count]);
         }
-        let kind = if is_negative { Kind::Negative } else { Kind::Positive };
+        let kind = if is_negative { DigitsKind::Negative } else { DigitsKind::Positive };
         Self { exponent, limbs: limbs as u32, kind, limb }
     }
 
     #[inline(always)]
     fn is_negative(&self) -> bool {
-        self.kind == Kind::Negative
+        self.kind == DigitsKind::Negative
     }
 
     /// Order of the magnitudes of two numbers that are neither zero nor infinite.
@@ -197,7 +197,7 @@ impl<const W: usize> Digits<W> {
 
     /// a + b, or a - b where `is_difference`.
     fn sum(a: &Self, b: &Self, is_difference: bool) -> Self {
-        if a.kind == Kind::NotFinite || b.kind == Kind::NotFinite {
+        if a.kind == DigitsKind::NotFinite || b.kind == DigitsKind::NotFinite {
             return Self::NAN;
         }
         if b.is_zero() {

@@ -2,14 +2,14 @@
 
 use super::convolution::{product, sum_of_products, times_whole};
 use super::quotient::{quotient, square_root};
-use super::{Digits, Kind, Layout, TWO_64, decimal_places, elementary};
+use super::{Digits, DigitsKind, NumberLayout, TWO_64, decimal_places, elementary};
 use crate::arithmetic::{DoubleDouble, Over, Real, Scalar};
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 impl<const W: usize> std::fmt::Debug for Digits<W> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
-        formatter.write_str(&self.to_decimal(decimal_places(self.limbs()), Layout::Free))
+        formatter.write_str(&self.to_decimal(decimal_places(self.limbs()), NumberLayout::Free))
     }
 }
 
@@ -28,14 +28,14 @@ impl<const W: usize> PartialEq for Digits<W> {
 impl<const W: usize> PartialOrd for Digits<W> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         let rank = |kind| match kind {
-            Kind::Negative => -1,
-            Kind::Zero => 0,
+            DigitsKind::Negative => -1,
+            DigitsKind::Zero => 0,
             _ => 1,
         };
         match (self.kind, other.kind) {
-            (Kind::NotFinite, _) | (_, Kind::NotFinite) => None,
-            (Kind::Positive, Kind::Positive) => Some(self.cmp_magnitude(other)),
-            (Kind::Negative, Kind::Negative) => Some(other.cmp_magnitude(self)),
+            (DigitsKind::NotFinite, _) | (_, DigitsKind::NotFinite) => None,
+            (DigitsKind::Positive, DigitsKind::Positive) => Some(self.cmp_magnitude(other)),
+            (DigitsKind::Negative, DigitsKind::Negative) => Some(other.cmp_magnitude(self)),
             (a, b) => Some(rank(a).cmp(&rank(b))),
         }
     }
@@ -73,8 +73,8 @@ impl<const W: usize> Neg for Digits<W> {
     type Output = Self;
     fn neg(mut self) -> Self {
         self.kind = match self.kind {
-            Kind::Positive => Kind::Negative,
-            Kind::Negative => Kind::Positive,
+            DigitsKind::Positive => DigitsKind::Negative,
+            DigitsKind::Negative => DigitsKind::Positive,
             kind => kind,
         };
         self
@@ -94,11 +94,11 @@ impl<const W: usize> SubAssign for Digits<W> {
 }
 
 impl<const W: usize> Scalar for Digits<W> {
-    const ZERO: Self = Self { exponent: 0, limbs: W as u32, kind: Kind::Zero, limb: [0; W] };
+    const ZERO: Self = Self { exponent: 0, limbs: W as u32, kind: DigitsKind::Zero, limb: [0; W] };
     const ONE: Self = {
         let mut limb = [0; W];
         limb[0] = 1;
-        Self { exponent: 1, limbs: W as u32, kind: Kind::Positive, limb }
+        Self { exponent: 1, limbs: W as u32, kind: DigitsKind::Positive, limb }
     };
 
     fn of(value: f64) -> Self {
@@ -167,7 +167,7 @@ impl<const W: usize> Real for Digits<W> {
     const DROPPED: f64 = 1e-40;
 
     fn value(self) -> f64 {
-        if self.kind == Kind::NotFinite {
+        if self.kind == DigitsKind::NotFinite {
             return f64::NAN;
         }
         let top: f64 = self.limb.iter().take(3).rev().fold(0.0, |sum, &limb| sum / TWO_64 + limb as f64);

@@ -7,7 +7,7 @@
 //!
 //! Every turn doubles the digits, and runs on as many limbs as it yields.
 
-use super::{Digits, Kind, Real, Scalar};
+use super::{Digits, DigitsKind, Real, Scalar};
 
 /// Limbs of the turns of an iteration that starts with a double and ends with so many.
 pub(super) fn turns(limbs: usize) -> impl Iterator<Item = usize> {
@@ -30,7 +30,7 @@ fn leading<const W: usize>(a: &Digits<W>) -> (f64, i32) {
 
 /// a / b.
 pub fn quotient<const W: usize>(a: Digits<W>, b: Digits<W>) -> Digits<W> {
-    if matches!(b.kind, Kind::Zero | Kind::NotFinite) || !a.is_finite() {
+    if matches!(b.kind, DigitsKind::Zero | DigitsKind::NotFinite) || !a.is_finite() {
         return Digits::NAN;
     }
     if a.is_zero() {
@@ -54,9 +54,9 @@ pub fn quotient<const W: usize>(a: Digits<W>, b: Digits<W>) -> Digits<W> {
 /// The root of `a`; NaN below zero.
 pub fn square_root<const W: usize>(a: Digits<W>) -> Digits<W> {
     match a.kind {
-        Kind::Zero => return a,
-        Kind::Negative | Kind::NotFinite => return Digits::NAN,
-        Kind::Positive => {}
+        DigitsKind::Zero => return a,
+        DigitsKind::Negative | DigitsKind::NotFinite => return Digits::NAN,
+        DigitsKind::Positive => {}
     }
     let limbs = a.limbs();
     let room = (limbs + 1).min(W);

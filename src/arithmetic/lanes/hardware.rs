@@ -11,7 +11,7 @@
 
 #![allow(unsafe_code)]
 
-use super::wide::{EightLanes, Slots, Task, WideCode, each_of_eight};
+use super::wide::{EightLanes, SlotTask, Slots, WideCode, each_of_eight};
 use super::{Arithmetic, Code, Lanes, Signed, each_of_four};
 use std::arch::x86_64::*;
 
@@ -102,14 +102,14 @@ fn compiled_apart<C: Code>(code: C) -> C::Output {
 /// A task compiled for AVX and FMA.
 #[target_feature(enable = "avx,fma")]
 #[inline]
-fn performed<T: Task>(task: T) -> T::Output {
+fn performed<T: SlotTask>(task: T) -> T::Output {
     task.perform()
 }
 
 /// A task compiled for AVX-512.
 #[target_feature(enable = "avx,fma,avx512f")]
 #[inline]
-fn performed_wide<T: Task>(task: T) -> T::Output {
+fn performed_wide<T: SlotTask>(task: T) -> T::Output {
     task.perform()
 }
 
@@ -240,7 +240,7 @@ impl Lanes for Avx {
     }
 
     #[inline(always)]
-    fn perform<T: Task>(task: T) -> T::Output {
+    fn perform<T: SlotTask>(task: T) -> T::Output {
         instruction!(performed(task))
     }
 }
@@ -333,7 +333,7 @@ impl Slots for Avx512 {
     }
 
     #[inline(always)]
-    fn perform<T: Task>(task: T) -> T::Output {
+    fn perform<T: SlotTask>(task: T) -> T::Output {
         instruction!(performed_wide(task))
     }
 }

@@ -25,12 +25,12 @@ pub trait Slots: Arithmetic + Send {
     fn array(self) -> [f64; 8];
 
     /// Performs a task, compiled for these slots.
-    fn perform<T: Task>(task: T) -> T::Output;
+    fn perform<T: SlotTask>(task: T) -> T::Output;
 }
 
-/// Code over slots of a kind that it knows itself; its [`Task::perform`], and every function below it, is
+/// Code over slots of a kind that it knows itself; its [`SlotTask::perform`], and every function below it, is
 /// `#[inline(always)]`.
-pub trait Task {
+pub trait SlotTask {
     /// What comes of it.
     type Output;
 
@@ -174,7 +174,7 @@ impl<L: Lanes> Slots for [L; 2] {
     }
 
     #[inline(always)]
-    fn perform<T: Task>(task: T) -> T::Output {
+    fn perform<T: SlotTask>(task: T) -> T::Output {
         L::perform(task)
     }
 }
@@ -249,7 +249,7 @@ impl<L: Lanes> Slots for Single<L> {
     }
 
     #[inline(always)]
-    fn perform<T: Task>(task: T) -> T::Output {
+    fn perform<T: SlotTask>(task: T) -> T::Output {
         L::perform(task)
     }
 }
@@ -319,9 +319,9 @@ impl Vectors {
 mod tests {
     use super::*;
 
-    struct Everything([[f64; 8]; 3]);
+    struct EverythingWide([[f64; 8]; 3]);
 
-    impl WideCode for Everything {
+    impl WideCode for EverythingWide {
         type Output = Vec<[u64; 8]>;
 
         #[inline(always)]
@@ -358,14 +358,14 @@ mod tests {
         for case in 0..100 {
             let operands: [[f64; 8]; 3] =
                 std::array::from_fn(|row| std::array::from_fn(|lane| number(24 * case + 8 * row + lane)));
-            let expected = Vectors::Portable.run(Everything(operands));
+            let expected = Vectors::Portable.run(EverythingWide(operands));
             let [x, y, z] = operands.map(|row| row[5]);
             assert_eq!(expected[5][5], crate::arithmetic::sum::fused(x, y, z).to_bits());
             if let Some(four) = Hardware::ask() {
-                assert_eq!(Vectors::Two(four).run(Everything(operands)), expected);
+                assert_eq!(Vectors::Two(four).run(EverythingWide(operands)), expected);
             }
             if let Some(wide) = WideHardware::ask() {
-                assert_eq!(Vectors::One(wide).run(Everything(operands)), expected);
+                assert_eq!(Vectors::One(wide).run(EverythingWide(operands)), expected);
             }
         }
     }

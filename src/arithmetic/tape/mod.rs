@@ -229,7 +229,7 @@ impl Tape {
 
     /// Writes the results of all operations, of which there are [`Tape::len`].
     #[inline]
-    fn write<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut (impl Room<S> + ?Sized)) {
+    fn write<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut (impl SlotStore<S> + ?Sized)) {
         for (i, operation) in self.operations.iter().enumerate() {
             let of = |slot: Slot| slots.at(slot as usize);
             let result = match *operation {
@@ -263,12 +263,12 @@ impl Tape {
 }
 
 /// Where results of operations are written.
-trait Room<S> {
+trait SlotStore<S> {
     fn at(&self, slot: usize) -> S;
     fn put(&mut self, slot: usize, value: S);
 }
 
-impl<S: Copy> Room<S> for [S] {
+impl<S: Copy> SlotStore<S> for [S] {
     #[inline(always)]
     fn at(&self, slot: usize) -> S {
         self[slot]
@@ -281,7 +281,7 @@ impl<S: Copy> Room<S> for [S] {
 }
 
 /// A power of two, so that no number of a slot needs a check.
-impl<S: Copy, const N: usize> Room<S> for [S; N] {
+impl<S: Copy, const N: usize> SlotStore<S> for [S; N] {
     #[inline(always)]
     fn at(&self, slot: usize) -> S {
         const { assert!(N.is_power_of_two()) };

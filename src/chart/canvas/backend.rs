@@ -2,7 +2,7 @@
 
 use super::{Canvas, UNITS, backend_colour, outline, points};
 use crate::chart::mark::Mark;
-use crate::chart::text::{Align, Lettering, Level};
+use crate::chart::text::{Align, Lettering, TextLevel};
 use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, VPos};
 use plotters_backend::{
@@ -108,9 +108,9 @@ impl DrawingBackend for Canvas {
             HPos::Right => Align::Right,
         };
         let level = match style.anchor().v_pos {
-            VPos::Top => Level::Top,
-            VPos::Center => Level::Middle,
-            VPos::Bottom => Level::Baseline,
+            VPos::Top => TextLevel::Top,
+            VPos::Center => TextLevel::Middle,
+            VPos::Bottom => TextLevel::Baseline,
         };
         let quarters = match style.transform() {
             FontTransform::None => 0.0,

@@ -116,9 +116,9 @@ pub struct KinematicsFlags {
     pub scene: SceneFlags,
     /// What is driven, and from where to where in rad or m: a motor, a body or a slider, as crank,
     /// crank=0..2pi or slider=-0.1..0.1 [default: the first motor, one turn from the start]
-    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(Drive),
+    #[arg(long, value_name = "NAME[=FROM..TO]", value_parser = clap::value_parser!(KinematicDrive),
         allow_hyphen_values = true)]
-    pub drive: Option<Drive>,
+    pub drive: Option<KinematicDrive>,
     /// Rate of the drive in rad/s or m/s [default: that of the motor at the start, 1 elsewhere]
     #[arg(long, value_name = "RATE", value_parser = rate, allow_hyphen_values = true)]
     pub rate: Option<f64>,

@@ -1,6 +1,6 @@
 //! In place of [`pictures`](super) where the program is built without charts: nothing is drawn.
 
-use super::{Done, Task};
+use super::{Done, SimulateTask};
 use crate::cli::failure::Failure;
 use crate::cli::flags::RunFlags;
 use crate::dynamics::Mechanism;
@@ -14,12 +14,12 @@ pub(super) struct Pages;
 impl Pages {
     pub fn see(&mut self, _: &[f64]) {}
 
-    pub fn write(self, _: &Task<'_>, _: &mut Folder) -> Result<(), Failure> {
+    pub fn write(self, _: &SimulateTask<'_>, _: &mut Folder) -> Result<(), Failure> {
         Ok(())
     }
 }
 
-impl Task<'_> {
+impl SimulateTask<'_> {
     pub(super) fn window(&self, _: &Plan) -> Result<Option<[f64; 2]>, Failure> {
         Ok(None)
     }

@@ -1,11 +1,11 @@
 //! What is drawn of runs: their charts, animations and pages.
 
-use super::{Done, Task};
+use super::{Done, SimulateTask};
 use crate::cli::failure::{Exit, Failure};
 use crate::cli::flags::RunFlags;
 use crate::dynamics::Mechanism;
 use crate::report;
-use crate::report::charts::Columns;
+use crate::report::charts::RowColumns;
 use crate::report::view::{Gathering, Viewed};
 use crate::run::{Folder, Outcome, Plan};
 use crate::scene::Scene;
@@ -24,7 +24,7 @@ impl Pages {
         }
     }
 
-    pub fn write(self, task: &Task<'_>, folder: &mut Folder) -> Result<(), Failure> {
+    pub fn write(self, task: &SimulateTask<'_>, folder: &mut Folder) -> Result<(), Failure> {
         let flags = task.flags;
         if !flags.html {
             return Ok(());
@@ -34,7 +34,7 @@ impl Pages {
     }
 }
 
-impl Task<'_> {
+impl SimulateTask<'_> {
     /// The window charts show; it has to hold rows.
     pub(super) fn window(&self, plan: &Plan) -> Result<Option<[f64; 2]>, Failure> {
         let Some([from, to]) = self.flags.window else { return Ok(None) };
@@ -64,8 +64,8 @@ pub(super) fn check(mechanism: &Mechanism, flags: &RunFlags) -> Result<(), Failu
 }
 
 /// The columns to be drawn.
-fn columns(mechanism: &Mechanism, flags: &RunFlags) -> Result<Columns, Failure> {
-    Columns::find(mechanism, &flags.chart)
+fn columns(mechanism: &Mechanism, flags: &RunFlags) -> Result<RowColumns, Failure> {
+    RowColumns::find(mechanism, &flags.chart)
         .map_err(|error| Failure::new(Exit::Usage, format!("--chart: {error}")))
 }
 

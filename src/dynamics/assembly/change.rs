@@ -1,14 +1,14 @@
 //! What of a start is not as the scene gives it.
 
 use super::SAME;
-use super::newton::{Aim, Goal, Problem};
+use super::newton::{AssemblyProblem, GivenNumber, Goal};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::forest::BodyOrigin;
 use serde::Serialize;
 
 /// A number of the start that is not what the scene gives.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Change {
+pub struct StartChange {
     /// The bar.
     pub body: String,
     /// `phi`, `omega`, `origin.x`, …
@@ -21,16 +21,16 @@ pub struct Change {
     pub unit: &'static str,
 }
 
-impl std::fmt::Display for Change {
+impl std::fmt::Display for StartChange {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { body, quantity, given, used, unit } = self;
         write!(f, "{quantity} of {body} is {used:?} {unit} at the start instead of {given:?} {unit}")
     }
 }
 
-impl Problem<'_> {
+impl AssemblyProblem<'_> {
     /// What of the positions is not as given.
-    pub(super) fn changes(&self, q: &[DoubleDouble], aims: &[Aim]) -> Vec<Change> {
+    pub(super) fn changes(&self, q: &[DoubleDouble], aims: &[GivenNumber]) -> Vec<StartChange> {
         aims.iter()
             .zip(self.measured(q))
             .filter_map(|(aim, used)| self.change(aim, used, ["phi", "origin"], ["rad", "m"]))
@@ -39,11 +39,11 @@ impl Problem<'_> {
 
     pub(super) fn change(
         &self,
-        aim: &Aim,
+        aim: &GivenNumber,
         used: f64,
         [turn, shift]: [&str; 2],
         [of_turn, of_shift]: [&'static str; 2],
-    ) -> Option<Change> {
+    ) -> Option<StartChange> {
         let is_angle = aim.goal == Goal::Coordinate(aim.bar);
         let scale = if is_angle { 1.0 } else { self.size };
         if (used - aim.given).abs() <= SAME * scale.max(aim.given.abs()) {
@@ -56,7 +56,7 @@ impl Problem<'_> {
         let quantity =
             if is_angle { turn.to_owned() } else { format!("{shift}.{}", if is_x { "x" } else { "y" }) };
         let body = self.mechanism.bodies[aim.bar].name.clone();
-        Some(Change {
+        Some(StartChange {
             body,
             quantity,
             given: aim.given,
@@ -68,12 +68,12 @@ impl Problem<'_> {
     /// What of the rates is not as given.
     pub(super) fn rate_changes(
         &self,
-        aims: &[Aim],
+        aims: &[GivenNumber],
         q: &[DoubleDouble],
         omega: &[DoubleDouble],
-    ) -> Vec<Change> {
+    ) -> Vec<StartChange> {
         let z = self.unit_vectors::<DoubleDouble>(q).1;
-        let change = |aim: &Aim| {
+        let change = |aim: &GivenNumber| {
             self.change(aim, self.aim_rate(aim, &z, omega).hi, ["omega", "velocity"], ["rad/s", "m/s"])
         };
         aims.iter().filter_map(change).collect()

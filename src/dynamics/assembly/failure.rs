@@ -1,10 +1,10 @@
 //! What is told where no start is found: all that is missing, and the configuration that comes closest.
 
-use super::newton::{Aim, Goal, Problem};
-use super::{DEPENDENT, DISTINCT, Found};
+use super::newton::{AssemblyProblem, GivenNumber, Goal};
+use super::{ClosedStart, DEPENDENT, DISTINCT};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::{Body, CompileError, quoted};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 
 /// Configurations apart by less are not told apart by a rough value \[rad, or sizes of the mechanism\].
 const ROUGHLY: f64 = 0.3;
@@ -39,7 +39,7 @@ impl std::fmt::Display for Closest {
     }
 }
 
-impl Problem<'_> {
+impl AssemblyProblem<'_> {
     /// No guess closes the rows: the one that came closest.
     pub(super) fn impossible(&self, open: Vec<Vec<DoubleDouble>>, guesses: [usize; 2]) -> CompileError {
         let least = open.into_iter().min_by(|a, b| self.worst(a).1.total_cmp(&self.worst(b).1));
@@ -48,7 +48,12 @@ impl Problem<'_> {
     }
 
     /// The nearest start is too far from what is given.
-    pub(super) fn far(&self, guess: &[DoubleDouble], best: &Found, guesses: [usize; 2]) -> CompileError {
+    pub(super) fn far(
+        &self,
+        guess: &[DoubleDouble],
+        best: &ClosedStart,
+        guesses: [usize; 2],
+    ) -> CompileError {
         let mut held = guess.to_vec();
         self.position(&mut held, &self.active, &vec![true; self.aims.len()]);
         self.no_start(&held, self.closest(&best.q, Some(best.change), guesses))
@@ -74,7 +79,7 @@ impl Problem<'_> {
         let is_driven = |body: usize| {
             let drives = |row: &ConstraintEquation| {
                 row.law.is_some()
-                    && matches!(row.measure, Measure::Angle { body: driven, .. } if driven == body)
+                    && matches!(row.measure, RowMeasure::Angle { body: driven, .. } if driven == body)
             };
             self.mechanism.constraints.iter().any(drives)
         };
@@ -89,7 +94,7 @@ impl Problem<'_> {
         &self,
         q: &[DoubleDouble],
         rows: &[bool],
-        aims: &[Aim],
+        aims: &[GivenNumber],
         missing: &[usize],
         what: &str,
     ) -> Result<(), CompileError> {
@@ -111,20 +116,24 @@ impl Problem<'_> {
     }
 
     /// How far apart two starts are in a coordinate \[rad, or sizes of the mechanism\].
-    fn apart(&self, one: &Found, other: &Found, k: usize) -> f64 {
+    fn apart(&self, one: &ClosedStart, other: &ClosedStart, k: usize) -> f64 {
         let apart = other.q[k] - one.q[k];
         if k < self.mechanism.bodies.len() { apart.reduced().0.hi.abs() } else { apart.hi.abs() / self.size }
     }
 
     /// The coordinate in which two starts differ most, where they differ.
-    pub(super) fn differs(&self, one: &Found, other: &Found) -> Option<usize> {
+    pub(super) fn differs(&self, one: &ClosedStart, other: &ClosedStart) -> Option<usize> {
         let apart = |&k: &usize| self.apart(one, other, k);
         (0..one.q.len()).max_by(|a, b| apart(a).total_cmp(&apart(b))).filter(|k| apart(k) > DISTINCT)
     }
 
     /// Refuses a start with rivals that are as near to what is given, and names what tells them all apart.
-    pub(super) fn check_alone(&self, best: &Found, near: Vec<&Found>) -> Result<(), CompileError> {
-        let mut rivals: Vec<&Found> = Vec::new();
+    pub(super) fn check_alone(
+        &self,
+        best: &ClosedStart,
+        near: Vec<&ClosedStart>,
+    ) -> Result<(), CompileError> {
+        let mut rivals: Vec<&ClosedStart> = Vec::new();
         for other in near {
             if self.differs(best, other).is_some()
                 && rivals.iter().all(|known| self.differs(known, other).is_some())
@@ -186,7 +195,7 @@ impl Problem<'_> {
         })
     }
 
-    fn shown(&self, found: &Found, k: usize) -> f64 {
+    fn shown(&self, found: &ClosedStart, k: usize) -> f64 {
         let q = &found.q[k];
         if k < self.mechanism.bodies.len() { q.reduced().0.hi } else { q.hi }
     }

@@ -1,10 +1,10 @@
 //! Where the search for a start begins.
 
-use super::Problem;
+use super::AssemblyProblem;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::scene::Scene;
 
-impl Problem<'_> {
+impl AssemblyProblem<'_> {
     /// Other guesses that are tried.
     pub(super) fn guesses(&self) -> usize {
         match self.coordinates() {

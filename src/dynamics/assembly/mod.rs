@@ -23,17 +23,17 @@ pub(in crate::dynamics) mod svd;
 mod watch;
 
 use super::compile::CompileError;
-use super::constraint::Measure;
+use super::constraint::RowMeasure;
 use super::forest::BodyOrigin;
 use super::law::Law;
 use super::partition::CoordinatePartition;
 use super::{Mechanism, Motion};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::scene::{Given, Scene};
-pub use change::Change;
+pub use change::StartChange;
 pub use failure::Closest;
-use newton::{Aim, Goal, KEPT, Problem, of_origin};
-use svd::{Matrix, independent};
+use newton::{AssemblyProblem, GivenNumber, Goal, KEPT, of_origin};
+use svd::{RowMatrix, independent};
 
 /// What counts as no change, relative to 1 rad (and rad/s), the size of the mechanism, or the value where
 /// that is larger.
@@ -65,7 +65,7 @@ pub struct Assembly {
     /// The start; `None` where the scene's own is taken as it is.
     pub start: Option<Motion>,
     /// What differs from what the scene gives.
-    pub changes: Vec<Change>,
+    pub changes: Vec<StartChange>,
     /// Coordinates less the rank of the rows.
     pub degrees_of_freedom: usize,
     /// Rows that follow from those before them, at the start and near it.
@@ -89,7 +89,7 @@ impl PartialEq for Assembly {
 }
 
 /// A start that closes the rows.
-struct Found {
+struct ClosedStart {
     q: Vec<DoubleDouble>,
     /// The largest change of what is given, measured.
     change: f64,
@@ -119,12 +119,12 @@ impl Mechanism {
             return Ok(self);
         }
         let given = |bar: usize| scene.given.get(bar).copied().unwrap_or(Given::ANGLE_AND_RATE);
-        let problem = Problem::new(&self, scene, kept, &given);
+        let problem = AssemblyProblem::new(&self, scene, kept, &given);
         let (found, aims) = (problem.find(scene)?, &problem.aims);
         let mut changes = problem.changes(&found.q, aims);
         let mut angles = Vec::new();
         for &row in kept {
-            if let Measure::Angle { body, base } = self.constraints[row].measure.clone() {
+            if let RowMeasure::Angle { body, base } = self.constraints[row].measure.clone() {
                 let between = found.q[body] - base.map_or(DoubleDouble::ZERO, |base| found.q[base]);
                 angles.push((row, between.hi));
             }
@@ -156,9 +156,9 @@ impl Mechanism {
     pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> Vec<Vec<f64>> {
         let start: Vec<DoubleDouble> = self.start(scene).phi;
         let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };
-        let problem = Problem { aims: Vec::new(), ..Problem::new(self, scene, &[], &given) };
+        let problem = AssemblyProblem { aims: Vec::new(), ..AssemblyProblem::new(self, scene, &[], &given) };
         let all: Vec<usize> = (0..start.len()).collect();
-        let mut found = vec![Found {
+        let mut found = vec![ClosedStart {
             q: start.clone(),
             change: 0.0,
             distance: 0.0,
@@ -169,13 +169,14 @@ impl Mechanism {
             let mut q = problem.other_guess(&start, &all, k);
             if problem.descend(&mut q, &problem.active, &[], HOPEFUL) < NEARLY && problem.closes(&mut q, &[])
             {
-                let other = Found { q, change: 0.0, distance: 0.0, held: Vec::new(), is_of_family: false };
+                let other =
+                    ClosedStart { q, change: 0.0, distance: 0.0, held: Vec::new(), is_of_family: false };
                 if found.iter().all(|known| problem.differs(known, &other).is_some()) {
                     found.push(other);
                 }
             }
         }
-        let plain = |found: Found| {
+        let plain = |found: ClosedStart| {
             let of = |(k, q): (usize, DoubleDouble)| {
                 if k < self.bodies.len() { q.reduced().0.hi } else { q.hi }
             };
@@ -223,7 +224,7 @@ impl Mechanism {
     }
 }
 
-impl<'a> Problem<'a> {
+impl<'a> AssemblyProblem<'a> {
     fn new(mechanism: &'a Mechanism, scene: &Scene, kept: &[usize], given: &dyn Fn(usize) -> Given) -> Self {
         let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
         let unit = (0..mechanism.coordinates()).map(|k| if k < angles { 1.0 } else { size }).collect();
@@ -231,15 +232,15 @@ impl<'a> Problem<'a> {
         let mut aims = Vec::new();
         for (bar, start) in scene.start.iter().enumerate() {
             if given(bar).phi {
-                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.phi });
+                aims.push(GivenNumber { bar, goal: Goal::Coordinate(bar), given: start.phi });
             }
             if let Some(origin) = given(bar).origin {
                 aims.extend(of_origin(mechanism, bar, origin));
             }
         }
-        let is_known = |measure: &Measure| match measure {
-            Measure::Angle { body, base } => given(*body).phi && base.is_none_or(|base| given(base).phi),
-            Measure::Place(_) => true,
+        let is_known = |measure: &RowMeasure| match measure {
+            RowMeasure::Angle { body, base } => given(*body).phi && base.is_none_or(|base| given(base).phi),
+            RowMeasure::Place(_) => true,
         };
         let active = mechanism
             .constraints
@@ -247,7 +248,7 @@ impl<'a> Problem<'a> {
             .enumerate()
             .map(|(i, row)| !kept.contains(&i) || is_known(&row.measure))
             .collect();
-        Problem { mechanism, active, size, unit, lever, aims }
+        AssemblyProblem { mechanism, active, size, unit, lever, aims }
     }
 
     /// Coordinates that nothing gives.
@@ -256,7 +257,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Positions that close the rows.
-    fn find(&self, scene: &Scene) -> Result<Found, CompileError> {
+    fn find(&self, scene: &Scene) -> Result<ClosedStart, CompileError> {
         let guess = self.guess(scene);
         let missing = self.missing();
         let first = self.attempt(&guess, &missing);
@@ -264,7 +265,7 @@ impl<'a> Problem<'a> {
             self.check_open(&found.q, &self.active, &self.held(found), &missing, "phi")?;
         }
         let others = if missing.is_empty() { 0 } else { self.guesses() };
-        let mut tried: Vec<Result<Found, Vec<DoubleDouble>>> = vec![first];
+        let mut tried: Vec<Result<ClosedStart, Vec<DoubleDouble>>> = vec![first];
         tried.extend((1..=others).map(|k| self.attempt(&self.other_guess(&guess, &missing, k), &missing)));
         if !tried.iter().flatten().any(|found| found.change <= ROUGH) {
             // What is given may lead nowhere, or not to what is next to it: from elsewhere.
@@ -276,7 +277,8 @@ impl<'a> Problem<'a> {
                 other
             };
             // Of a family of positions the one next to the guesses is among those before.
-            let is_single = |one: &Result<Found, _>| !one.as_ref().is_ok_and(|found| found.is_of_family);
+            let is_single =
+                |one: &Result<ClosedStart, _>| !one.as_ref().is_ok_and(|found| found.is_of_family);
             let more = (1..=self.guesses()).map(|k| self.near(begin(k), &guess, &missing));
             tried.extend(more.filter(is_single));
         }
@@ -320,12 +322,12 @@ impl<'a> Problem<'a> {
     }
 
     /// The aims kept as given.
-    fn held(&self, found: &Found) -> Vec<Aim> {
+    fn held(&self, found: &ClosedStart) -> Vec<GivenNumber> {
         self.aims.iter().zip(&found.held).filter(|(_, held)| **held).map(|(aim, _)| *aim).collect()
     }
 
     /// From a guess to a start that closes the rows; else how far it came.
-    fn attempt(&self, guess: &[DoubleDouble], missing: &[usize]) -> Result<Found, Vec<DoubleDouble>> {
+    fn attempt(&self, guess: &[DoubleDouble], missing: &[usize]) -> Result<ClosedStart, Vec<DoubleDouble>> {
         let (all, none) = (vec![true; self.aims.len()], vec![false; self.aims.len()]);
         let mut q = guess.to_vec();
         if self.closes(&mut q, &all) {
@@ -333,7 +335,7 @@ impl<'a> Problem<'a> {
             if self.finish(&mut q, &self.active, &all) > 1e-20 && q.len() <= DENSE {
                 self.finish(&mut q, &self.active, &none);
             }
-            return Ok(Found { q, change: 0.0, distance: 0.0, held: all, is_of_family: false });
+            return Ok(ClosedStart { q, change: 0.0, distance: 0.0, held: all, is_of_family: false });
         }
         self.near(q, guess, missing)
     }
@@ -344,7 +346,7 @@ impl<'a> Problem<'a> {
         mut q: Vec<DoubleDouble>,
         guess: &[DoubleDouble],
         missing: &[usize],
-    ) -> Result<Found, Vec<DoubleDouble>> {
+    ) -> Result<ClosedStart, Vec<DoubleDouble>> {
         let none = vec![false; self.aims.len()];
         if !self.closes(&mut q, &none) {
             return Err(q);
@@ -371,7 +373,7 @@ impl<'a> Problem<'a> {
         let measured = self.measured(&q).zip(&self.aims);
         let off: Vec<f64> = measured.map(|(used, aim)| self.share(aim, used - aim.given).abs()).collect();
         let distance = off.iter().fold(0.0, |sum, off| sum + off * off).sqrt();
-        Ok(Found { q, change: off.into_iter().fold(0.0, f64::max), distance, held, is_of_family })
+        Ok(ClosedStart { q, change: off.into_iter().fold(0.0, f64::max), distance, held, is_of_family })
     }
 
     /// Closes the rows as far as double-double goes, with these aims held.
@@ -381,13 +383,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Of the aims as many as the rows leave free, from the first on.
-    fn kept(&self, aims: &[Aim], q: &[DoubleDouble], rows: &[bool]) -> Vec<bool> {
+    fn kept(&self, aims: &[GivenNumber], q: &[DoubleDouble], rows: &[bool]) -> Vec<bool> {
         let mut matrix = self.jacobian(q, rows);
         self.add_aims(&mut matrix, aims, q);
         independent(&matrix, DEPENDENT).split_off(self.mechanism.constraints.len())
     }
 
-    fn add_aims(&self, matrix: &mut Matrix, aims: &[Aim], q: &[DoubleDouble]) {
+    fn add_aims(&self, matrix: &mut RowMatrix, aims: &[GivenNumber], q: &[DoubleDouble]) {
         let z = self.unit_vectors::<f64>(q).1;
         for aim in aims {
             matrix.entries.extend(self.aim(aim, q, &z).1);
@@ -402,7 +404,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A change of an aim, measured.
-    fn share(&self, aim: &Aim, change: f64) -> f64 {
+    fn share(&self, aim: &GivenNumber, change: f64) -> f64 {
         change / if aim.goal == Goal::Coordinate(aim.bar) { 1.0 } else { self.size }
     }
 

@@ -10,9 +10,9 @@
 //! the mechanism, rows in their largest lever. Source: P. Deuflhard, *Newton Methods for Nonlinear Problems*
 //! (2004), section 4.4.
 
-use super::svd::{Matrix, dot};
+use super::svd::{RowMatrix, dot};
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::constraint::{Linearised, Measure, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, Linearised, RowMeasure};
 use crate::dynamics::forest::BodyOrigin;
 use crate::dynamics::{Mechanism, Time};
 
@@ -29,7 +29,7 @@ pub const KEPT: f64 = 1e-13;
 
 /// What the start is to be found from.
 #[derive(Clone, Debug)]
-pub struct Problem<'a> {
+pub struct AssemblyProblem<'a> {
     pub mechanism: &'a Mechanism,
     /// False for rows that keep an angle the start itself is to give.
     pub active: Vec<bool>,
@@ -40,12 +40,12 @@ pub struct Problem<'a> {
     /// What each row is measured in: 1 rad, or its largest lever \[m\].
     pub lever: Vec<f64>,
     /// What is given.
-    pub aims: Vec<Aim>,
+    pub aims: Vec<GivenNumber>,
 }
 
 /// A number that the scene gives of the start.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Aim {
+pub struct GivenNumber {
     /// The bar.
     pub bar: usize,
     pub goal: Goal,
@@ -53,7 +53,7 @@ pub struct Aim {
     pub given: f64,
 }
 
-/// What an [`Aim`] is of.
+/// What an [`GivenNumber`] is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
     /// A coordinate.
@@ -62,7 +62,7 @@ pub enum Goal {
     Origin(Complex<f64>),
 }
 
-impl Problem<'_> {
+impl AssemblyProblem<'_> {
     /// Number of coordinates.
     pub fn coordinates(&self) -> usize {
         self.unit.len()
@@ -94,7 +94,11 @@ impl Problem<'_> {
         let mut gradient = vec![T::ZERO; self.coordinates()];
         for (i, row) in self.mechanism.constraints.iter().enumerate() {
             gradient.fill(T::ZERO);
-            let here = row.linearise(Time::default(), Posture { phi: &phi, z: &z, omega }, &mut gradient);
+            let here = row.linearise(
+                Time::default(),
+                ConstraintArguments { phi: &phi, z: &z, omega },
+                &mut gradient,
+            );
             see(i, here, &gradient);
         }
         z
@@ -108,9 +112,9 @@ impl Problem<'_> {
     }
 
     /// Every row's Jacobian in all coordinates, measured; rows that are not among `rows` come out zero.
-    pub fn jacobian(&self, q: &[DoubleDouble], rows: &[bool]) -> Matrix {
+    pub fn jacobian(&self, q: &[DoubleDouble], rows: &[bool]) -> RowMatrix {
         let n = self.coordinates();
-        let mut matrix = Matrix::zero(self.mechanism.constraints.len(), n);
+        let mut matrix = RowMatrix::zero(self.mechanism.constraints.len(), n);
         self.visit::<f64>(q, &vec![0.0; n], |i, _, gradient| {
             if rows[i] {
                 self.measure(gradient, self.lever[i], matrix.row_mut(i));
@@ -126,7 +130,7 @@ impl Problem<'_> {
     }
 
     /// Value of an aim \[rad or m\], and its gradient, measured.
-    pub fn aim<T: Real>(&self, aim: &Aim, q: &[DoubleDouble], z: &[Complex<T>]) -> (T, Vec<f64>) {
+    pub fn aim<T: Real>(&self, aim: &GivenNumber, q: &[DoubleDouble], z: &[Complex<T>]) -> (T, Vec<f64>) {
         let n = self.coordinates();
         let mut row = vec![0.0; n];
         match aim.goal {
@@ -151,7 +155,12 @@ impl Problem<'_> {
     }
 
     /// Rate of an aim \[rad/s or m/s\].
-    pub fn aim_rate(&self, aim: &Aim, z: &[Complex<DoubleDouble>], omega: &[DoubleDouble]) -> DoubleDouble {
+    pub fn aim_rate(
+        &self,
+        aim: &GivenNumber,
+        z: &[Complex<DoubleDouble>],
+        omega: &[DoubleDouble],
+    ) -> DoubleDouble {
         match aim.goal {
             Goal::Coordinate(k) => omega[k],
             Goal::Origin(axis) => {
@@ -168,10 +177,10 @@ impl Problem<'_> {
         rows: &[bool],
         held: &[bool],
         columns: &[usize],
-    ) -> (Vec<f64>, Matrix) {
+    ) -> (Vec<f64>, RowMatrix) {
         let n = self.coordinates();
         let (mut left, mut matrix) =
-            (Vec::new(), Matrix { rows: 0, columns: columns.len(), entries: Vec::new() });
+            (Vec::new(), RowMatrix { rows: 0, columns: columns.len(), entries: Vec::new() });
         let (mut plain, mut full) = (vec![0.0; n], vec![0.0; n]);
         let z = self.visit::<T>(q, &vec![T::ZERO; n], |i, here, gradient| {
             if rows[i] {
@@ -302,8 +311,14 @@ impl Problem<'_> {
 
     /// Changes the rates that are not held, as little as may be, so that all rows keep; returns what is left,
     /// measured, relative to the rates.
-    pub fn rates(&self, q: &[DoubleDouble], omega: &mut [DoubleDouble], aims: &[Aim], held: &[bool]) -> f64 {
-        let columns = Problem { aims: aims.to_vec(), ..self.clone() }.columns(held);
+    pub fn rates(
+        &self,
+        q: &[DoubleDouble],
+        omega: &mut [DoubleDouble],
+        aims: &[GivenNumber],
+        held: &[bool],
+    ) -> f64 {
+        let columns = AssemblyProblem { aims: aims.to_vec(), ..self.clone() }.columns(held);
         let rates = |omega: &[DoubleDouble]| {
             omega
                 .iter()
@@ -311,7 +326,7 @@ impl Problem<'_> {
                 .fold(0.0, |most: f64, (omega, unit)| most.max((omega.hi / unit).abs()))
         };
         let guessed = rates(omega);
-        let mut matrix = Matrix { rows: 0, columns: columns.len(), entries: Vec::new() };
+        let mut matrix = RowMatrix { rows: 0, columns: columns.len(), entries: Vec::new() };
         let mut full = vec![0.0; self.coordinates()];
         let z = self.visit::<f64>(q, &vec![0.0; self.coordinates()], |i, _, gradient| {
             self.measure(gradient, self.lever[i], &mut full);
@@ -374,8 +389,8 @@ impl Problem<'_> {
 
 /// The largest lever of a row \[m\], translational coordinates counted with the size of the mechanism; 1 rad
 /// for an angle.
-pub fn lever(measure: &Measure, size: f64) -> f64 {
-    let Measure::Place(place) = measure else { return 1.0 };
+pub fn lever(measure: &RowMeasure, size: f64) -> f64 {
+    let RowMeasure::Place(place) = measure else { return 1.0 };
     let length =
         |k: usize, g: &Complex<f64>| g.norm_squared().sqrt() * if k < place.angles { 1.0 } else { size };
     let linear = place.linear.iter().map(|(k, g)| length(*k, g));
@@ -384,7 +399,7 @@ pub fn lever(measure: &Measure, size: f64) -> f64 {
     if most > 0.0 { most } else { size }
 }
 
-impl Matrix {
+impl RowMatrix {
     fn push(&mut self, full: &[f64], columns: &[usize]) {
         self.entries.extend(columns.iter().map(|&k| full[k]));
         self.rows += 1;
@@ -408,12 +423,12 @@ fn squares(values: &[f64]) -> f64 {
 }
 
 /// The aims at the origin of a bar, or at its velocity.
-pub(super) fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [Aim; 2] {
+pub(super) fn of_origin(mechanism: &Mechanism, bar: usize, [x, y]: [f64; 2]) -> [GivenNumber; 2] {
     match mechanism.forest.hangs[bar].origin_point {
         BodyOrigin::Free(k) => {
-            [(k, x), (k + 1, y)].map(|(k, given)| Aim { bar, goal: Goal::Coordinate(k), given })
+            [(k, x), (k + 1, y)].map(|(k, given)| GivenNumber { bar, goal: Goal::Coordinate(k), given })
         }
-        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| Aim {
+        _ => [(Complex::new(1.0, 0.0), x), (Complex::new(0.0, 1.0), y)].map(|(axis, given)| GivenNumber {
             bar,
             goal: Goal::Origin(axis),
             given,

@@ -1,8 +1,8 @@
 //! Degrees of freedom, and rows that say nothing new: everywhere, or at the start alone.
 
 use super::guess::shuffled;
-use super::newton::{KEPT, Problem};
-use super::svd::{Matrix, independent};
+use super::newton::{AssemblyProblem, KEPT};
+use super::svd::{RowMatrix, independent};
 use super::{Assembly, DENSE, DEPENDENT};
 use crate::arithmetic::{DoubleDouble, Scalar};
 
@@ -13,7 +13,7 @@ const NEARLY: f64 = 1e-5;
 /// independent.
 const LARGEST: usize = 1 << 28;
 
-impl Problem<'_> {
+impl AssemblyProblem<'_> {
     /// Degrees of freedom, redundant rows and singular ones.
     pub(super) fn rank(&self, q: &[DoubleDouble]) -> Assembly {
         let rows = self.mechanism.constraints.len();
@@ -77,13 +77,13 @@ impl Problem<'_> {
 }
 
 /// The least singular value that counts over the largest; 1 without any.
-fn conditioning(jacobian: &Matrix) -> f64 {
+fn conditioning(jacobian: &RowMatrix) -> f64 {
     let values = jacobian.values();
     let smallest = values.iter().copied().filter(|&sigma| sigma > DEPENDENT).fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { smallest / values.iter().copied().fold(0.0, f64::max) } else { 1.0 }
 }
 
 /// Which rows are combinations of those before.
-fn dependent(jacobian: &Matrix, least: f64) -> Vec<bool> {
+fn dependent(jacobian: &RowMatrix, least: f64) -> Vec<bool> {
     independent(jacobian, least).iter().map(|new| !new).collect()
 }

@@ -1,13 +1,13 @@
 //! Rates of a start that keep the constraints.
 
-use super::Change;
-use super::newton::{Aim, Goal, KEPT, Problem, of_origin};
+use super::StartChange;
+use super::newton::{AssemblyProblem, GivenNumber, Goal, KEPT, of_origin};
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::compile::CompileError;
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::scene::{Given, Scene};
 
-impl Problem<'_> {
+impl AssemblyProblem<'_> {
     /// Rates that keep the rows; adds what is not as given to `changes`.
     pub(super) fn find_rates(
         &self,
@@ -15,7 +15,7 @@ impl Problem<'_> {
         given: &dyn Fn(usize) -> Given,
         q: &[DoubleDouble],
         is_singular: bool,
-        changes: &mut Vec<Change>,
+        changes: &mut Vec<StartChange>,
     ) -> Result<Vec<DoubleDouble>, CompileError> {
         let aims = self.rate_aims(scene, given);
         let mut guess = vec![DoubleDouble::ZERO; q.len()];
@@ -26,7 +26,7 @@ impl Problem<'_> {
         }
         let every = vec![true; self.mechanism.constraints.len()];
         let (all, none) = (vec![true; aims.len()], vec![false; aims.len()]);
-        let missing = Problem { aims: aims.clone(), ..self.clone() }.columns(&all);
+        let missing = AssemblyProblem { aims: aims.clone(), ..self.clone() }.columns(&all);
         let mut ways = vec![all];
         if !missing.is_empty() {
             ways.push(self.kept(&aims, q, &every));
@@ -56,11 +56,11 @@ impl Problem<'_> {
     }
 
     /// The rates that the scene gives.
-    pub(super) fn rate_aims(&self, scene: &Scene, given: &dyn Fn(usize) -> Given) -> Vec<Aim> {
+    pub(super) fn rate_aims(&self, scene: &Scene, given: &dyn Fn(usize) -> Given) -> Vec<GivenNumber> {
         let mut aims = Vec::new();
         for (bar, start) in scene.start.iter().enumerate() {
             if given(bar).omega {
-                aims.push(Aim { bar, goal: Goal::Coordinate(bar), given: start.omega });
+                aims.push(GivenNumber { bar, goal: Goal::Coordinate(bar), given: start.omega });
             }
             if let Some(velocity) = given(bar).velocity {
                 aims.extend(of_origin(self.mechanism, bar, velocity));

@@ -8,7 +8,7 @@
 //! The shortest way in the metric of the mass matrix, not in angles: energy and momentum of the vibration are
 //! those of the motion taken out, and the motion left has all the rest of both.
 
-use super::newton::Problem;
+use super::newton::AssemblyProblem;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -54,7 +54,7 @@ impl Mechanism {
         kernel.multiplier_accelerations();
         motion.omega.iter_mut().zip(&kernel.load).for_each(|(rate, &change)| *rate -= change);
         let of = |bar: usize| given(scene, bar);
-        let problem = Problem::new(self, scene, &[], &of);
+        let problem = AssemblyProblem::new(self, scene, &[], &of);
         let tau = DoubleDouble::TAU;
         let unwound = |(q, &turns): (&DoubleDouble, &i64)| *q + tau.scale(turns as f64);
         let full: Vec<DoubleDouble> = motion.phi.iter().zip(&motion.turns).map(unwound).collect();

@@ -6,7 +6,7 @@
 
 /// A matrix row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Matrix {
+pub struct RowMatrix {
     pub rows: usize,
     pub columns: usize,
     /// rows × columns.
@@ -23,7 +23,7 @@ pub struct Svd {
 /// Sweeps over all pairs; eight are enough in practice.
 const SWEEPS: usize = 40;
 
-impl Matrix {
+impl RowMatrix {
     /// All zero.
     pub fn zero(rows: usize, columns: usize) -> Self {
         Self { rows, columns, entries: vec![0.0; rows * columns] }
@@ -116,13 +116,13 @@ pub enum Solver<'a> {
     /// By singular values, those below a share of the largest counting as zero; and the number of columns.
     Small(Svd, usize, f64),
     /// By the factors of A Aᵀ or Aᵀ A with a little on the diagonal: steps that are repeated.
-    Large(&'a Matrix, Matrix),
+    Large(&'a RowMatrix, RowMatrix),
 }
 
 /// The longest shorter side that is taken apart.
 const SMALL: usize = 100;
 
-impl Matrix {
+impl RowMatrix {
     /// Prepares solutions.
     pub fn solver(&self, share: f64) -> Solver<'_> {
         if self.rows.min(self.columns) <= SMALL {
@@ -135,7 +135,7 @@ impl Matrix {
     fn squared(&self) -> Solver<'_> {
         let few = self.rows.min(self.columns);
         let is_wide = self.rows <= self.columns;
-        let mut square = Matrix::zero(few, few);
+        let mut square = RowMatrix::zero(few, few);
         if is_wide {
             for i in 0..few {
                 for j in 0..=i {
@@ -233,7 +233,7 @@ impl Svd {
 
 /// Which of the rows, from the first on, are no combination of those before; what is left of a row counts as
 /// zero below `least`.
-pub fn independent(matrix: &Matrix, least: f64) -> Vec<bool> {
+pub fn independent(matrix: &RowMatrix, least: f64) -> Vec<bool> {
     let mut basis: Vec<Vec<f64>> = Vec::new();
     (0..matrix.rows)
         .map(|row| {
@@ -285,9 +285,9 @@ mod tests {
     use super::*;
 
     /// Entries without a pattern.
-    fn matrix(rows: usize, columns: usize) -> Matrix {
+    fn matrix(rows: usize, columns: usize) -> RowMatrix {
         let entries = (0..rows * columns).map(|k| libm::sin(1.0 + (k * k) as f64)).collect();
-        Matrix { rows, columns, entries }
+        RowMatrix { rows, columns, entries }
     }
 
     #[test]

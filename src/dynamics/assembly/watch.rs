@@ -1,6 +1,6 @@
 //! What there is to watch of the rows while a mechanism moves: how near to a singular position it is.
 
-use super::svd::Matrix;
+use super::svd::RowMatrix;
 use crate::dynamics::Mechanism;
 use crate::dynamics::kernel::Kernel;
 
@@ -25,13 +25,13 @@ impl Mechanism {
     }
 
     /// The rows' Jacobian in rad and sizes of the mechanism.
-    fn measured(&self, kernel: &Kernel<f64>) -> Option<Matrix> {
+    fn measured(&self, kernel: &Kernel<f64>) -> Option<RowMatrix> {
         let (r, n) = (self.constraints.len(), self.coordinates());
         if r == 0 || r > MOST || kernel.jacobian.len() != r * n {
             return None;
         }
         let (size, angles) = (self.size_of_parts(), self.bodies.len());
-        let mut measured = Matrix::zero(r, n);
+        let mut measured = RowMatrix::zero(r, n);
         for (i, row) in self.constraints.iter().enumerate() {
             let unit = if row.is_angle() { 1.0 } else { 1.0 / size };
             for (k, (entry, g)) in measured.row_mut(i).iter_mut().zip(&kernel.jacobian[i * n..]).enumerate() {

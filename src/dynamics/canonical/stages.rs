@@ -3,7 +3,7 @@
 //! The formulas are those of a single point, evaluated on [`Eight`] and, where what doubles drop is wanted
 //! too, on [`Pairs`].  What depends on time alone is formed once for each set of times, in double-double.
 
-use super::Scratch;
+use super::CanonicalScratch;
 use crate::arithmetic::eight::{Eight, LANES, Lanewise, Octet};
 use crate::arithmetic::lanes::{self, Code, Hardware, Lanes, Portable, Vector};
 use crate::arithmetic::pairs::Pairs;
@@ -13,37 +13,37 @@ use crate::dynamics::{Mechanism, Points, Time};
 
 /// Scratch space of an evaluation in lanes, for one kind of vector.
 #[derive(Clone, Debug)]
-pub struct Stages {
+pub struct LaneStages {
     /// The times the drives below are for; not a number before the first.
     time: [Time; LANES],
-    room: Room,
+    room: StagesByVector,
 }
 
 /// The code and what it runs on.
 #[derive(Clone, Debug)]
-enum Room {
-    Portable(Box<Both<Portable>>),
-    Hardware(Hardware, Box<Both<Vector>>),
+enum StagesByVector {
+    Portable(Box<BothScalars<Portable>>),
+    Hardware(Hardware, Box<BothScalars<Vector>>),
 }
 
 #[derive(Clone, Debug)]
-struct Both<L> {
-    plain: Bench<Eight<L>>,
-    exact: Bench<Pairs<L>>,
+struct BothScalars<L> {
+    plain: StageScratch<Eight<L>>,
+    exact: StageScratch<Pairs<L>>,
 }
 
 /// Scratch space for one scalar.
 #[derive(Clone, Debug)]
-struct Bench<T> {
-    scratch: Scratch<T>,
+struct StageScratch<T> {
+    scratch: CanonicalScratch<T>,
     y: Vec<T>,
     rate: Vec<T>,
 }
 
-impl<T: Lanewise> Bench<T> {
+impl<T: Lanewise> StageScratch<T> {
     fn new(mechanism: &Mechanism) -> Self {
         let zeros = vec![T::ZERO; 2 * mechanism.partition.count() + 1];
-        Self { scratch: Scratch::new(mechanism), y: zeros.clone(), rate: zeros }
+        Self { scratch: CanonicalScratch::new(mechanism), y: zeros.clone(), rate: zeros }
     }
 
     /// The rates at all points.
@@ -87,9 +87,9 @@ impl<T: Lanewise> Bench<T> {
     }
 }
 
-impl<L: Lanes> Both<L> {
+impl<L: Lanes> BothScalars<L> {
     fn new(mechanism: &Mechanism) -> Self {
-        Self { plain: Bench::new(mechanism), exact: Bench::new(mechanism) }
+        Self { plain: StageScratch::new(mechanism), exact: StageScratch::new(mechanism) }
     }
 
     #[inline(always)]
@@ -121,13 +121,15 @@ impl<L: Lanes> Both<L> {
     }
 }
 
-struct Rates<'a, V, const N: usize, const WORK: bool, const EXACT: bool>(
-    &'a mut Both<V>,
+struct CanonicalRates<'a, V, const N: usize, const WORK: bool, const EXACT: bool>(
+    &'a mut BothScalars<V>,
     &'a Mechanism,
     &'a mut Points,
 );
 
-impl<V: Lanes, const N: usize, const WORK: bool, const EXACT: bool> Code for Rates<'_, V, N, WORK, EXACT> {
+impl<V: Lanes, const N: usize, const WORK: bool, const EXACT: bool> Code
+    for CanonicalRates<'_, V, N, WORK, EXACT>
+{
     type Output = ();
 
     #[inline(always)]
@@ -139,20 +141,20 @@ impl<V: Lanes, const N: usize, const WORK: bool, const EXACT: bool> Code for Rat
 /// The same code compiled for the processor.
 fn in_hardware<const N: usize, const WORK: bool, const EXACT: bool>(
     hardware: Hardware,
-    both: &mut Both<Vector>,
+    both: &mut BothScalars<Vector>,
     mechanism: &Mechanism,
     points: &mut Points,
 ) {
-    hardware.run(Rates::<_, N, WORK, EXACT>(both, mechanism, points));
+    hardware.run(CanonicalRates::<_, N, WORK, EXACT>(both, mechanism, points));
 }
 
-impl Stages {
+impl LaneStages {
     /// Room for a mechanism, in the processor's vectors where it has them and `portable` does not forbid it.
     pub fn new(mechanism: &Mechanism, portable: bool) -> Self {
         let time = [Time::of(f64::NAN); LANES];
         let room = match lanes::hardware().filter(|_| !portable) {
-            Some(hardware) => Room::Hardware(hardware, Box::new(Both::new(mechanism))),
-            None => Room::Portable(Box::new(Both::new(mechanism))),
+            Some(hardware) => StagesByVector::Hardware(hardware, Box::new(BothScalars::new(mechanism))),
+            None => StagesByVector::Portable(Box::new(BothScalars::new(mechanism))),
         };
         Self { time, room }
     }
@@ -165,19 +167,25 @@ impl Stages {
         if work_integral && self.time != points.time {
             self.time = points.time;
             match &mut self.room {
-                Room::Portable(both) => both.drive(mechanism, &self.time),
-                Room::Hardware(_, both) => both.drive(mechanism, &self.time),
+                StagesByVector::Portable(both) => both.drive(mechanism, &self.time),
+                StagesByVector::Hardware(_, both) => both.drive(mechanism, &self.time),
             }
         }
         // The sizes worth unrolling; any other count of the same operations has the same bits.
         match &mut self.room {
-            Room::Portable(both) => match (work_integral, exact) {
-                (false, false) => Portable::apart(Rates::<_, 0, false, false>(both, mechanism, points)),
-                (false, true) => Portable::apart(Rates::<_, 0, false, true>(both, mechanism, points)),
-                (true, false) => Portable::apart(Rates::<_, 0, true, false>(both, mechanism, points)),
-                (true, true) => Portable::apart(Rates::<_, 0, true, true>(both, mechanism, points)),
+            StagesByVector::Portable(both) => match (work_integral, exact) {
+                (false, false) => {
+                    Portable::apart(CanonicalRates::<_, 0, false, false>(both, mechanism, points))
+                }
+                (false, true) => {
+                    Portable::apart(CanonicalRates::<_, 0, false, true>(both, mechanism, points))
+                }
+                (true, false) => {
+                    Portable::apart(CanonicalRates::<_, 0, true, false>(both, mechanism, points))
+                }
+                (true, true) => Portable::apart(CanonicalRates::<_, 0, true, true>(both, mechanism, points)),
             },
-            Room::Hardware(hardware, both) => {
+            StagesByVector::Hardware(hardware, both) => {
                 let code = match (mechanism.size(), work_integral, exact) {
                     (1, false, false) => in_hardware::<1, false, false>,
                     (2, false, false) => in_hardware::<2, false, false>,

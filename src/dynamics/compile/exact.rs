@@ -6,13 +6,13 @@ mod rows;
 use super::parts;
 use super::{Body, CompileError, Mechanism, dense_constants};
 use crate::arithmetic::Complex;
-use crate::dynamics::constraint::{ConstraintEquation, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation};
 #[cfg(feature = "digits")]
 use crate::dynamics::force::formula::FormulaEvent;
-use crate::dynamics::force::formula::{Driven, Formulas};
-use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
+use crate::dynamics::force::formula::{DrivenPart, Formulas};
+use crate::dynamics::force::{AppliedAction, CompiledSpring, Torsion, UserForce};
 use crate::dynamics::forest::Forest;
-use crate::dynamics::friction::{Friction, Mode, frictions};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, frictions};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::series::{FrictionTerms, Terms};
@@ -34,11 +34,11 @@ pub struct ExactMechanism<C> {
     /// The driven angles.
     pub partition: CoordinatePartition<C>,
     /// Springs and dampers that act.
-    pub springs: Vec<Spring<C>>,
+    pub springs: Vec<CompiledSpring<C>>,
     /// Torsion springs and dampers that act.
     pub torsions: Vec<Torsion<C>>,
     /// Applied forces and torques that act.
-    pub actions: Vec<Action<C>>,
+    pub actions: Vec<AppliedAction<C>>,
     /// Forces by formulas that act.
     pub forces: Vec<UserForce<C>>,
     /// Events.
@@ -54,7 +54,7 @@ pub struct ExactMechanism<C> {
     /// Constraint equations.
     pub constraints: Vec<ConstraintEquation<C>>,
     /// Places with dry friction, in the order of the mechanism's.
-    pub frictions: Vec<Friction<C>>,
+    pub frictions: Vec<CompiledFriction<C>>,
     /// Gravity \[m/s²\].
     gravity: Complex<C>,
     /// The gap of each wall, and its restitution.
@@ -66,9 +66,9 @@ pub struct ExactMechanism<C> {
 /// All springs, torsion springs, applied forces and torques, and constraint equations, whatever acts.
 #[derive(Debug)]
 struct AllParts<C> {
-    springs: Vec<Spring<C>>,
+    springs: Vec<CompiledSpring<C>>,
     torsions: Vec<Torsion<C>>,
-    actions: Vec<Action<C>>,
+    actions: Vec<AppliedAction<C>>,
     constraints: Vec<ConstraintEquation<C>>,
 }
 
@@ -87,7 +87,7 @@ pub struct Acting<C> {
     /// sticks.
     pub held: Vec<usize>,
     /// What places with dry friction do.
-    pub sliding: Vec<Mode<C>>,
+    pub sliding: Vec<FrictionMode<C>>,
 }
 
 /// An event.
@@ -156,7 +156,7 @@ impl<C: Decimal> ExactMechanism<C> {
             off: structure.resting().to_vec(),
             shifts: vec![C::ZERO; constraints.len()],
             held: Vec::new(),
-            sliding: vec![Mode::Open; frictions.len()],
+            sliding: vec![FrictionMode::Open; frictions.len()],
         };
         let event = |event: &SceneEvent| ExactEvent {
             name: event.name.clone(),
@@ -216,7 +216,7 @@ impl<C: Decimal> ExactMechanism<C> {
             let whole = if whole.held.is_empty() { whole.clone() } else { whole.holding(&[]) };
             next.structure = Arc::new(whole.acting(&acting.off)?);
         }
-        let sliding: Vec<Mode> = acting.sliding.iter().map(Mode::in_doubles).collect();
+        let sliding: Vec<FrictionMode> = acting.sliding.iter().map(FrictionMode::in_doubles).collect();
         if acting.held != next.structure.held || sliding != next.structure.modes {
             next.structure = Arc::new(next.structure.moving(&acting.held, &sliding));
         }
@@ -237,7 +237,7 @@ impl<C: Decimal> ExactMechanism<C> {
             next.functions = laws.record_events(parameters, modes)?;
             next.functions.truncate(next.events.len());
             next.conditions = laws.record_conditions(parameters, modes)?;
-            for (Driven { name, is_wall }, profile) in laws.profiles(parameters, modes) {
+            for (DrivenPart { name, is_wall }, profile) in laws.profiles(parameters, modes) {
                 let mut walls = next.walls.iter_mut().map(|(row, _)| row);
                 let row = match is_wall {
                     true => walls.find(|row| row.name == *name),
@@ -259,7 +259,7 @@ impl<C: Decimal> ExactMechanism<C> {
         }
         next.constraints.extend(acting.held.iter().map(|&wall| next.walls[wall].0.clone()));
         let stuck = next.frictions.iter().zip(&acting.sliding).filter_map(|(friction, mode)| match *mode {
-            Mode::Stick(at) => Some(friction.stuck(at)),
+            FrictionMode::Stick(at) => Some(friction.stuck(at)),
             _ => None,
         });
         next.constraints.extend(stuck);
@@ -310,7 +310,7 @@ impl<C: Decimal> ExactMechanism<C> {
         let gravity = self.tree.gravity_energy(z) + self.ground_energy;
         let springs = self.springs.iter().fold(gravity, |sum, spring| sum + spring.energy(z));
         let elastic = self.torsions.iter().fold(springs, |sum, torsion| sum + torsion.energy(phi));
-        let at = Posture { phi, z, omega: &[] };
+        let at = ConstraintArguments { phi, z, omega: &[] };
         let potential = self.forces.iter().fold(elastic, |sum, force| sum + force.energy(C::ZERO, at));
         [dot(omega, &momentum).scale(0.5), potential]
     }

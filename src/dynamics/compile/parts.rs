@@ -2,10 +2,10 @@
 
 use super::{Body, Joint};
 use crate::arithmetic::{Complex, Real};
-use crate::dynamics::constraint::{self, ConstraintEquation, Measure};
-use crate::dynamics::force::action::Kind;
-use crate::dynamics::force::formula::{Driven, PlacedAim};
-use crate::dynamics::force::{Action, Spring, Torsion};
+use crate::dynamics::constraint::{self, ConstraintEquation, RowMeasure};
+use crate::dynamics::force::action::Applied;
+use crate::dynamics::force::formula::{DrivenPart, PlacedAim};
+use crate::dynamics::force::{AppliedAction, CompiledSpring, Torsion};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::impact::Contact;
 use crate::dynamics::law::Law;
@@ -124,7 +124,7 @@ pub(super) fn follows<C: Real>(
             let nothing = Quadratic { angles: forest.hangs.len(), ..Quadratic::default() };
             ConstraintEquation {
                 name: name.clone(),
-                measure: Measure::Place(nothing),
+                measure: RowMeasure::Place(nothing),
                 law: None,
                 push: None,
                 aim: None,
@@ -149,7 +149,7 @@ pub(super) fn give<'a, C: Real + 'a>(
     aims: Vec<PlacedAim<'_, C>>,
 ) {
     let mut walls: Vec<_> = walls.collect();
-    for (Driven { name, is_wall }, aim) in aims {
+    for (DrivenPart { name, is_wall }, aim) in aims {
         let row = match is_wall {
             true => walls.iter_mut().map(|row| &mut **row).find(|row| row.name == *name),
             false => rows.iter_mut().find(|row| row.name == *name && !row.is_angle()),
@@ -229,9 +229,9 @@ pub(super) fn rods<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Constra
 }
 
 /// Springs that are elastic.
-pub(super) fn springs<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Spring<C>> {
+pub(super) fn springs<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<CompiledSpring<C>> {
     (scene.springs.iter().filter(|spring| !spring.rigid))
-        .map(|spring| Spring {
+        .map(|spring| CompiledSpring {
             name: spring.name.clone(),
             bodies: [spring.between[0].bar, spring.between[1].bar],
             span: forest.point(&spring.between[0]).minus(&forest.point(&spring.between[1])),
@@ -257,21 +257,21 @@ pub(super) fn torsions<C: Real>(scene: &Scene<C>) -> Vec<Torsion<C>> {
 }
 
 /// Applied forces and torques.
-pub(super) fn actions<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Action<C>> {
-    let forces = scene.forces.iter().map(|force| Action {
+pub(super) fn actions<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<AppliedAction<C>> {
+    let forces = scene.forces.iter().map(|force| AppliedAction {
         name: force.name.clone(),
         body: force.bar,
-        kind: Kind::Force {
+        kind: Applied::Force {
             point: forest.point(&Place { bar: Some(force.bar), point: force.point }),
             force: Complex::new(force.force[0], force.force[1]),
             follows: force.follows,
         },
         law: force.law.clone(),
     });
-    let torques = scene.torques.iter().map(|torque| Action {
+    let torques = scene.torques.iter().map(|torque| AppliedAction {
         name: torque.name.clone(),
         body: torque.bar,
-        kind: Kind::Torque { torque: torque.torque, base: torque.relative_to },
+        kind: Applied::Torque { torque: torque.torque, base: torque.relative_to },
         law: torque.law.clone(),
     });
     forces.chain(torques).collect()

@@ -2,7 +2,7 @@
 
 use super::Mechanism;
 use crate::dynamics::Time;
-use crate::dynamics::constraint::{Measure, Site};
+use crate::dynamics::constraint::{RowMeasure, Site};
 use crate::dynamics::force::UserForce;
 use crate::dynamics::force::formula::Formulas;
 use crate::scene::Meaning;
@@ -73,8 +73,8 @@ impl WholeTurns {
     }
 
     /// True where the angle a row measures may change by a whole turn.
-    pub fn is_of_row(&self, measure: &Measure) -> bool {
-        let Measure::Angle { body, base } = *measure else { return false };
+    pub fn is_of_row(&self, measure: &RowMeasure) -> bool {
+        let RowMeasure::Angle { body, base } = *measure else { return false };
         self.with[body] != base.and_then(|base| self.with[base])
     }
 }
@@ -84,7 +84,7 @@ impl Mechanism {
     /// \[rad\].
     fn angles_given(&self) -> impl Iterator<Item = (usize, Option<usize>, f64)> {
         self.constraints.iter().filter_map(|row| match (&row.measure, &row.law, &row.aim) {
-            (&Measure::Angle { body, base }, Some(law), None) => {
+            (&RowMeasure::Angle { body, base }, Some(law), None) => {
                 Some((body, base, law.angle(Time::default()).hi))
             }
             _ => None,
@@ -153,7 +153,7 @@ mod tests {
         assert_eq!(apart, [9.0, 1.0, -9.0 - TAU, 0.0, 8.0]);
         let upside_down = turns.principal(&[9.0, 0.5, 9.0, -PI]);
         assert_eq!(upside_down, [9.0, 0.5, 9.0, PI]);
-        let measures = |body, base| turns.is_of_row(&Measure::Angle { body, base });
+        let measures = |body, base| turns.is_of_row(&RowMeasure::Angle { body, base });
         assert!(!measures(0, None) && !measures(2, Some(1)));
         assert!(measures(1, None) && measures(3, Some(2)) && measures(2, Some(0)));
     }

@@ -10,17 +10,17 @@
 //! by the reverse mode of the tape, so that the Jacobian and the quadratic terms are exact on every scalar.
 //! As long as f does not depend on time the row does no work.
 
-use super::{Linearised, Posture, Site};
+use super::{ConstraintArguments, Linearised, Site};
 use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::Time;
-use crate::dynamics::configuration::{Configuration, Source};
+use crate::dynamics::configuration::{Configuration, ConfigurationSource};
 use crate::dynamics::force::UserForce;
 use std::cell::RefCell;
 
 /// What a formula of time and place asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::dynamics) enum Input {
+pub(in crate::dynamics) enum AimInput {
     /// A number that is no double.
     Number(usize),
     Time,
@@ -37,7 +37,7 @@ pub(in crate::dynamics) enum Input {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Aim<C = f64> {
     pub(in crate::dynamics) tape: Tape,
-    pub(in crate::dynamics) inputs: Vec<Input>,
+    pub(in crate::dynamics) inputs: Vec<AimInput>,
     /// Numbers that are no doubles.
     pub(in crate::dynamics) numbers: Vec<C>,
     /// f, f_t and f'' at zero acceleration.
@@ -62,7 +62,7 @@ impl<C: Real> Aim<C> {
         angles: &[usize],
         formula: impl Fn(&Configuration<Symbol, C>) -> Symbol,
     ) -> Option<Self> {
-        let recorder = Recorder::<C>::default();
+        let recorder = AimRecorder::<C>::default();
         let (mut coordinates, mut has_rates, mut is_timed) = (Vec::new(), false, false);
         let [(tape, slots)] = Symbol::record(|| {
             let signs = [1.0, -1.0];
@@ -94,15 +94,15 @@ impl<C: Real> Aim<C> {
     }
 
     /// What it comes to at a time [s] and a posture: all results of its tape.
-    pub fn at<T: Over<C>, R>(&self, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
+    pub fn at<T: Over<C>, R>(&self, time: T, at: ConstraintArguments<T>, then: impl FnOnce(&[T]) -> R) -> R {
         let input = |number: u32| match self.inputs[number as usize] {
-            Input::Number(number) => T::constant(self.numbers[number]),
-            Input::Time => time,
-            Input::Angle(k) | Input::Origin(k) => at.phi[k],
-            Input::Cosine(k) => at.z[k].re,
-            Input::Sine(k) => at.z[k].im,
+            AimInput::Number(number) => T::constant(self.numbers[number]),
+            AimInput::Time => time,
+            AimInput::Angle(k) | AimInput::Origin(k) => at.phi[k],
+            AimInput::Cosine(k) => at.z[k].re,
+            AimInput::Sine(k) => at.z[k].im,
             // Values and slopes are asked for without rates.
-            Input::Rate(k) => at.omega.get(k).copied().unwrap_or(T::ZERO),
+            AimInput::Rate(k) => at.omega.get(k).copied().unwrap_or(T::ZERO),
         };
         self.tape.results(input, then)
     }
@@ -113,7 +113,7 @@ impl Aim {
     pub(in crate::dynamics) fn map<D>(&self, mut of: impl FnMut(f64) -> D) -> Aim<D> {
         let (mut inputs, mut numbers) = (self.inputs.clone(), Vec::new());
         let (tape, new) = self.tape.lifted(|value| {
-            inputs.push(Input::Number(numbers.len()));
+            inputs.push(AimInput::Number(numbers.len()));
             numbers.push(of(value));
             inputs.len() as u32 - 1
         });
@@ -133,30 +133,36 @@ impl Aim {
         }
     }
 
-    fn results<T: Real, R>(&self, t: Time, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
+    fn results<T: Real, R>(&self, t: Time, at: ConstraintArguments<T>, then: impl FnOnce(&[T]) -> R) -> R {
         self.at(T::split(t).0, at, then)
     }
 
     /// f, at angles and translational coordinates `phi` and elements `z`.
     pub fn value(&self, t: Time, phi: &[f64], z: &[Complex<f64>]) -> f64 {
-        self.results(t, Posture { phi, z, omega: &[] }, |slots| slots[self.value as usize])
+        self.results(t, ConstraintArguments { phi, z, omega: &[] }, |slots| slots[self.value as usize])
     }
 
     /// f' along the motion.
     pub fn rate(&self, t: Time, phi: &[f64], z: &[Complex<f64>], omega: &[f64]) -> f64 {
-        self.results(t, Posture { phi, z, omega }, |slots| {
+        self.results(t, ConstraintArguments { phi, z, omega }, |slots| {
             let drive = slots[self.drive as usize];
             self.slopes.iter().fold(drive, |sum, &(k, slope)| sum + slots[slope as usize] * omega[k])
         })
     }
 
     /// Its explicit rate f_t.
-    pub fn drive(&self, t: Time, at: Posture<f64>) -> f64 {
+    pub fn drive(&self, t: Time, at: ConstraintArguments<f64>) -> f64 {
         self.results(t, at, |slots| slots[self.drive as usize])
     }
 
     /// Takes it off a row.
-    pub fn subtract<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T], here: &mut Linearised<T>) {
+    pub fn subtract<T: Real>(
+        &self,
+        t: Time,
+        at: ConstraintArguments<T>,
+        jacobian: &mut [T],
+        here: &mut Linearised<T>,
+    ) {
         self.results(t, at, |slots| {
             here.position -= slots[self.value as usize];
             here.drive -= slots[self.drive as usize];
@@ -171,7 +177,7 @@ impl Aim {
 impl<C> Aim<C> {
     /// The bodies whose whole turns matter to it.
     pub(crate) fn counted_angles(&self) -> impl Iterator<Item = usize> {
-        self.inputs.iter().filter_map(|input| if let Input::Angle(k) = *input { Some(k) } else { None })
+        self.inputs.iter().filter_map(|input| if let AimInput::Angle(k) = *input { Some(k) } else { None })
     }
 
     /// The coordinates it depends on.
@@ -182,8 +188,8 @@ impl<C> Aim<C> {
 
 /// Hands out inputs while a formula is recorded.
 #[derive(Default)]
-struct Recorder<C> {
-    inputs: RefCell<Vec<Input>>,
+struct AimRecorder<C> {
+    inputs: RefCell<Vec<AimInput>>,
     numbers: RefCell<Vec<C>>,
 }
 
@@ -195,8 +201,8 @@ struct Derivatives {
     rates: Vec<Symbol>,
 }
 
-impl<C: Real> Recorder<C> {
-    fn input(&self, input: Input) -> Symbol {
+impl<C: Real> AimRecorder<C> {
+    fn input(&self, input: AimInput) -> Symbol {
         Symbol::input(number_of(&self.inputs, &input) as u32)
     }
 
@@ -206,18 +212,18 @@ impl<C: Real> Recorder<C> {
         for (number, weight) in of.gradient() {
             let input = self.inputs.borrow()[number as usize];
             let (k, slope) = match input {
-                Input::Number(_) => continue,
-                Input::Time => {
+                AimInput::Number(_) => continue,
+                AimInput::Time => {
                     found.time += weight;
                     continue;
                 }
-                Input::Rate(_) => {
+                AimInput::Rate(_) => {
                     found.rates.push(weight);
                     continue;
                 }
-                Input::Angle(k) | Input::Origin(k) => (k, weight),
-                Input::Cosine(k) => (k, -(weight * self.input(Input::Sine(k)))),
-                Input::Sine(k) => (k, weight * self.input(Input::Cosine(k))),
+                AimInput::Angle(k) | AimInput::Origin(k) => (k, weight),
+                AimInput::Cosine(k) => (k, -(weight * self.input(AimInput::Sine(k)))),
+                AimInput::Sine(k) => (k, weight * self.input(AimInput::Cosine(k))),
             };
             match found.slopes.iter_mut().find(|known| known.0 == k) {
                 Some(known) => known.1 += slope,
@@ -241,25 +247,25 @@ impl<C: Real> Recorder<C> {
 
     /// The derivative along the motion, at zero acceleration.
     fn along(&self, of: &Derivatives) -> Symbol {
-        of.slopes.iter().fold(of.time, |sum, &(k, slope)| sum + slope * self.input(Input::Rate(k)))
+        of.slopes.iter().fold(of.time, |sum, &(k, slope)| sum + slope * self.input(AimInput::Rate(k)))
     }
 }
 
-impl<C: Real> Source<Symbol, C> for Recorder<C> {
+impl<C: Real> ConfigurationSource<Symbol, C> for AimRecorder<C> {
     fn time(&self) -> Symbol {
-        self.input(Input::Time)
+        self.input(AimInput::Time)
     }
 
     fn angle(&self, body: usize) -> Symbol {
-        self.input(Input::Angle(body))
+        self.input(AimInput::Angle(body))
     }
 
     fn rate(&self, body: usize) -> Symbol {
-        self.input(Input::Rate(body))
+        self.input(AimInput::Rate(body))
     }
 
     fn direction(&self, body: usize) -> Complex<Symbol> {
-        Complex::new(self.input(Input::Cosine(body)), self.input(Input::Sine(body)))
+        Complex::new(self.input(AimInput::Cosine(body)), self.input(AimInput::Sine(body)))
     }
 
     fn position(&self, site: &Site<C>) -> Complex<Symbol> {
@@ -269,7 +275,7 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
             .iter()
             .fold(self.vector(site.point.root), |sum, &(k, gamma)| sum + self.turned(k, gamma));
         site.point.shifts.iter().fold(turned, |sum, &(x, share)| {
-            let origin = Complex::new(self.input(Input::Origin(x)), self.input(Input::Origin(x + 1)));
+            let origin = Complex::new(self.input(AimInput::Origin(x)), self.input(AimInput::Origin(x + 1)));
             sum + origin.times(Symbol::of(share))
         })
     }
@@ -284,7 +290,7 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
     /// What is no double is an input: the tape folds constants in doubles.
     fn constant(&self, value: C) -> Symbol {
         if C::HAS_CONSTANTS {
-            self.input(Input::Number(number_of(&self.numbers, &value)))
+            self.input(AimInput::Number(number_of(&self.numbers, &value)))
         } else {
             Symbol::of(value.value())
         }
@@ -295,7 +301,7 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
 mod tests {
     use super::*;
     use crate::dynamics::constraint::tests::{assert_derivatives, free, posture, rod};
-    use crate::dynamics::constraint::{ConstraintEquation, Measure};
+    use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
     use crate::dynamics::quadratic::Quadratic;
     use std::sync::Arc;
 
@@ -310,7 +316,7 @@ mod tests {
         });
         let row = ConstraintEquation {
             name: "cam".into(),
-            measure: Measure::Place(Quadratic { angles: 2, ..Quadratic::default() }),
+            measure: RowMeasure::Place(Quadratic { angles: 2, ..Quadratic::default() }),
             law: None,
             push: None,
             aim: Some(Arc::new(aim.expect("a formula of place"))),
@@ -318,7 +324,11 @@ mod tests {
         assert_derivatives(&row);
         let (phi, z, omega) = posture(0.0);
         let mut jacobian = vec![Default::default(); 4];
-        row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+        row.linearise(
+            Default::default(),
+            ConstraintArguments { phi: &phi, z: &z, omega: &omega },
+            &mut jacobian,
+        );
         assert!(
             jacobian.iter().all(|entry: &crate::arithmetic::DoubleDouble| entry.hi != 0.0),
             "{jacobian:?}"

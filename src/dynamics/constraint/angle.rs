@@ -7,14 +7,14 @@
 //! C is taken modulo whole turns.  The multiplier is minus the torque on body a; the motor's power is torque
 //! · theta'.
 
-use super::{ConstraintEquation, Measure};
+use super::{ConstraintEquation, RowMeasure};
 use crate::dynamics::law::Law;
 
 /// Keeps the angle of `body`, measured from `base` or from +x, at a law of time.
 pub fn angle_equation<C>(name: &str, body: usize, base: Option<usize>, law: Law<C>) -> ConstraintEquation<C> {
     ConstraintEquation {
         name: name.into(),
-        measure: Measure::Angle { body, base },
+        measure: RowMeasure::Angle { body, base },
         law: Some(law),
         push: None,
         aim: None,

@@ -7,7 +7,7 @@
 //!
 //! C is positive on the side the normal points to.  The force on the point is -lambda n.
 
-use super::{ConstraintEquation, Measure, Push, Site, Way};
+use super::{ConstraintEquation, ConstraintForce, ForceDirection, RowMeasure, Site};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
@@ -26,9 +26,9 @@ pub fn line_equation<C: Real>(
     place.constant -= offset;
     ConstraintEquation {
         name: name.into(),
-        measure: Measure::Place(place),
+        measure: RowMeasure::Place(place),
         law,
-        push: Some(Push { on: site.body, from: None, way: Way::Ground(normal) }),
+        push: Some(ConstraintForce { on: site.body, from: None, way: ForceDirection::Ground(normal) }),
         aim: None,
     }
 }

@@ -31,7 +31,7 @@ use std::sync::Arc;
 
 /// Coordinates, elements and rates at one moment.
 #[derive(Clone, Copy, Debug)]
-pub struct Posture<'a, T> {
+pub struct ConstraintArguments<'a, T> {
     /// Angles in [-π, π] \[rad\], then the coordinates of translational coordinates \[m\].
     pub phi: &'a [T],
     /// Unit vectors, then translational coordinates.
@@ -69,7 +69,7 @@ impl Site {
 
 /// What a row measures.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Measure<C = f64> {
+pub enum RowMeasure<C = f64> {
     /// The angle of a body, from +x where it has no base \[rad\].
     Angle {
         /// The body.
@@ -81,7 +81,7 @@ pub enum Measure<C = f64> {
     Place(Quadratic<C>),
 }
 
-impl<C: Real> Measure<C> {
+impl<C: Real> RowMeasure<C> {
     /// Its value \[rad, m\] at coordinates and elements.
     pub fn value<T: Over<C>>(&self, phi: &[T], z: &[Complex<T>]) -> T {
         match self {
@@ -104,18 +104,18 @@ impl<C: Real> Measure<C> {
 
 /// The force a row exerts: -lambda direction on one body, the opposite on another.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Push<C = f64> {
+pub struct ConstraintForce<C = f64> {
     /// The body that takes -lambda direction.
     pub on: Option<usize>,
     /// The body that takes the opposite.
     pub from: Option<usize>,
     /// Where to.
-    pub way: Way<C>,
+    pub way: ForceDirection<C>,
 }
 
 /// The direction of a force, a unit vector.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Way<C = f64> {
+pub enum ForceDirection<C = f64> {
     /// Fixed in the ground.
     Ground(Complex<C>),
     /// Fixed in the frame of a body.
@@ -124,13 +124,13 @@ pub enum Way<C = f64> {
     Span(Point<C>, C),
 }
 
-impl<C: Real> Push<C> {
+impl<C: Real> ConstraintForce<C> {
     /// Its direction at the elements `z`.
     pub fn direction<T: Over<C>>(&self, z: &[Complex<T>]) -> Complex<T> {
         match &self.way {
-            Way::Ground(direction) => Complex::of(*direction),
-            Way::Body(body, direction) => z[*body].turn(*direction),
-            Way::Span(span, length) => span.position(z).times(T::constant(C::ONE / *length)),
+            ForceDirection::Ground(direction) => Complex::of(*direction),
+            ForceDirection::Body(body, direction) => z[*body].turn(*direction),
+            ForceDirection::Span(span, length) => span.position(z).times(T::constant(C::ONE / *length)),
         }
     }
 }
@@ -141,11 +141,11 @@ pub struct ConstraintEquation<C = f64> {
     /// Name in reports: that of the joint or motor, with an axis where there are two.
     pub name: String,
     /// What it measures.
-    pub measure: Measure<C>,
+    pub measure: RowMeasure<C>,
     /// What it is to be; `None`: zero.
     pub law: Option<Law<C>>,
     /// The force it exerts, where it is one.
-    pub push: Option<Push<C>>,
+    pub push: Option<ConstraintForce<C>>,
     /// The formula of time and place that is taken off.
     pub aim: Option<Arc<Aim<C>>>,
 }
@@ -168,7 +168,7 @@ impl<C: Real> ConstraintEquation<C> {
 
     /// True for rows that give an angle.
     pub fn is_angle(&self) -> bool {
-        matches!(self.measure, Measure::Angle { .. })
+        matches!(self.measure, RowMeasure::Angle { .. })
     }
 
     /// True where C is an angle: also of a gear or a cam, which gives it by others.
@@ -179,8 +179,8 @@ impl<C: Real> ConstraintEquation<C> {
     /// The coordinates it depends on; some may come up more than once.
     pub fn coordinates(&self) -> Vec<usize> {
         let mut found: Vec<usize> = match &self.measure {
-            Measure::Angle { body, base } => std::iter::once(*body).chain(*base).collect(),
-            Measure::Place(place) => place.coordinates(),
+            RowMeasure::Angle { body, base } => std::iter::once(*body).chain(*base).collect(),
+            RowMeasure::Place(place) => place.coordinates(),
         };
         found.extend(self.aim.iter().flat_map(|aim| aim.coordinates()));
         found
@@ -188,7 +188,7 @@ impl<C: Real> ConstraintEquation<C> {
 
     /// Lets it constrain nothing any more, of a mechanism of so many angles.
     pub(super) fn release(&mut self, angles: usize) {
-        self.measure = Measure::Place(Quadratic { angles, ..Quadratic::default() });
+        self.measure = RowMeasure::Place(Quadratic { angles, ..Quadratic::default() });
         (self.law, self.push, self.aim) = (None, None, None);
     }
 
@@ -200,8 +200,8 @@ impl<C: Real> ConstraintEquation<C> {
     /// C, for a row without a law \[m\]: the gap of a wall.
     pub fn gap<T: Over<C>>(&self, z: &[Complex<T>]) -> T {
         match &self.measure {
-            Measure::Angle { .. } => T::ZERO,
-            Measure::Place(place) => place.value(z),
+            RowMeasure::Angle { .. } => T::ZERO,
+            RowMeasure::Place(place) => place.value(z),
         }
     }
 }
@@ -225,16 +225,21 @@ impl ConstraintEquation {
 
     /// Adds the row's Jacobian to `jacobian` (n, zero on entry) and returns the rest.
     #[inline]
-    pub fn linearise<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+    pub fn linearise<T: Real>(
+        &self,
+        t: Time,
+        at: ConstraintArguments<T>,
+        jacobian: &mut [T],
+    ) -> Linearised<T> {
         match &self.measure {
-            Measure::Angle { body, base } => {
+            RowMeasure::Angle { body, base } => {
                 let given = base.map_or(at.phi[*body], |base| difference(at.phi[*body], at.phi[base]));
                 turn(*body, *base, jacobian);
                 let [theta, rate, acceleration] =
                     self.law.as_ref().map_or([T::ZERO; 3], |law| law.angles::<T>(t));
                 Linearised { position: difference(given, theta), drive: -rate, convective: -acceleration }
             }
-            Measure::Place(place) => {
+            RowMeasure::Place(place) => {
                 let mut here = place.linearise(at, jacobian);
                 if let Some(law) = &self.law {
                     here.position -= law.value(t);
@@ -250,9 +255,14 @@ impl ConstraintEquation {
 
     /// The same without C, which is written as zero: accelerations do not ask for it.
     #[inline]
-    pub fn differentiate<T: Real>(&self, t: Time, at: Posture<T>, jacobian: &mut [T]) -> Linearised<T> {
+    pub fn differentiate<T: Real>(
+        &self,
+        t: Time,
+        at: ConstraintArguments<T>,
+        jacobian: &mut [T],
+    ) -> Linearised<T> {
         match &self.measure {
-            Measure::Angle { body, base } => {
+            RowMeasure::Angle { body, base } => {
                 turn(*body, *base, jacobian);
                 let mut here = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
                 if let Some(law) = &self.law {
@@ -260,7 +270,7 @@ impl ConstraintEquation {
                 }
                 here
             }
-            Measure::Place(place) => {
+            RowMeasure::Place(place) => {
                 let mut here = place.differentiate(at, jacobian);
                 if let Some(law) = &self.law {
                     drive(law, t, &mut here);
@@ -347,13 +357,13 @@ pub(super) mod tests {
             let mut jacobian = [DoubleDouble::ZERO; 4];
             let here = row.linearise(
                 DoubleDouble::of(t),
-                Posture { phi: &phi, z: &z, omega: &omega },
+                ConstraintArguments { phi: &phi, z: &z, omega: &omega },
                 &mut jacobian,
             );
             let mut again = [DoubleDouble::ZERO; 4];
             let rest = row.differentiate(
                 DoubleDouble::of(t),
-                Posture { phi: &phi, z: &z, omega: &omega },
+                ConstraintArguments { phi: &phi, z: &z, omega: &omega },
                 &mut again,
             );
             assert_eq!((jacobian, here.drive, here.convective), (again, rest.drive, rest.convective));

@@ -7,7 +7,7 @@
 //!
 //! The force on the first point is -lambda n, on the second lambda n.
 
-use super::{ConstraintEquation, Measure, Push, Site, Way};
+use super::{ConstraintEquation, ConstraintForce, ForceDirection, RowMeasure, Site};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::quadratic::Quadratic;
 
@@ -22,9 +22,9 @@ pub fn pin_equations<C: Real>(
     [("x", Complex::new(C::ONE, C::ZERO)), ("y", Complex::new(C::ZERO, C::ONE))].map(|(letter, axis)| {
         ConstraintEquation {
             name: format!("{name}.{letter}"),
-            measure: Measure::Place(Quadratic::along(&span, axis, angles)),
+            measure: RowMeasure::Place(Quadratic::along(&span, axis, angles)),
             law: None,
-            push: Some(Push { on: a.body, from: b.body, way: Way::Ground(axis) }),
+            push: Some(ConstraintForce { on: a.body, from: b.body, way: ForceDirection::Ground(axis) }),
             aim: None,
         }
     })

@@ -8,7 +8,7 @@
 //! Near the distance kept C is what the distance is off.  The force on the first point is -lambda D/L, on the
 //! second lambda D/L.
 
-use super::{ConstraintEquation, Measure, Push, Site, Way};
+use super::{ConstraintEquation, ConstraintForce, ForceDirection, RowMeasure, Site};
 use crate::arithmetic::Real;
 use crate::dynamics::quadratic::Quadratic;
 
@@ -25,9 +25,9 @@ pub fn rod_equation<C: Real>(
     place.constant -= C::of(0.5) * length;
     ConstraintEquation {
         name: name.into(),
-        measure: Measure::Place(place),
+        measure: RowMeasure::Place(place),
         law: None,
-        push: Some(Push { on: a.body, from: b.body, way: Way::Span(span, length) }),
+        push: Some(ConstraintForce { on: a.body, from: b.body, way: ForceDirection::Span(span, length) }),
         aim: None,
     }
 }

@@ -10,7 +10,7 @@
 //! As a function of the elements it is bilinear.  The force on the point is -lambda nu, on the body lambda nu
 //! at the same place.
 
-use super::{ConstraintEquation, Measure, Push, Site, Way};
+use super::{ConstraintEquation, ConstraintForce, ForceDirection, RowMeasure, Site};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::law::Law;
 use crate::dynamics::quadratic::Quadratic;
@@ -28,14 +28,18 @@ pub fn slot_equation<C: Real>(
 ) -> ConstraintEquation<C> {
     ConstraintEquation {
         name: name.into(),
-        measure: Measure::Place(Quadratic::along_body(
+        measure: RowMeasure::Place(Quadratic::along_body(
             &site.point.minus(&origin_point.point),
             rail,
             normal,
             angles,
         )),
         law,
-        push: Some(Push { on: site.body, from: Some(rail), way: Way::Body(rail, normal) }),
+        push: Some(ConstraintForce {
+            on: site.body,
+            from: Some(rail),
+            way: ForceDirection::Body(rail, normal),
+        }),
         aim: None,
     }
 }
@@ -44,7 +48,7 @@ pub fn slot_equation<C: Real>(
 mod tests {
     use super::*;
     use crate::arithmetic::Scalar;
-    use crate::dynamics::constraint::Posture;
+    use crate::dynamics::constraint::ConstraintArguments;
     use crate::dynamics::constraint::tests::{assert_derivatives, crank, free, law, posture, rod};
 
     #[test]
@@ -60,8 +64,11 @@ mod tests {
         let row = slot_equation("slot", &point, 0, &origin_point, normal, None, 2);
         let (phi, z, omega) = posture(0.3);
         let mut jacobian = vec![Default::default(); 4];
-        let here =
-            row.linearise(Default::default(), Posture { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+        let here = row.linearise(
+            Default::default(),
+            ConstraintArguments { phi: &phi, z: &z, omega: &omega },
+            &mut jacobian,
+        );
         let (nu, span) = (z[0].turn(normal), point.point.minus(&origin_point.point));
         let turned = omega[0] * nu.left().dot(span.velocity(&z, &omega));
         let expected = nu.dot(span.convective(&z, &omega)) + turned.scale(2.0)

@@ -12,7 +12,7 @@
 //! Björck, *Numerical Methods for Least Squares Problems* (1996), sections 2.4.5 (orthogonalized twice) and
 //! 2.7.3.
 
-use crate::dynamics::constraint::{ConstraintEquation, Linearised, Measure, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation, Linearised, RowMeasure};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Mechanism, Time};
 use nalgebra::{DMatrix, DVector};
@@ -21,7 +21,7 @@ use nalgebra::{DMatrix, DVector};
 const NEW: f64 = 1e-7;
 
 /// A row and its Jacobian at one moment.
-pub struct Gradient {
+pub struct MetricRow {
     /// Drive and what is left of C'' at zero acceleration.
     pub row: Linearised<f64>,
     /// The Jacobian (n).
@@ -29,13 +29,13 @@ pub struct Gradient {
 }
 
 /// A mechanism at one moment, its constraints among themselves.
-pub struct Metric {
+pub struct ContactMetric {
     lower: DMatrix<f64>,
     scale: DVector<f64>,
     /// b \[N·m, N\].
     load: Vec<f64>,
     /// The mechanism's rows, contacts that are held included.
-    pub rows: Vec<Gradient>,
+    pub rows: Vec<MetricRow>,
     /// How many rows say something new by their geometry alone.
     rank: usize,
     /// The rows that count, in the order of the columns of `basis`.
@@ -43,7 +43,7 @@ pub struct Metric {
     basis: Basis,
 }
 
-impl Metric {
+impl ContactMetric {
     /// At these coordinates \[rad, m\] and rates; `None` where the mass matrix is not positive definite.
     pub fn at(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> Option<Self> {
         let n = mechanism.coordinates();
@@ -53,8 +53,9 @@ impl Metric {
         let scale = DVector::from_fn(n, |i, _| kernel.mass[i * n + i].sqrt().recip());
         let mass = DMatrix::from_fn(n, n, |i, j| kernel.mass[i.min(j) * n + i.max(j)] * scale[i] * scale[j]);
         let lower = mass.cholesky()?.unpack();
-        let at = Posture { phi, z: &kernel.z, omega };
-        let rows: Vec<Gradient> = mechanism.constraints.iter().map(|row| Gradient::of(row, t, at)).collect();
+        let at = ConstraintArguments { phi, z: &kernel.z, omega };
+        let rows: Vec<MetricRow> =
+            mechanism.constraints.iter().map(|row| MetricRow::of(row, t, at)).collect();
         let counting = new_rows(mechanism, &mechanism.constraints.iter().zip(&rows).collect::<Vec<_>>());
         let (load, rank) = (kernel.load, counting.len());
         let mut metric = Self { lower, scale, load, rows, rank, counting: Vec::new(), basis: Basis::new(n) };
@@ -90,8 +91,8 @@ impl Metric {
     }
 
     /// True where the constraints of the mechanism leave nothing of a row, by their geometry alone.
-    pub fn has(&self, mechanism: &Mechanism, row: &ConstraintEquation, gradient: &Gradient) -> bool {
-        let mut rows: Vec<(&ConstraintEquation, &Gradient)> =
+    pub fn has(&self, mechanism: &Mechanism, row: &ConstraintEquation, gradient: &MetricRow) -> bool {
+        let mut rows: Vec<(&ConstraintEquation, &MetricRow)> =
             mechanism.constraints.iter().zip(&self.rows).collect();
         rows.push((row, gradient));
         new_rows(mechanism, &rows).len() == self.rank
@@ -132,9 +133,9 @@ impl Metric {
     }
 }
 
-impl Gradient {
+impl MetricRow {
     /// That of a row.
-    pub fn of(row: &ConstraintEquation, t: Time, at: Posture<f64>) -> Self {
+    pub fn of(row: &ConstraintEquation, t: Time, at: ConstraintArguments<f64>) -> Self {
         let mut along = vec![0.0; at.phi.len()];
         Self { row: row.differentiate(t, at, &mut along), along }
     }
@@ -142,9 +143,9 @@ impl Gradient {
 
 /// The rows that say something new, those that say most first: angles in rad, lengths in sizes of the
 /// mechanism, each row over the most it could say.
-fn new_rows(mechanism: &Mechanism, rows: &[(&ConstraintEquation, &Gradient)]) -> Vec<usize> {
+fn new_rows(mechanism: &Mechanism, rows: &[(&ConstraintEquation, &MetricRow)]) -> Vec<usize> {
     let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
-    let scaled = |(row, gradient): &(&ConstraintEquation, &Gradient)| {
+    let scaled = |(row, gradient): &(&ConstraintEquation, &MetricRow)| {
         let along = DVector::from_fn(gradient.along.len(), |k, _| {
             gradient.along[k] * if k < angles { 1.0 } else { size }
         });
@@ -169,8 +170,8 @@ fn new_rows(mechanism: &Mechanism, rows: &[(&ConstraintEquation, &Gradient)]) ->
 
 /// The most a row changes by where one element moves by rad or the size of the mechanism, products with
 /// translational coordinates aside.
-fn reach(measure: &Measure, size: f64) -> f64 {
-    let Measure::Place(place) = measure else { return 1.0 };
+fn reach(measure: &RowMeasure, size: f64) -> f64 {
+    let RowMeasure::Place(place) = measure else { return 1.0 };
     let unit = |k: usize| if k < place.angles { 1.0 } else { size };
     let linear = place.linear.iter().map(|&(k, g)| g.norm_squared().sqrt() * unit(k));
     let bilinear = place.bilinear.iter().map(|&(_, k, h)| h.norm_squared().sqrt() * unit(k));

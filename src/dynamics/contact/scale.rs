@@ -15,9 +15,9 @@
 
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::compile::Body;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
-use crate::dynamics::force::Action;
-use crate::dynamics::force::action::Kind;
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
+use crate::dynamics::force::AppliedAction;
+use crate::dynamics::force::action::Applied;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::point::Point;
 use crate::dynamics::{Mechanism, Motion};
@@ -77,7 +77,7 @@ fn levers(point: &Point) -> f64 {
 
 /// Sum of the magnitudes a gap is summed from \[m\].
 pub fn magnitudes(row: &ConstraintEquation, z: &[Complex<f64>]) -> f64 {
-    let Measure::Place(place) = &row.measure else { return 0.0 };
+    let RowMeasure::Place(place) = &row.measure else { return 0.0 };
     let part = |&(k, g): &(usize, Complex<f64>)| (g.re * z[k].re).abs() + (g.im * z[k].im).abs();
     let linear = place.constant.abs() + place.linear.iter().map(part).sum::<f64>();
     place.bilinear.iter().fold(linear, |sum, &(j, k, h)| {
@@ -112,10 +112,10 @@ fn driven<'a>(rows: impl Iterator<Item = &'a ConstraintEquation>, mass: f64, len
 }
 
 /// The magnitudes of applied forces, and of torques over `length` \[N\].
-fn applied(actions: &[Action], length: f64) -> f64 {
-    let force = |action: &Action| match &action.kind {
-        Kind::Force { force, .. } => force.norm_squared().sqrt(),
-        Kind::Torque { torque, .. } => torque.abs() / length,
+fn applied(actions: &[AppliedAction], length: f64) -> f64 {
+    let force = |action: &AppliedAction| match &action.kind {
+        Applied::Force { force, .. } => force.norm_squared().sqrt(),
+        Applied::Torque { torque, .. } => torque.abs() / length,
     };
     actions.iter().map(force).sum()
 }

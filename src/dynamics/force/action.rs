@@ -14,20 +14,20 @@ use crate::dynamics::point::Point;
 
 /// An applied force or torque of the compiled mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Action<C = f64> {
+pub struct AppliedAction<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// The body it acts on.
     pub body: usize,
     /// Force or torque.
-    pub kind: Kind<C>,
+    pub kind: Applied<C>,
     /// What it is multiplied by; `None`: one.
     pub law: Option<Law<C>>,
 }
 
 /// What acts.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Kind<C = f64> {
+pub enum Applied<C = f64> {
     /// A force \[N\] at a point, in the frame of the body where it `follows`.
     Force {
         /// Where it acts.
@@ -46,7 +46,7 @@ pub enum Kind<C = f64> {
     },
 }
 
-impl Action {
+impl AppliedAction {
     /// What it is multiplied by at a time.
     #[inline(always)]
     pub fn factor<T: Real>(&self, t: Time) -> T {
@@ -54,14 +54,14 @@ impl Action {
     }
 }
 
-impl<C: Real> Action<C> {
+impl<C: Real> AppliedAction<C> {
     /// The force \[N\]; zero for a torque.
     #[inline(always)]
     pub fn force<T: Over<C>>(&self, factor: T, z: &[Complex<T>]) -> Complex<T> {
         match &self.kind {
-            Kind::Force { force, follows: true, .. } => z[self.body].turn(*force).times(factor),
-            Kind::Force { force, .. } => Complex::of(*force).times(factor),
-            Kind::Torque { .. } => Complex::ZERO,
+            Applied::Force { force, follows: true, .. } => z[self.body].turn(*force).times(factor),
+            Applied::Force { force, .. } => Complex::of(*force).times(factor),
+            Applied::Torque { .. } => Complex::ZERO,
         }
     }
 
@@ -69,8 +69,8 @@ impl<C: Real> Action<C> {
     #[inline(always)]
     pub fn pull<T: Over<C>>(&self, factor: T, z: &[Complex<T>], load: &mut [T]) {
         match &self.kind {
-            Kind::Force { point, .. } => point.pull(self.force(factor, z), z, load),
-            Kind::Torque { torque, base } => {
+            Applied::Force { point, .. } => point.pull(self.force(factor, z), z, load),
+            Applied::Torque { torque, base } => {
                 load[self.body] += factor.by(*torque);
                 if let Some(base) = base {
                     load[*base] -= factor.by(*torque);
@@ -83,8 +83,8 @@ impl<C: Real> Action<C> {
     #[inline(always)]
     pub fn power<T: Over<C>>(&self, factor: T, z: &[Complex<T>], omega: &[T]) -> T {
         match &self.kind {
-            Kind::Force { point, .. } => self.force(factor, z).dot(point.velocity(z, omega)),
-            Kind::Torque { torque, base } => {
+            Applied::Force { point, .. } => self.force(factor, z).dot(point.velocity(z, omega)),
+            Applied::Torque { torque, base } => {
                 let rate = base.map_or(omega[self.body], |base| omega[self.body] - omega[base]);
                 (rate * factor).by(*torque)
             }
@@ -103,11 +103,11 @@ mod tests {
         let (z, omega) = ([Complex::unit(0.4), Complex::unit(-1.0)], [1.5, -0.7]);
         let force = Complex::new(2.0, -3.0);
         for kind in [
-            Kind::Force { point: point.clone(), force, follows: false },
-            Kind::Force { point, force, follows: true },
-            Kind::Torque { torque: 0.7, base: Some(0) },
+            Applied::Force { point: point.clone(), force, follows: false },
+            Applied::Force { point, force, follows: true },
+            Applied::Torque { torque: 0.7, base: Some(0) },
         ] {
-            let action = Action { name: "a".into(), body: 1, kind, law: None };
+            let action = AppliedAction { name: "a".into(), body: 1, kind, law: None };
             let mut load = [0.0; 2];
             action.pull(1.3, &z, &mut load);
             let power = load[0] * omega[0] + load[1] * omega[1];

@@ -7,7 +7,7 @@
 mod dependence;
 mod there;
 
-use super::law::{Acts, Law};
+use super::law::{Acts, ForceLaw};
 use crate::arithmetic::Scalar;
 use crate::arithmetic::scratch::with_copies;
 use crate::arithmetic::tape::Symbol;
@@ -169,7 +169,7 @@ impl<C> FormulaEvent<C> {
 
 /// A part that moves by a law of time.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Driven {
+pub(crate) struct DrivenPart {
     /// Its name.
     pub name: String,
     /// True for a wall, false for a motor.
@@ -177,7 +177,7 @@ pub(crate) struct Driven {
 }
 
 /// An aim and what has it.
-pub(crate) type PlacedAim<'a, C> = (&'a Driven, Arc<Aim<C>>);
+pub(crate) type PlacedAim<'a, C> = (&'a DrivenPart, Arc<Aim<C>>);
 
 /// All formulas of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -185,11 +185,11 @@ pub(crate) struct Formulas<C = f64> {
     /// Values of the parameters at the start.
     pub parameters: Vec<C>,
     pub(super) signals: Vec<Expression<C>>,
-    pub(super) laws: Vec<Law<C>>,
+    pub(super) laws: Vec<ForceLaw<C>>,
     /// Laws of motors and walls that are formulas.
-    pub(super) profiles: Vec<(Driven, Expression<C>)>,
+    pub(super) profiles: Vec<(DrivenPart, Expression<C>)>,
     /// Aims of motors and walls that depend on the mechanism, with the angles they are of.
-    aims: Vec<(Driven, Vec<usize>, Expression<C>)>,
+    aims: Vec<(DrivenPart, Vec<usize>, Expression<C>)>,
     /// Events.
     pub events: Vec<FormulaEvent<C>>,
     /// What each condition is part of, for messages.
@@ -238,7 +238,7 @@ impl<C: Decimal> Formulas<C> {
             .chain(scene.walls.iter().map(|wall| (&wall.name, wall.law.as_ref(), true)));
         let driven: Vec<_> = motors
             .filter_map(|(name, law, is_wall)| {
-                Some((Driven { name: name.clone(), is_wall }, law?.profile.as_ref()?))
+                Some((DrivenPart { name: name.clone(), is_wall }, law?.profile.as_ref()?))
             })
             .collect();
         let is_plain = scene.laws.is_empty()
@@ -289,7 +289,7 @@ impl<C: Decimal> Formulas<C> {
                 }
                 Load::Potential { energy } => (Some(expression(energy)?), Acts::Nowhere),
             };
-            laws.push(Law { name: law.name.clone(), potential, place });
+            laws.push(ForceLaw { name: law.name.clone(), potential, place });
         }
         let mut profiles = Vec::new();
         for (part, profile) in driven {
@@ -302,12 +302,12 @@ impl<C: Decimal> Formulas<C> {
                 Coupled::Angle { bar, relative_to } => std::iter::once(bar).chain(relative_to).collect(),
                 Coupled::Travel(_) => Vec::new(),
             };
-            let part = Driven { name: name.clone(), is_wall: false };
+            let part = DrivenPart { name: name.clone(), is_wall: false };
             aims.push((part, angles, binder.expression(&names.alone(), aim, name)?));
         }
         for Wall { name, aim, .. } in &scene.walls {
             let Some(aim) = aim else { continue };
-            let part = Driven { name: name.clone(), is_wall: true };
+            let part = DrivenPart { name: name.clone(), is_wall: true };
             aims.push((part, Vec::new(), binder.expression(&names.alone(), aim, name)?));
         }
         let mut whens = Vec::new();
@@ -403,7 +403,7 @@ impl<C: Decimal> Formulas<C> {
     /// # Errors
     /// One that depends on rates.
     pub fn aims(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<PlacedAim<'_, C>>, CompileError> {
-        let aim = |(part, angles, expression): &'_ (Driven, Vec<usize>, Expression<C>)| {
+        let aim = |(part, angles, expression): &'_ (DrivenPart, Vec<usize>, Expression<C>)| {
             let formula = |at: &Configuration<Symbol, C>| {
                 self.with_signals(at, parameters, modes, |signals| {
                     expression.evaluated(at, parameters, signals, modes)
@@ -418,7 +418,7 @@ impl<C: Decimal> Formulas<C> {
 
     /// The formulas that act: of forces, motors, walls.
     fn acting(&self) -> impl Iterator<Item = &Expression<C>> {
-        let laws = self.laws.iter().flat_map(Law::expressions);
+        let laws = self.laws.iter().flat_map(ForceLaw::expressions);
         let profiles = self.profiles.iter().map(|profile| &profile.1);
         laws.chain(profiles).chain(self.aims.iter().map(|aim| &aim.2))
     }

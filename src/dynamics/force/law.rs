@@ -1,6 +1,6 @@
 //! A law of a scene as it is recorded: on the branches of some modes, with some parameters.
 
-use super::formula::{Driven, Expression, FormulaEvent, Formulas, span};
+use super::formula::{DrivenPart, Expression, FormulaEvent, Formulas, span};
 use super::span::SpanLaw;
 use super::{Loads, UserForce};
 use crate::arithmetic::Scalar;
@@ -39,13 +39,13 @@ impl<C: PartialEq> Acts<C> {
 
 /// One law.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Law<C = f64> {
+pub(super) struct ForceLaw<C = f64> {
     pub name: String,
     pub potential: Option<Expression<C>>,
     pub place: Acts<C>,
 }
 
-impl<C> Law<C> {
+impl<C> ForceLaw<C> {
     /// Its formulas in the order in which they were bound.
     pub fn expressions(&self) -> impl Iterator<Item = &Expression<C>> {
         let acting: Vec<&Expression<C>> = match &self.place {
@@ -59,8 +59,8 @@ impl<C> Law<C> {
 }
 
 /// A law on the branches of some modes, as it is recorded.
-pub(super) struct Recorded<'a, C> {
-    pub law: &'a Law<C>,
+pub(super) struct LawOnBranches<'a, C> {
+    pub law: &'a ForceLaw<C>,
     pub formulas: &'a Formulas<C>,
     pub parameters: &'a [C],
     pub modes: &'a [bool],
@@ -72,12 +72,16 @@ impl<C: Decimal> Formulas<C> {
     /// # Errors
     /// A potential that depends on time or rates.
     pub fn record(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<UserForce<C>>, CompileError> {
-        let record = |law| Recorded { law, formulas: self, parameters, modes }.record();
+        let record = |law| LawOnBranches { law, formulas: self, parameters, modes }.record();
         self.laws.iter().map(record).collect()
     }
 
     /// The laws of motors and walls on the same branches.
-    pub fn profiles(&self, parameters: &[C], modes: &[bool]) -> impl Iterator<Item = (&Driven, Profile<C>)> {
+    pub fn profiles(
+        &self,
+        parameters: &[C],
+        modes: &[bool],
+    ) -> impl Iterator<Item = (&DrivenPart, Profile<C>)> {
         self.profiles.iter().map(move |(part, expression)| {
             let value = |meaning: &Meaning<Site<C>>| match meaning {
                 Meaning::Parameter(number) => Some(parameters[*number]),
@@ -99,8 +103,8 @@ impl<C: Decimal> Formulas<C> {
     pub fn record_events(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<UserForce<C>>, CompileError> {
         let record = |event: &FormulaEvent<C>| {
             let place = Acts::Torque { body: 0, base: None, torque: event.when.clone() };
-            let law = Law { name: event.name.clone(), potential: None, place };
-            Recorded { law: &law, formulas: self, parameters, modes }.record()
+            let law = ForceLaw { name: event.name.clone(), potential: None, place };
+            LawOnBranches { law: &law, formulas: self, parameters, modes }.record()
         };
         self.events.iter().map(record).collect()
     }
@@ -146,7 +150,7 @@ impl<C: Decimal + crate::arithmetic::Over<C>> Formulas<C> {
     }
 }
 
-impl<C: Decimal> Recorded<'_, C> {
+impl<C: Decimal> LawOnBranches<'_, C> {
     /// Records it.
     ///
     /// # Errors

@@ -10,8 +10,8 @@ pub mod torsion;
 pub mod user;
 pub mod vibration;
 
-pub use action::Action;
-pub use spring::Spring;
+pub use action::AppliedAction;
+pub use spring::CompiledSpring;
 pub use torsion::Torsion;
 pub use user::{Force, Loads, UserForce};
 pub use vibration::Vibration;

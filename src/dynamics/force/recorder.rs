@@ -1,23 +1,23 @@
 //! Forces recorded as tapes: run once on symbols, their potentials differentiated.
 
-use super::user::{Force, Input, Loads, Part, UserForce};
+use super::user::{Force, ForceInput, ForceTape, Loads, UserForce};
 use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
 use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::CompileError;
-use crate::dynamics::configuration::{Configuration, Source};
+use crate::dynamics::configuration::{Configuration, ConfigurationSource};
 use crate::dynamics::constraint::Site;
 use std::cell::RefCell;
 
 /// Hands out inputs while a force is recorded.
 #[derive(Default)]
-struct Recorder<C> {
-    inputs: RefCell<Vec<Input>>,
+struct ForceRecorder<C> {
+    inputs: RefCell<Vec<ForceInput>>,
     sites: RefCell<Vec<Site<C>>>,
     numbers: RefCell<Vec<C>>,
 }
 
-impl<C: Real> Recorder<C> {
-    fn input(&self, input: Input) -> Symbol {
+impl<C: Real> ForceRecorder<C> {
+    fn input(&self, input: ForceInput) -> Symbol {
         Symbol::input(number_of(&self.inputs, &input) as u32)
     }
 
@@ -26,21 +26,21 @@ impl<C: Real> Recorder<C> {
     }
 }
 
-impl<C: Real> Source<Symbol, C> for Recorder<C> {
+impl<C: Real> ConfigurationSource<Symbol, C> for ForceRecorder<C> {
     fn time(&self) -> Symbol {
-        self.input(Input::Time)
+        self.input(ForceInput::Time)
     }
 
     fn angle(&self, body: usize) -> Symbol {
-        self.input(Input::Angle(body))
+        self.input(ForceInput::Angle(body))
     }
 
     fn rate(&self, body: usize) -> Symbol {
-        self.input(Input::Rate(body))
+        self.input(ForceInput::Rate(body))
     }
 
     fn direction(&self, body: usize) -> Complex<Symbol> {
-        Complex::new(self.input(Input::Cosine(body)), self.input(Input::Sine(body)))
+        Complex::new(self.input(ForceInput::Cosine(body)), self.input(ForceInput::Sine(body)))
     }
 
     fn position(&self, site: &Site<C>) -> Complex<Symbol> {
@@ -49,7 +49,7 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
             return Complex::new(self.constant(root.re), self.constant(root.im));
         }
         let site = self.site(site);
-        Complex::new(self.input(Input::X(site)), self.input(Input::Y(site)))
+        Complex::new(self.input(ForceInput::X(site)), self.input(ForceInput::Y(site)))
     }
 
     fn velocity(&self, site: &Site<C>) -> Complex<Symbol> {
@@ -57,13 +57,13 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
             return Complex::ZERO;
         }
         let site = self.site(site);
-        Complex::new(self.input(Input::XRate(site)), self.input(Input::YRate(site)))
+        Complex::new(self.input(ForceInput::XRate(site)), self.input(ForceInput::YRate(site)))
     }
 
     /// What is no double is an input: the tape folds constants in doubles.
     fn constant(&self, value: C) -> Symbol {
         if C::HAS_CONSTANTS {
-            self.input(Input::Number(number_of(&self.numbers, &value)))
+            self.input(ForceInput::Number(number_of(&self.numbers, &value)))
         } else {
             Symbol::of(value.value())
         }
@@ -72,23 +72,23 @@ impl<C: Real> Source<Symbol, C> for Recorder<C> {
 
 /// What a force comes to, in symbols.
 #[derive(Default)]
-struct Recorded {
+struct ForceSymbols {
     forces: Vec<(usize, [Symbol; 2])>,
     torques: Vec<(usize, Symbol)>,
 }
 
-impl Recorded {
+impl ForceSymbols {
     /// Adds a share of a generalized force that belongs to an input.
-    fn add<C: Real>(&mut self, recorder: &Recorder<C>, input: Input, share: Symbol) {
+    fn add<C: Real>(&mut self, recorder: &ForceRecorder<C>, input: ForceInput, share: Symbol) {
         let (place, vector) = match input {
-            Input::X(site) => (site, [share, Symbol::ZERO]),
-            Input::Y(site) => (site, [Symbol::ZERO, share]),
-            Input::Angle(body) => return self.torques.push((body, share)),
-            Input::Cosine(body) => {
-                return self.torques.push((body, -(share * recorder.input(Input::Sine(body)))));
+            ForceInput::X(site) => (site, [share, Symbol::ZERO]),
+            ForceInput::Y(site) => (site, [Symbol::ZERO, share]),
+            ForceInput::Angle(body) => return self.torques.push((body, share)),
+            ForceInput::Cosine(body) => {
+                return self.torques.push((body, -(share * recorder.input(ForceInput::Sine(body)))));
             }
-            Input::Sine(body) => {
-                return self.torques.push((body, share * recorder.input(Input::Cosine(body))));
+            ForceInput::Sine(body) => {
+                return self.torques.push((body, share * recorder.input(ForceInput::Cosine(body))));
             }
             _ => return,
         };
@@ -107,10 +107,10 @@ impl Recorded {
     }
 
     /// Of results and their tape: forces, torques, and the power if there is one more.
-    fn part(&self, (tape, slots): (Tape, Vec<Slot>)) -> Part {
+    fn part(&self, (tape, slots): (Tape, Vec<Slot>)) -> ForceTape {
         let (forces, rest) = slots.split_at(2 * self.forces.len());
         let (torques, power) = rest.split_at(self.torques.len());
-        Part {
+        ForceTape {
             tape,
             forces: self
                 .forces
@@ -140,21 +140,21 @@ impl<C: Real> UserForce<C> {
     pub(in crate::dynamics) fn at_points(
         potential: impl FnOnce(&Configuration<Symbol, C>) -> Symbol,
     ) -> Option<Self> {
-        let recorder = Recorder::default();
-        let mut pulls = Recorded::default();
+        let recorder = ForceRecorder::default();
+        let mut pulls = ForceSymbols::default();
         let [recorded] = Symbol::record(|| {
             for (number, slope) in potential(&Configuration::new(&recorder)).gradient() {
                 let input = recorder.inputs.borrow()[number as usize];
-                if matches!(input, Input::X(_) | Input::Y(_)) {
+                if matches!(input, ForceInput::X(_) | ForceInput::Y(_)) {
                     pulls.add(&recorder, input, -slope);
                 }
             }
             [pulls.symbols()]
         });
-        let of_forces = |part: Part| Self {
+        let of_forces = |part: ForceTape| Self {
             name: String::new(),
             may_be_flat: part.tape.may_be_flat(),
-            parts: [part, Part::default()],
+            parts: [part, ForceTape::default()],
             span: None,
             potential: None,
             inputs: recorder.inputs.into_inner(),
@@ -173,8 +173,8 @@ impl<C: Real> UserForce<C> {
         potential: impl FnOnce(&Configuration<Symbol, C>) -> Symbol,
         apply: impl FnOnce(&Configuration<Symbol, C>, &mut Loads<Symbol, C>),
     ) -> Result<Self, CompileError> {
-        let recorder = Recorder::default();
-        let (mut conservative, mut applied) = (Recorded::default(), Recorded::default());
+        let recorder = ForceRecorder::default();
+        let (mut conservative, mut applied) = (ForceSymbols::default(), ForceSymbols::default());
         let mut refused = None;
         let [by_potential, beside, energy] = Symbol::record(|| {
             let at = Configuration::new(&recorder);
@@ -182,10 +182,10 @@ impl<C: Real> UserForce<C> {
             for (number, slope) in potential.gradient() {
                 let input = recorder.inputs.borrow()[number as usize];
                 match input {
-                    Input::Time | Input::Rate(_) | Input::XRate(_) | Input::YRate(_) => {
+                    ForceInput::Time | ForceInput::Rate(_) | ForceInput::XRate(_) | ForceInput::YRate(_) => {
                         refused = Some(CompileError::NoPotential(name.into()));
                     }
-                    Input::Number(_) => {}
+                    ForceInput::Number(_) => {}
                     _ => conservative.add(&recorder, input, -slope),
                 }
             }
@@ -196,12 +196,12 @@ impl<C: Real> UserForce<C> {
                 let velocity = recorder.velocity(&site);
                 power += x * velocity.re + y * velocity.im;
                 let site = recorder.site(&site);
-                applied.add(&recorder, Input::X(site), x);
-                applied.add(&recorder, Input::Y(site), y);
+                applied.add(&recorder, ForceInput::X(site), x);
+                applied.add(&recorder, ForceInput::Y(site), y);
             }
             for (body, torque) in loads.torques {
                 power += torque * recorder.rate(body);
-                applied.add(&recorder, Input::Angle(body), torque);
+                applied.add(&recorder, ForceInput::Angle(body), torque);
             }
             let some = |symbol: Symbol| (!symbol.is_zero()).then_some(symbol);
             let beside = applied.symbols().into_iter().chain(some(power)).collect();

@@ -12,7 +12,7 @@
 
 use crate::arithmetic::tape::{Slot, Symbol, Tape};
 use crate::arithmetic::{Over, Real, Scalar};
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::point::Point;
 
 /// Inputs of the tapes: length \[m\], its rate \[m/s\] and time \[s\].
@@ -91,7 +91,7 @@ impl<C: Real> SpanLaw<C> {
 
     /// Adds the generalized forces \[N·m, N\]; returns the power accounted as work \[W\].
     #[inline]
-    pub fn pull<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) -> T {
+    pub fn pull<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>, load: &mut [T]) -> T {
         let span = self.span.position(at.z);
         let length = span.norm_squared().sqrt();
         let rate = match self.needs_rate {
@@ -114,7 +114,7 @@ impl<C: Real> SpanLaw<C> {
 #[cfg(test)]
 mod tests {
     use crate::arithmetic::Complex;
-    use crate::dynamics::constraint::Posture;
+    use crate::dynamics::constraint::ConstraintArguments;
     use crate::dynamics::{Mechanism, force::UserForce};
     use crate::scene::parse_scene;
 
@@ -152,7 +152,7 @@ mod tests {
                 let of = |shift: f64| (shift + 1.7 * f64::from(i)).sin() * 3.0;
                 let (phi, omega) = ([of(0.3), of(1.1)], [of(2.3), of(0.7)]);
                 let z = phi.map(Complex::unit);
-                let at = Posture { phi: &phi, z: &z, omega: &omega };
+                let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
                 let (mut found, mut expected) = ([0.0; 2], [0.0; 2]);
                 let time = 0.37 * f64::from(i);
                 let powers = [force.pull(time, at, &mut found), points.pull(time, at, &mut expected)];

@@ -12,7 +12,7 @@ use crate::dynamics::point::Point;
 
 /// A spring of the compiled mechanism.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spring<C = f64> {
+pub struct CompiledSpring<C = f64> {
     /// Name in the scene.
     pub name: String,
     /// The bodies its ends are on; `None` for the ground.
@@ -27,7 +27,7 @@ pub struct Spring<C = f64> {
     pub damping: C,
 }
 
-impl<C: Real> Spring<C> {
+impl<C: Real> CompiledSpring<C> {
     /// True where the force depends on the length, and not on the span alone.
     pub fn needs_length(&self) -> bool {
         self.free_length != C::ZERO || self.damping != C::ZERO
@@ -97,9 +97,16 @@ impl<C: Real> Spring<C> {
 mod tests {
     use super::*;
 
-    fn spring(free_length: f64, damping: f64) -> Spring {
+    fn spring(free_length: f64, damping: f64) -> CompiledSpring {
         let span = Point::ground([0.3, 0.0]).along(0, Complex::new(0.4, 0.0));
-        Spring { name: "s".into(), bodies: [None, Some(0)], span, stiffness: 7.0, free_length, damping }
+        CompiledSpring {
+            name: "s".into(),
+            bodies: [None, Some(0)],
+            span,
+            stiffness: 7.0,
+            free_length,
+            damping,
+        }
     }
 
     #[test]

@@ -14,7 +14,7 @@ use super::span::SpanLaw;
 use crate::arithmetic::tape::{Slot, Tape};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::configuration::Configuration;
-use crate::dynamics::constraint::{Posture, Site};
+use crate::dynamics::constraint::{ConstraintArguments, Site};
 use crate::dynamics::point::Point;
 
 /// A force or torque that acts on a mechanism, beside those a scene knows.
@@ -91,7 +91,7 @@ impl<S: Scalar, C: Clone> Loads<S, C> {
 
 /// What an input of the tape is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::dynamics) enum Input {
+pub(in crate::dynamics) enum ForceInput {
     /// A number that is no double.
     Number(usize),
     Time,
@@ -107,7 +107,7 @@ pub(in crate::dynamics) enum Input {
 
 /// Forces and torques as results of a tape.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(in crate::dynamics) struct Part {
+pub(in crate::dynamics) struct ForceTape {
     pub tape: Tape,
     /// Sites and both components \[N\].
     pub forces: Vec<(usize, [Slot; 2])>,
@@ -122,12 +122,12 @@ pub(in crate::dynamics) struct Part {
 pub struct UserForce<C = f64> {
     /// Name in messages.
     pub name: String,
-    pub(in crate::dynamics) inputs: Vec<Input>,
+    pub(in crate::dynamics) inputs: Vec<ForceInput>,
     pub(in crate::dynamics) sites: Vec<Site<C>>,
     /// Numbers that are no doubles.
     pub(in crate::dynamics) numbers: Vec<C>,
     /// What its potential does, and what it applies beside.
-    pub(in crate::dynamics) parts: [Part; 2],
+    pub(in crate::dynamics) parts: [ForceTape; 2],
     /// The same law over its length, where it is that of a spring and asks for nothing else.
     pub(crate) span: Option<Box<SpanLaw<C>>>,
     /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
@@ -147,14 +147,14 @@ impl UserForce {
         let sites = self.sites.iter().map(site).collect();
         let (mut inputs, mut numbers) = (self.inputs.clone(), Vec::new());
         let mut input = |value: f64| {
-            inputs.push(Input::Number(numbers.len()));
+            inputs.push(ForceInput::Number(numbers.len()));
             numbers.push(of(value));
             inputs.len() as u32 - 1
         };
         let parts = self.parts.each_ref().map(|part| {
             let (tape, new) = part.tape.lifted(&mut input);
             let at = |slot: Slot| new[slot as usize];
-            Part {
+            ForceTape {
                 tape,
                 forces: part.forces.iter().map(|&(site, xy)| (site, xy.map(at))).collect(),
                 torques: part.torques.iter().map(|&(body, torque)| (body, at(torque))).collect(),
@@ -190,19 +190,22 @@ impl<C: Real> UserForce<C> {
     pub(crate) fn counted_angles(&self) -> impl Iterator<Item = usize> {
         let numbers = self.parts.iter().flat_map(|part| part.tape.inputs());
         numbers.filter_map(|number| match self.inputs[number as usize] {
-            Input::Angle(k) => Some(k),
+            ForceInput::Angle(k) => Some(k),
             _ => None,
         })
     }
 
     /// True where what is applied depends on rates, as drag does.
     pub fn depends_on_rates(&self) -> bool {
-        let Part { tape, forces, torques, .. } = &self.parts[1];
+        let ForceTape { tape, forces, torques, .. } = &self.parts[1];
         let acting: Vec<Slot> =
             forces.iter().flat_map(|force| force.1).chain(torques.iter().map(|torque| torque.1)).collect();
         let mut needed = tape.inputs_of(&acting).into_iter();
         needed.any(|number| {
-            matches!(self.inputs[number as usize], Input::Rate(_) | Input::XRate(_) | Input::YRate(_))
+            matches!(
+                self.inputs[number as usize],
+                ForceInput::Rate(_) | ForceInput::XRate(_) | ForceInput::YRate(_)
+            )
         })
     }
 
@@ -214,7 +217,10 @@ impl<C: Real> UserForce<C> {
     /// The largest number of a body it acts on or asks for.
     pub fn last_body(&self) -> Option<usize> {
         let asked = self.inputs.iter().filter_map(|input| match input {
-            Input::Angle(body) | Input::Rate(body) | Input::Cosine(body) | Input::Sine(body) => Some(*body),
+            ForceInput::Angle(body)
+            | ForceInput::Rate(body)
+            | ForceInput::Cosine(body)
+            | ForceInput::Sine(body) => Some(*body),
             _ => None,
         });
         let torques = self.parts[1].torques.iter().map(|torque| torque.0);
@@ -223,18 +229,24 @@ impl<C: Real> UserForce<C> {
 
     /// Evaluates a tape at `time` \[s\] and calls `then` with all results.
     #[inline]
-    fn at<T: Over<C>, R>(&self, tape: &Tape, time: T, at: Posture<T>, then: impl FnOnce(&[T]) -> R) -> R {
+    fn at<T: Over<C>, R>(
+        &self,
+        tape: &Tape,
+        time: T,
+        at: ConstraintArguments<T>,
+        then: impl FnOnce(&[T]) -> R,
+    ) -> R {
         let input = |number: u32| match self.inputs[number as usize] {
-            Input::Number(number) => T::constant(self.numbers[number]),
-            Input::Time => time,
-            Input::Angle(body) => at.phi[body],
-            Input::Rate(body) => at.omega[body],
-            Input::Cosine(body) => at.z[body].re,
-            Input::Sine(body) => at.z[body].im,
-            Input::X(site) => self.sites[site].point.position(at.z).re,
-            Input::Y(site) => self.sites[site].point.position(at.z).im,
-            Input::XRate(site) => self.sites[site].point.velocity(at.z, at.omega).re,
-            Input::YRate(site) => self.sites[site].point.velocity(at.z, at.omega).im,
+            ForceInput::Number(number) => T::constant(self.numbers[number]),
+            ForceInput::Time => time,
+            ForceInput::Angle(body) => at.phi[body],
+            ForceInput::Rate(body) => at.omega[body],
+            ForceInput::Cosine(body) => at.z[body].re,
+            ForceInput::Sine(body) => at.z[body].im,
+            ForceInput::X(site) => self.sites[site].point.position(at.z).re,
+            ForceInput::Y(site) => self.sites[site].point.position(at.z).im,
+            ForceInput::XRate(site) => self.sites[site].point.velocity(at.z, at.omega).re,
+            ForceInput::YRate(site) => self.sites[site].point.velocity(at.z, at.omega).im,
         };
         tape.results(input, then)
     }
@@ -244,9 +256,9 @@ impl<C: Real> UserForce<C> {
     #[inline]
     fn each<T: Over<C>>(
         &self,
-        part: &Part,
+        part: &ForceTape,
         time: T,
-        at: Posture<T>,
+        at: ConstraintArguments<T>,
         mut force: impl FnMut(&Site<C>, Complex<T>),
         mut torque: impl FnMut(usize, T),
     ) {
@@ -264,7 +276,13 @@ impl<C: Real> UserForce<C> {
     }
 
     /// Adds the generalized forces \[N·m, N\] of a part; returns its power accounted as work \[W\].
-    fn pull_part<T: Over<C>>(&self, part: &Part, time: T, at: Posture<T>, load: &mut [T]) -> T {
+    fn pull_part<T: Over<C>>(
+        &self,
+        part: &ForceTape,
+        time: T,
+        at: ConstraintArguments<T>,
+        load: &mut [T],
+    ) -> T {
         if part.tape.is_empty() {
             return T::ZERO;
         }
@@ -281,7 +299,7 @@ impl<C: Real> UserForce<C> {
     }
 
     /// Adds all its generalized forces \[N·m, N\]; returns the power accounted as work \[W\].
-    pub fn pull<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) -> T {
+    pub fn pull<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>, load: &mut [T]) -> T {
         if let Some(span) = &self.span {
             return span.pull(time, at, load);
         }
@@ -289,18 +307,23 @@ impl<C: Real> UserForce<C> {
     }
 
     /// Adds those of its potential.
-    pub fn pull_by_potential<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+    pub fn pull_by_potential<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>, load: &mut [T]) {
         self.pull_part(&self.parts[0], time, at, load);
     }
 
     /// Adds those applied beside.
-    pub fn pull_applied<T: Over<C>>(&self, time: T, at: Posture<T>, load: &mut [T]) {
+    pub fn pull_applied<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>, load: &mut [T]) {
         self.pull_part(&self.parts[1], time, at, load);
     }
 
     /// Calls `force` with every element and the force \[N·m, N\] on it; torques act across their unit
     /// vectors.
-    pub fn spread<T: Over<C>>(&self, time: T, at: Posture<T>, force: impl FnMut(usize, Complex<T>)) {
+    pub fn spread<T: Over<C>>(
+        &self,
+        time: T,
+        at: ConstraintArguments<T>,
+        force: impl FnMut(usize, Complex<T>),
+    ) {
         let force = std::cell::RefCell::new(force);
         let torque = |body: usize, torque| (force.borrow_mut())(body, at.z[body].left().times(torque));
         for part in &self.parts {
@@ -309,7 +332,12 @@ impl<C: Real> UserForce<C> {
     }
 
     /// Calls `force` with the body and the force \[N\] at every point it acts at.
-    pub fn forces<T: Over<C>>(&self, time: T, at: Posture<T>, mut force: impl FnMut(usize, Complex<T>)) {
+    pub fn forces<T: Over<C>>(
+        &self,
+        time: T,
+        at: ConstraintArguments<T>,
+        mut force: impl FnMut(usize, Complex<T>),
+    ) {
         for part in &self.parts {
             self.each(
                 part,
@@ -322,7 +350,7 @@ impl<C: Real> UserForce<C> {
     }
 
     /// Magnitudes of forces \[N\] and torques \[N·m\] at a moment, summed.
-    pub fn magnitudes(&self, time: f64, at: Posture<f64>) -> [f64; 2]
+    pub fn magnitudes(&self, time: f64, at: ConstraintArguments<f64>) -> [f64; 2]
     where
         f64: Over<C>,
     {
@@ -340,14 +368,14 @@ impl<C: Real> UserForce<C> {
     }
 
     /// Potential energy \[J\].
-    pub fn energy<T: Over<C>>(&self, time: T, at: Posture<T>) -> T {
+    pub fn energy<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>) -> T {
         let Some((tape, slot)) = &self.potential else { return T::ZERO };
         self.at(tape, time, at, |slots| slots[*slot as usize])
     }
 
     /// Power accounted as work \[W\].
-    pub fn work_rate<T: Over<C>>(&self, time: T, at: Posture<T>) -> T {
-        let Part { tape, power: Some(slot), .. } = &self.parts[1] else { return T::ZERO };
+    pub fn work_rate<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>) -> T {
+        let ForceTape { tape, power: Some(slot), .. } = &self.parts[1] else { return T::ZERO };
         self.at(tape, time, at, |slots| slots[*slot as usize])
     }
 }

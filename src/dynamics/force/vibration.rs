@@ -35,7 +35,7 @@ pub struct Vibration {
 }
 
 /// G, u, s and the unit vector along the span.
-struct Found<T> {
+struct SpanTerms<T> {
     along: Complex<T>,
     length: T,
     inertia: T,
@@ -50,7 +50,7 @@ impl Vibration {
         (mass, pivot): (&[T], &[T]),
         slope: &mut [T],
         minv_jt: &mut [T],
-    ) -> Found<T> {
+    ) -> SpanTerms<T> {
         let span = self.span.position(z);
         let length = span.norm_squared().sqrt();
         let along = span.times(T::ONE / length);
@@ -58,7 +58,7 @@ impl Vibration {
         self.span.pull(along, z, slope);
         minv_jt.copy_from_slice(slope);
         tree::solve::<T, N>(size::<N>(minv_jt.len()), mass, pivot, minv_jt);
-        Found { along, length, inertia: dot(slope, minv_jt) }
+        SpanTerms { along, length, inertia: dot(slope, minv_jt) }
     }
 
     /// Writes the generalized forces \[N·m, N\] to `force`; `factors` are those of M, `twist` is the one
@@ -72,7 +72,7 @@ impl Vibration {
         twist: &[T],
         [force, minv_jt]: [&mut [T]; 2],
     ) {
-        let Found { along, length, inertia } = self.find::<T, N>(z, factors, force, minv_jt);
+        let SpanTerms { along, length, inertia } = self.find::<T, N>(z, factors, force, minv_jt);
         // dT/dq at the rates u, with the opposite sign, and the change of G along u.
         force.fill(T::ZERO);
         tree.velocity_terms::<T, N>(minv_jt, twist, force);

@@ -1,10 +1,10 @@
 //! Friction in an evaluation of the equations: the forces of what slides, and the normal forces.
 
-use super::super::constraint::Posture;
+use super::super::constraint::ConstraintArguments;
 use super::super::energy::moment;
 use super::super::kernel::{Kernel, dot};
 use super::super::{Mechanism, Time, tree};
-use super::{Friction, Mode, Normal, forces, size};
+use super::{CompiledFriction, FrictionMode, Normal, forces, size};
 use crate::arithmetic::{Complex, Real};
 
 /// What one unit of tau does.
@@ -19,7 +19,7 @@ impl<T: Real> Kernel<T> {
     #[cold]
     pub(in crate::dynamics) fn slide(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         let n = phi.len();
-        let sliding: Vec<(&Friction, f64)> = mechanism.sliding().collect();
+        let sliding: Vec<(&CompiledFriction, f64)> = mechanism.sliding().collect();
         self.friction.clear();
         self.friction.resize(sliding.len(), T::ZERO);
         self.friction_rows.clear();
@@ -28,7 +28,7 @@ impl<T: Real> Kernel<T> {
         if sliding.is_empty() {
             return;
         }
-        let at = Posture { phi, z: &self.z, omega };
+        let at = ConstraintArguments { phi, z: &self.z, omega };
         for ((friction, _), row) in sliding.iter().zip(self.friction_rows.chunks_exact_mut(n)) {
             friction.tangent.differentiate(t, at, row);
         }
@@ -57,8 +57,8 @@ impl<T: Real> Kernel<T> {
         &self,
         mechanism: &Mechanism,
         t: Time,
-        at: Posture<T>,
-        sliding: &[(&Friction, f64)],
+        at: ConstraintArguments<T>,
+        sliding: &[(&CompiledFriction, f64)],
         j: usize,
     ) -> Response<T> {
         let (n, rows) = (self.z.len(), mechanism.constraints.len());
@@ -85,7 +85,7 @@ impl<T: Real> Kernel<T> {
     /// normal forces \[N\] of all places; zeros for those that are open.  After
     /// [`accelerate`](Kernel::accelerate).
     pub fn friction_forces(&self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> Vec<[T; 2]> {
-        let at = Posture { phi, z: &self.z, omega };
+        let at = ConstraintArguments { phi, z: &self.z, omega };
         let mut needed = mechanism.needed_forces(t, at, &self.load);
         for ((friction, _), &tau) in mechanism.sliding().zip(&self.friction) {
             friction.tangent.add_force(moment(t), at, tau, &mut needed);
@@ -96,9 +96,9 @@ impl<T: Real> Kernel<T> {
         (mechanism.frictions.iter().zip(&mechanism.modes))
             .map(|(friction, mode)| {
                 let tau = match mode {
-                    Mode::Open => return [T::ZERO; 2],
-                    Mode::Stick(_) => stuck.next(),
-                    Mode::Slip(_) | Mode::Strained(_) => slid.next(),
+                    FrictionMode::Open => return [T::ZERO; 2],
+                    FrictionMode::Stick(_) => stuck.next(),
+                    FrictionMode::Slip(_) | FrictionMode::Strained(_) => slid.next(),
                 };
                 let force = mechanism.normal_force(friction, &self.multiplier, &carried);
                 [tau.copied().unwrap_or(T::ZERO), size(friction.normal, force).0]

@@ -14,8 +14,8 @@
 //! Source: E. J. Routh, *Dynamics of a System of Rigid Bodies*, 7th ed. (1905), section 187 ff.; Y. Wang,
 //! M. Mason, *Two-dimensional rigid-body collisions with friction*, J. Appl. Mech. 59 (1992).
 
-use super::super::constraint::Posture;
-use super::super::contact::metric::{Gradient, Metric};
+use super::super::constraint::ConstraintArguments;
+use super::super::contact::metric::{ContactMetric, MetricRow};
 use super::super::{Mechanism, Time};
 use super::{Normal, solve};
 use crate::arithmetic::Real;
@@ -102,13 +102,13 @@ impl Mechanism {
     ///
     /// They may pull: see `run/contact/rest.rs`.
     pub(crate) fn without_normal_rates(&self, t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<f64>> {
-        let metric = Metric::at(self, t, phi, omega)?;
+        let metric = ContactMetric::at(self, t, phi, omega)?;
         let (before, z) = (metric.velocity(omega), self.elements(phi));
         let columns: Vec<DVector<f64>> = metric.rows.iter().map(|row| metric.column(&row.along)).collect();
         let mut pushes = columns.clone();
         for (friction, coefficient) in self.sliding() {
             let Normal::Contact(_) = friction.normal else { continue };
-            let along = Gradient::of(&friction.tangent, t, Posture { phi, z: &z, omega }).along;
+            let along = MetricRow::of(&friction.tangent, t, ConstraintArguments { phi, z: &z, omega }).along;
             pushes[self.normal_row(friction)?].axpy(-coefficient, &metric.column(&along), 1.0);
         }
         let counting = metric.counting();

@@ -19,11 +19,11 @@
 //! Source: D. Stewart, *Rigid-body dynamics with friction and impact*, SIAM Review 42 (2000); of the paradox
 //! F. Génot, B. Brogliato, *New results on Painlevé paradoxes*, Eur. J. Mech. A 18 (1999).
 
-use super::super::constraint::Posture;
+use super::super::constraint::ConstraintArguments;
 use super::super::kernel::{Bias, Kernel, dot};
 use super::super::{Mechanism, Motion, Time};
-use super::shared::Room;
-use super::{Mode, Normal};
+use super::shared::FreeDisplacements;
+use super::{FrictionMode, Normal};
 use crate::arithmetic::Complex;
 
 /// Velocity over the sum of the magnitudes of its parts, and over the mechanism's own, up to which a place
@@ -80,11 +80,11 @@ pub const HINT: &str = "lower the coefficient, or put a spring and a damper wher
 pub const JAMS: &str = "friction no longer follows from the motion: Painlevé's paradox, the surfaces jam";
 
 /// Contacts that are held, and the modes of all places.
-pub type Modes = (Vec<usize>, Vec<Mode>);
+pub type Modes = (Vec<usize>, Vec<FrictionMode>);
 
 /// A moment: coordinates \[rad, m\], elements and rates \[rad/s, m/s\].
 #[derive(Clone, Copy, Debug)]
-pub struct Moment<'a> {
+pub struct FrictionMoment<'a> {
     /// Time.
     pub t: Time,
     /// Coordinates.
@@ -97,7 +97,7 @@ pub struct Moment<'a> {
 
 /// What is known of all places: their velocities, where they are pushed, and which one has just come to rest.
 #[derive(Clone, Copy)]
-struct Known<'a> {
+struct PlaceRates<'a> {
     rates: &'a [f64],
     pushed: &'a [Option<f64>],
     arrived: Option<usize>,
@@ -106,7 +106,7 @@ struct Known<'a> {
 /// What the equations tell of contacts that are closed and places in these modes: signs, zero where rounding
 /// leaves them open.
 #[derive(Clone, Debug)]
-pub struct Told {
+pub struct ContactSigns {
     /// The determinant of the equations of friction.
     pub regularity: f64,
     /// Pressures of the closed contacts.
@@ -127,11 +127,11 @@ pub trait Evidence {
     fn rates(&self) -> Vec<f64>;
 
     /// What the equations tell; `None` where they have no finite solution.
-    fn told(&self, closed: &[usize], modes: &[Mode], touching: &[usize]) -> Option<Told>;
+    fn told(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> Option<ContactSigns>;
 
     /// True where a place that is held by contacts, constraints and the others in these modes has no
     /// acceleration; of what motors hold less is asked.
-    fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], is_driven: bool) -> bool;
+    fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], is_driven: bool) -> bool;
 
     /// True where a place that contacts and constraints hold has no velocity once that of the rest is as
     /// these have it.
@@ -141,7 +141,7 @@ pub trait Evidence {
 /// The evidence in doubles.
 struct InDoubles<'a> {
     mechanism: &'a Mechanism,
-    at: Moment<'a>,
+    at: FrictionMoment<'a>,
 }
 
 impl Mechanism {
@@ -152,8 +152,8 @@ impl Mechanism {
     /// There is none, or more than one.
     pub fn modes_at(
         &self,
-        at: Moment,
-        before: &[Mode],
+        at: FrictionMoment,
+        before: &[FrictionMode],
         contacts: [&[usize]; 2],
         transition: Transition,
     ) -> Result<Modes, Paradox> {
@@ -167,8 +167,8 @@ impl Mechanism {
     pub fn modes_by(
         &self,
         evidence: &dyn Evidence,
-        at: Moment,
-        before: &[Mode],
+        at: FrictionMoment,
+        before: &[FrictionMode],
         [staying, touching]: [&[usize]; 2],
         transition: Transition,
     ) -> Result<Modes, Paradox> {
@@ -180,7 +180,7 @@ impl Mechanism {
             let rates = self.rates_beside(evidence, at, &closed, &rates);
             let mut options = self.options(at, before, &rates, &closed, (&pushed, transition));
             let resting = options.iter().filter(|of| of.len() > 1).count();
-            let count = |options: &[Vec<Mode>]| {
+            let count = |options: &[Vec<FrictionMode>]| {
                 options.iter().map(Vec::len).try_fold(1_usize, |all, of| all.checked_mul(of))
             };
             self.spare_driven(at, &pushed, &mut options);
@@ -194,7 +194,7 @@ impl Mechanism {
             if looked_at > MOST {
                 return Err(Paradox::TooMany(resting));
             }
-            let known = Known { rates: &rates, pushed: &pushed, arrived: transition.arrived };
+            let known = PlaceRates { rates: &rates, pushed: &pushed, arrived: transition.arrived };
             let fit = combinations(&options).into_iter().find_map(|modes| {
                 let load = self.fits(evidence, at, &closed, &modes, touching, known)?;
                 Some(((closed.clone(), modes), load))
@@ -231,16 +231,16 @@ impl Mechanism {
         };
         let touching: Vec<usize> = (0..self.contacts.len()).filter(is_still).collect();
         let staying = self.staying(&touching, start.time, &phi, &omega)?;
-        let at = Moment { t: start.time, phi: &phi, z: &z, omega: &omega };
+        let at = FrictionMoment { t: start.time, phi: &phi, z: &z, omega: &omega };
         let (contacts, modes) =
             self.modes_at(at, &self.modes, [&staying, &touching], Transition::default()).ok()?;
         Some(self.moving(&contacts, &modes))
     }
 
     /// The relative velocity \[rad/s, m/s\] of every place, zero where it is rounding.
-    fn sliding_rates(&self, at: Moment) -> Vec<f64> {
+    fn sliding_rates(&self, at: FrictionMoment) -> Vec<f64> {
         let mut row = vec![0.0; at.phi.len()];
-        let posture = Posture { phi: at.phi, z: at.z, omega: at.omega };
+        let posture = ConstraintArguments { phi: at.phi, z: at.z, omega: at.omega };
         (self.frictions.iter().enumerate())
             .map(|(number, friction)| {
                 row.fill(0.0);
@@ -256,36 +256,36 @@ impl Mechanism {
     /// The modes each place may be in with these contacts closed, those that stick first.
     fn options(
         &self,
-        at: Moment,
-        before: &[Mode],
+        at: FrictionMoment,
+        before: &[FrictionMode],
         rates: &[f64],
         closed: &[usize],
         (pushed, Transition { arrived, .. }): (&[Option<f64>], Transition),
-    ) -> Vec<Vec<Mode>> {
-        let of = |(number, friction): (usize, &super::Friction)| {
+    ) -> Vec<Vec<FrictionMode>> {
+        let of = |(number, friction): (usize, &super::CompiledFriction)| {
             if let Normal::Contact(contact) = friction.normal
                 && !closed.contains(&contact)
             {
-                return vec![Mode::Open];
+                return vec![FrictionMode::Open];
             }
             if let Normal::Joint(joint) = friction.normal
                 && self.joints[joint].outer.is_none()
                 && self.joints[joint].row.is_none()
             {
-                return vec![Mode::Open];
+                return vec![FrictionMode::Open];
             }
             if let Some(sign) = pushed[number] {
-                return vec![Mode::Slip(sign)];
+                return vec![FrictionMode::Slip(sign)];
             }
             let rate = if arrived == Some(number) { 0.0 } else { rates[number] };
             if rate != 0.0 {
-                return vec![Mode::Slip(rate.signum())];
+                return vec![FrictionMode::Slip(rate.signum())];
             }
             let stick = match before.get(number) {
-                Some(Mode::Stick(anchor)) => *anchor,
+                Some(FrictionMode::Stick(anchor)) => *anchor,
                 _ => friction.displacement(at.phi, at.z),
             };
-            vec![Mode::Stick(stick), Mode::Slip(1.0), Mode::Slip(-1.0)]
+            vec![FrictionMode::Stick(stick), FrictionMode::Slip(1.0), FrictionMode::Slip(-1.0)]
         };
         self.frictions.iter().enumerate().map(of).collect()
     }
@@ -294,16 +294,17 @@ impl Mechanism {
     fn fits(
         &self,
         evidence: &dyn Evidence,
-        at: Moment,
+        at: FrictionMoment,
         closed: &[usize],
-        modes: &[Mode],
+        modes: &[FrictionMode],
         touching: &[usize],
-        Known { rates, pushed, arrived }: Known,
+        PlaceRates { rates, pushed, arrived }: PlaceRates,
     ) -> Option<Vec<f64>> {
         let told = evidence.told(closed, modes, touching)?;
         // At walls the pressure has a sign, which tells; the force of joints and rails may have either.
         let at_walls = self.frictions.iter().zip(modes).all(|(friction, mode)| {
-            matches!(friction.normal, Normal::Contact(_)) || matches!(mode, Mode::Open | Mode::Stick(_))
+            matches!(friction.normal, Normal::Contact(_))
+                || matches!(mode, FrictionMode::Open | FrictionMode::Stick(_))
         });
         let leaves = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
         if !at_walls && told.regularity <= 0.0
@@ -315,17 +316,19 @@ impl Mechanism {
         let is_held = |place: usize| self.room_beside(at, closed, modes, place).is_held(place);
         let is_still = |place: usize, is_driven| evidence.is_still(place, closed, modes, is_driven);
         let fit = modes.iter().enumerate().all(|(number, mode)| match mode {
-            Mode::Open => true,
+            FrictionMode::Open => true,
             // Where the travel of a moving linkage turns back, the linkage moves it on, and no force of
             // friction holds it.
-            Mode::Stick(_) => told.grips[number] >= 0 && (!is_held(number) || is_still(number, false)),
-            Mode::Slip(sign) => {
+            FrictionMode::Stick(_) => {
+                told.grips[number] >= 0 && (!is_held(number) || is_still(number, false))
+            }
+            FrictionMode::Slip(sign) => {
                 let slides = rates[number] != 0.0 && arrived != Some(number);
                 // What breaks begins with what the coefficients leave, which may be nothing.
                 let is_pushed = pushed[number].is_some() && !is_held(number);
                 slides || is_pushed || sign * f64::from(told.speeding[number]) > 0.0
             }
-            Mode::Strained(strain) => is_held(number) && is_still(number, *strain == 0.0),
+            FrictionMode::Strained(strain) => is_held(number) && is_still(number, *strain == 0.0),
         });
         fit.then_some(told.load)
     }
@@ -336,7 +339,7 @@ impl Evidence for InDoubles<'_> {
         self.mechanism.sliding_rates(self.at)
     }
 
-    fn told(&self, closed: &[usize], modes: &[Mode], touching: &[usize]) -> Option<Told> {
+    fn told(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> Option<ContactSigns> {
         let Self { mechanism: free, at } = *self;
         let mechanism = free.moving(closed, modes);
         let mut kernel = Kernel::<f64>::new(&mechanism);
@@ -348,7 +351,7 @@ impl Evidence for InDoubles<'_> {
         let pressures = closed.iter().zip(&kernel.multiplier[mechanism.standing_rows()..]);
         let pressure = |(&contact, &multiplier): (&usize, &f64)| free.contacts[contact].pressure(multiplier);
         let pressures = pressures.map(pressure).map(|pressure| sign(pressure, ROUNDING)).collect();
-        let posture = Posture { phi: at.phi, z: at.z, omega: at.omega };
+        let posture = ConstraintArguments { phi: at.phi, z: at.z, omega: at.omega };
         let mut row = vec![0.0; at.phi.len()];
         let mut acceleration = |of: &super::ConstraintEquation| {
             row.fill(0.0);
@@ -362,7 +365,7 @@ impl Evidence for InDoubles<'_> {
         };
         let leaving = touching.iter().map(|&contact| acceleration(&free.contacts[contact].row)).collect();
         let speeding = free.frictions.iter().map(|friction| acceleration(&friction.tangent)).collect();
-        let grip = |(friction, [tau, pressing]): (&super::Friction, [f64; 2])| {
+        let grip = |(friction, [tau, pressing]): (&super::CompiledFriction, [f64; 2])| {
             let rounding =
                 f64::EPSILON * kernel.multiplier.iter().fold(pressing, |most, x| most.max(x.abs()));
             let most = friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding;
@@ -370,16 +373,16 @@ impl Evidence for InDoubles<'_> {
         };
         let grips = free.frictions.iter().zip(forces).map(grip).collect();
         let regularity = kernel.regularity;
-        Some(Told { regularity, pressures, leaving, grips, speeding, load: kernel.load })
+        Some(ContactSigns { regularity, pressures, leaving, grips, speeding, load: kernel.load })
     }
 
-    fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], is_driven: bool) -> bool {
+    fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], is_driven: bool) -> bool {
         self.mechanism.room_beside(self.at, closed, modes, place).is_still(place, is_driven)
     }
 
     fn stands(&self, place: usize, closed: &[usize]) -> bool {
-        let open = vec![Mode::Open; self.mechanism.frictions.len()];
-        Room::new(self.mechanism, self.at, closed, &open).stands(place)
+        let open = vec![FrictionMode::Open; self.mechanism.frictions.len()];
+        FreeDisplacements::new(self.mechanism, self.at, closed, &open).stands(place)
     }
 }
 
@@ -410,8 +413,8 @@ fn subsets(staying: &[usize], touching: &[usize]) -> Vec<Vec<usize>> {
 }
 
 /// Every combination of one mode a place, by the number of places that do not take their first one.
-fn combinations(options: &[Vec<Mode>]) -> Vec<Vec<Mode>> {
-    let mut all: Vec<(usize, Vec<Mode>)> = vec![(0, Vec::new())];
+fn combinations(options: &[Vec<FrictionMode>]) -> Vec<Vec<FrictionMode>> {
+    let mut all: Vec<(usize, Vec<FrictionMode>)> = vec![(0, Vec::new())];
     for of in options {
         all = all
             .iter()

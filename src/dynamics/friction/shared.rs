@@ -10,10 +10,10 @@
 //! Source: G. Strang, *Linear Algebra and Its Applications*, 3rd ed. (1988), section 8.2 (vertices).
 
 use super::super::Mechanism;
-use super::super::constraint::Posture;
-use super::super::contact::metric::{Gradient, Metric};
+use super::super::constraint::ConstraintArguments;
+use super::super::contact::metric::{ContactMetric, MetricRow};
 use super::modes::Evidence;
-use super::{Mode, Moment, Normal, Transition};
+use super::{FrictionMode, FrictionMoment, Normal, Transition};
 
 /// Acceleration, over that without constraints, up to which the rest leaves a place still.
 const STILL: f64 = 1e-10;
@@ -22,25 +22,30 @@ const STILL: f64 = 1e-10;
 const SMOOTH: f64 = 1e-6;
 
 /// What constraints, contacts and places that stick leave to the displacements of places with friction.
-pub(super) struct Room<'a> {
+pub(super) struct FreeDisplacements<'a> {
     mechanism: &'a Mechanism,
-    at: Moment<'a>,
+    at: FrictionMoment<'a>,
     rest: Mechanism,
-    metric: Option<Metric>,
+    metric: Option<ContactMetric>,
 }
 
-impl<'a> Room<'a> {
+impl<'a> FreeDisplacements<'a> {
     /// With these contacts held and the places in these modes.
-    pub fn new(mechanism: &'a Mechanism, at: Moment<'a>, contacts: &[usize], modes: &[Mode]) -> Self {
+    pub fn new(
+        mechanism: &'a Mechanism,
+        at: FrictionMoment<'a>,
+        contacts: &[usize],
+        modes: &[FrictionMode],
+    ) -> Self {
         let rest = mechanism.moving(contacts, modes);
-        let metric = Metric::at(&rest, at.t, at.phi, at.omega);
+        let metric = ContactMetric::at(&rest, at.t, at.phi, at.omega);
         Self { mechanism, at, rest, metric }
     }
 
     /// The displacement of a place.
-    fn gradient(&self, place: usize) -> Gradient {
-        let Moment { t, phi, z, omega } = self.at;
-        Gradient::of(&self.mechanism.frictions[place].tangent, t, Posture { phi, z, omega })
+    fn gradient(&self, place: usize) -> MetricRow {
+        let FrictionMoment { t, phi, z, omega } = self.at;
+        MetricRow::of(&self.mechanism.frictions[place].tangent, t, ConstraintArguments { phi, z, omega })
     }
 
     /// True where nothing is left of the displacement of a place.
@@ -53,7 +58,7 @@ impl<'a> Room<'a> {
     /// True where a place that is held has no acceleration; of what motors hold less is asked.
     pub fn is_still(&self, place: usize, is_driven: bool) -> bool {
         self.metric.as_ref().is_some_and(|metric| {
-            let Gradient { row, along } = self.gradient(place);
+            let MetricRow { row, along } = self.gradient(place);
             let column = metric.column(&along);
             let leaving = (column.dot(&metric.acceleration()) + row.convective).abs();
             let size = column.norm() * metric.unconstrained().norm() + row.convective.abs();
@@ -66,7 +71,7 @@ impl<'a> Room<'a> {
     /// have it.
     pub fn stands(&self, place: usize) -> bool {
         self.metric.as_ref().is_some_and(|metric| {
-            let Gradient { row, along } = self.gradient(place);
+            let MetricRow { row, along } = self.gradient(place);
             let (column, velocity) = (metric.column(&along), metric.velocity(self.at.omega));
             let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time;
             let size = column.norm() * velocity.norm() + row.drive.abs() + own;
@@ -92,14 +97,14 @@ impl Mechanism {
     /// What the rest leaves of a place in these modes.
     pub(super) fn room_beside<'a>(
         &'a self,
-        at: Moment<'a>,
+        at: FrictionMoment<'a>,
         contacts: &[usize],
-        modes: &[Mode],
+        modes: &[FrictionMode],
         place: usize,
-    ) -> Room<'a> {
+    ) -> FreeDisplacements<'a> {
         let mut others = modes.to_vec();
-        others[place] = Mode::Open;
-        Room::new(self, at, contacts, &others)
+        others[place] = FrictionMode::Open;
+        FreeDisplacements::new(self, at, contacts, &others)
     }
 
     /// Relative velocities of all places, zero of those that closed contacts hold: the speed with which a
@@ -107,7 +112,7 @@ impl Mechanism {
     pub(super) fn rates_beside(
         &self,
         evidence: &dyn Evidence,
-        at: Moment,
+        at: FrictionMoment,
         closed: &[usize],
         rates: &[f64],
     ) -> Vec<f64> {
@@ -121,7 +126,7 @@ impl Mechanism {
         if may_stand.is_empty() {
             return rates;
         }
-        let room = Room::new(self, at, closed, &vec![Mode::Open; rates.len()]);
+        let room = FreeDisplacements::new(self, at, closed, &vec![FrictionMode::Open; rates.len()]);
         for place in
             may_stand.into_iter().filter(|&place| room.is_held(place) && evidence.stands(place, closed))
         {
@@ -134,8 +139,8 @@ impl Mechanism {
     /// limits that move on with it.
     pub(super) fn pushed(
         &self,
-        at: Moment,
-        before: &[Mode],
+        at: FrictionMoment,
+        before: &[FrictionMode],
         staying: &[usize],
         Transition { breaks, .. }: Transition,
     ) -> Vec<Option<f64>> {
@@ -143,12 +148,12 @@ impl Mechanism {
         let Some((place, sign)) = breaks else { return pushed };
         pushed[place] = Some(sign);
         let strained = before.iter().enumerate().filter_map(|(number, mode)| match mode {
-            Mode::Strained(strain) if number != place => Some((number, *strain)),
+            FrictionMode::Strained(strain) if number != place => Some((number, *strain)),
             _ => None,
         });
         let strained: Vec<(usize, f64)> = strained.collect();
         if !strained.is_empty() {
-            let room = Room::new(self, at, staying, &vec![Mode::Open; before.len()]);
+            let room = FreeDisplacements::new(self, at, staying, &vec![FrictionMode::Open; before.len()]);
             for (number, strain) in strained {
                 if strain * sign * room.moved([place, number]) > 0.0 {
                     pushed[number] = Some(strain);
@@ -160,20 +165,26 @@ impl Mechanism {
 
     /// True where motors and locks hold a place.
     #[cfg(feature = "digits")]
-    pub(crate) fn is_driven(&self, at: Moment, place: usize) -> bool {
-        Room::new(self, at, &[], &vec![Mode::Open; self.frictions.len()]).is_held(place)
+    pub(crate) fn is_driven(&self, at: FrictionMoment, place: usize) -> bool {
+        FreeDisplacements::new(self, at, &[], &vec![FrictionMode::Open; self.frictions.len()]).is_held(place)
     }
 
     /// Leaves without friction the places at rest that motors and locks hold.
-    pub(super) fn spare_driven(&self, at: Moment, pushed: &[Option<f64>], options: &mut [Vec<Mode>]) {
+    pub(super) fn spare_driven(
+        &self,
+        at: FrictionMoment,
+        pushed: &[Option<f64>],
+        options: &mut [Vec<FrictionMode>],
+    ) {
         let resting = resting(options, pushed);
         if resting.is_empty() {
             return;
         }
-        let driven = Room::new(self, at, &[], &vec![Mode::Open; options.len()]);
+        let driven = FreeDisplacements::new(self, at, &[], &vec![FrictionMode::Open; options.len()]);
         for place in resting {
             if driven.is_held(place) {
-                options[place] = vec![Mode::Strained(0.0), Mode::Slip(1.0), Mode::Slip(-1.0)];
+                options[place] =
+                    vec![FrictionMode::Strained(0.0), FrictionMode::Slip(1.0), FrictionMode::Slip(-1.0)];
             }
         }
     }
@@ -182,28 +193,28 @@ impl Mechanism {
     /// at their limits.
     pub(super) fn strain(
         &self,
-        at: Moment,
+        at: FrictionMoment,
         closed: &[usize],
         pushed: &[Option<f64>],
-        options: &mut [Vec<Mode>],
+        options: &mut [Vec<FrictionMode>],
     ) {
         let mut resting = resting(options, pushed);
-        resting.retain(|&place| options[place][0] != Mode::Strained(0.0));
+        resting.retain(|&place| options[place][0] != FrictionMode::Strained(0.0));
         if resting.len() + closed.len() < 2 {
             return;
         }
-        let stuck = |number: usize| Mode::Stick(self.frictions[number].displacement(at.phi, at.z));
+        let stuck = |number: usize| FrictionMode::Stick(self.frictions[number].displacement(at.phi, at.z));
         for &place in &resting {
             let is_other = |number: usize| number != place && resting.contains(&number);
-            let others: Vec<Mode> = (0..options.len())
-                .map(|number| if is_other(number) { stuck(number) } else { Mode::Open })
+            let others: Vec<FrictionMode> = (0..options.len())
+                .map(|number| if is_other(number) { stuck(number) } else { FrictionMode::Open })
                 .collect();
-            if !Room::new(self, at, closed, &others).is_held(place) {
+            if !FreeDisplacements::new(self, at, closed, &others).is_held(place) {
                 continue;
             }
             let strained = match pushed[place] {
-                Some(sign) => vec![Mode::Strained(sign)],
-                None => vec![Mode::Strained(1.0), Mode::Strained(-1.0)],
+                Some(sign) => vec![FrictionMode::Strained(sign)],
+                None => vec![FrictionMode::Strained(1.0), FrictionMode::Strained(-1.0)],
             };
             let first = usize::from(pushed[place].is_none());
             options[place].splice(first..first, strained);
@@ -212,7 +223,7 @@ impl Mechanism {
 }
 
 /// The places that may rest.
-fn resting(options: &[Vec<Mode>], pushed: &[Option<f64>]) -> Vec<usize> {
+fn resting(options: &[Vec<FrictionMode>], pushed: &[Option<f64>]) -> Vec<usize> {
     let rests = |number: &usize| options[*number].len() > 1 || pushed[*number].is_some();
     (0..options.len()).filter(rests).collect()
 }

@@ -18,8 +18,8 @@
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), sections 8.2 and
 //! 8.3.
 
-use super::super::constraint::Posture;
-use super::super::contact::metric::{Gradient, Metric};
+use super::super::constraint::ConstraintArguments;
+use super::super::contact::metric::{ContactMetric, MetricRow};
 use super::super::{Mechanism, Time};
 use crate::arithmetic::Real;
 use nalgebra::DVector;
@@ -49,7 +49,7 @@ pub struct Shocks<T = f64> {
 
 /// What the impulse at one wall does.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Way {
+struct ImpulseEffect {
     /// True where the point takes the least normal velocity, else the least impulse.
     is_pressed: bool,
     /// Sign of the velocity of what slides, 0 of what sticks.
@@ -88,8 +88,8 @@ impl<T: Real> Shocks<T> {
     /// others do; without friction.
     pub fn pressed(&self, walls: &[usize]) -> Option<Vec<T>> {
         let nothing = vec![T::ZERO; self.restitution.len()];
-        let way = |i| Way { is_pressed: walls.contains(&i), slides: 0.0 };
-        let ways: Vec<Way> = (0..nothing.len()).map(way).collect();
+        let way = |i| ImpulseEffect { is_pressed: walls.contains(&i), slides: 0.0 };
+        let ways: Vec<ImpulseEffect> = (0..nothing.len()).map(way).collect();
         self.impulses_of(&self.velocity, &nothing, &nothing, &ways)
     }
 
@@ -102,11 +102,11 @@ impl<T: Real> Shocks<T> {
 
     /// The impulses of a phase from these velocities on.
     fn phase(&self, from: &[T], least: &[T], rebound: &[T]) -> Option<Vec<T>> {
-        let ways: Vec<Vec<Way>> = (0..least.len()).map(|i| self.ways(i, from, least[i])).collect();
+        let ways: Vec<Vec<ImpulseEffect>> = (0..least.len()).map(|i| self.ways(i, from, least[i])).collect();
         let total = ways.iter().try_fold(1_usize, |all, of| all.checked_mul(of.len()));
         let total = total.filter(|&total| total <= MOST)?;
         (0..total).find_map(|mut number| {
-            let way: Vec<Way> = (ways.iter())
+            let way: Vec<ImpulseEffect> = (ways.iter())
                 .map(|of| {
                     let own = of[number % of.len()];
                     number /= of.len();
@@ -124,7 +124,7 @@ impl<T: Real> Shocks<T> {
     }
 
     /// What a wall may do, first what changes least.
-    fn ways(&self, i: usize, from: &[T], least: T) -> Vec<Way> {
+    fn ways(&self, i: usize, from: &[T], least: T) -> Vec<ImpulseEffect> {
         let ahead = from[from.len() / 2 + i];
         let still = self.still();
         let slides: &[f64] = match self.coefficients[i] {
@@ -133,14 +133,14 @@ impl<T: Real> Shocks<T> {
             _ if ahead < -still => &[-1.0, 0.0, 1.0],
             _ => &[0.0, 1.0, -1.0],
         };
-        let way = |is_pressed| slides.iter().map(move |&slides| Way { is_pressed, slides });
+        let way = |is_pressed| slides.iter().map(move |&slides| ImpulseEffect { is_pressed, slides });
         // Without an impulse there is no friction.
         let few = if least > T::ZERO { slides.len() } else { 1 };
         way(true).chain(way(false).take(few)).collect()
     }
 
     /// The impulses that go these ways, wherever they lead; `None` where there are none.
-    fn impulses_of(&self, from: &[T], least: &[T], rebound: &[T], way: &[Way]) -> Option<Vec<T>> {
+    fn impulses_of(&self, from: &[T], least: &[T], rebound: &[T], way: &[ImpulseEffect]) -> Option<Vec<T>> {
         let (count, size) = (way.len(), from.len());
         let mut impulse = vec![T::ZERO; size];
         let mut unknown = Vec::new();
@@ -188,7 +188,7 @@ impl<T: Real> Shocks<T> {
     }
 
     /// Whether impulses and velocities after them are such as these ways claim.
-    fn fits(&self, from: &[T], least: &[T], rebound: &[T], way: &[Way], impulse: &[T]) -> bool {
+    fn fits(&self, from: &[T], least: &[T], rebound: &[T], way: &[ImpulseEffect], impulse: &[T]) -> bool {
         let count = way.len();
         let after = self.after(from, impulse);
         let speed = self.still();
@@ -302,15 +302,15 @@ impl Mechanism {
         phi: &[f64],
         omega: &[f64],
     ) -> Option<Impacts> {
-        let (metric, z) = (Metric::at(self, t, phi, omega)?, self.elements(phi));
-        let at = Posture { phi, z: &z, omega };
+        let (metric, z) = (ContactMetric::at(self, t, phi, omega)?, self.elements(phi));
+        let at = ConstraintArguments { phi, z: &z, omega };
         let before = metric.velocity(omega);
         let kept = metric.kept(&before);
-        let normals: Vec<Gradient> =
-            contacts.iter().map(|&contact| Gradient::of(&self.contacts[contact].row, t, at)).collect();
+        let normals: Vec<MetricRow> =
+            contacts.iter().map(|&contact| MetricRow::of(&self.contacts[contact].row, t, at)).collect();
         let frictions: Vec<_> = contacts.iter().map(|&contact| self.friction_at(contact)).collect();
         let along = frictions.iter().map(|friction| match friction {
-            Some(friction) => metric.column(&Gradient::of(&friction.tangent, t, at).along),
+            Some(friction) => metric.column(&MetricRow::of(&friction.tangent, t, at).along),
             None => DVector::zeros(omega.len()),
         });
         let columns: Vec<DVector<f64>> =

@@ -2,7 +2,7 @@
 
 use super::{Bias, Kernel, dot};
 use crate::arithmetic::Real;
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::schur::{self, NEAR};
 use crate::dynamics::tree::{self, size};
 use crate::dynamics::{Mechanism, Time};
@@ -24,7 +24,7 @@ impl<T: Real> Kernel<T> {
             self.vibrate::<N>(mechanism, vibration);
         }
         let is_biased = bias != Bias::default();
-        let posture = Posture { phi, z: &self.z[..n], omega };
+        let posture = ConstraintArguments { phi, z: &self.z[..n], omega };
         let (all, multiplier, correction) =
             (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
         let load = &mut self.load[..n];
@@ -83,7 +83,7 @@ impl<T: Real> Kernel<T> {
     /// C, G, C_t, gamma of every row, and nothing else.
     pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         let n = mechanism.tree.coordinates;
-        let posture = Posture { phi, z: &self.z, omega };
+        let posture = ConstraintArguments { phi, z: &self.z, omega };
         if let Some(bodywise) = &mut self.bodywise {
             bodywise.rows_at(mechanism, t, posture, &mut self.rows);
             return;

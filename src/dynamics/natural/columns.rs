@@ -6,23 +6,23 @@
 //! S mu = r,   a body whose pivot is less than a share DROPPED of its scale is left out, its multiplier zero
 //! ```
 
-use super::reduced::Reduced;
+use super::reduced::ReducedMatrices;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::row::{Row, load};
 use crate::dynamics::schur::DROPPED;
 
 /// W column by column, in lanes over its rows; lanes beyond the last body are zero.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Columns<const B: usize> {
+pub struct LaneColumns<const B: usize> {
     /// xx, xy, yx, yy of every column \[1/(kg·m²)\].
     pub blocks: Vec<[Row<B>; 4]>,
     /// What the pivots of S are measured against.
     pub scale: Vec<f64>,
 }
 
-impl<const B: usize> Columns<B> {
+impl<const B: usize> LaneColumns<B> {
     /// Of a mechanism's matrices; there must be room, and no translational coordinates.
-    pub fn new(reduced: &Reduced) -> Self {
+    pub fn new(reduced: &ReducedMatrices) -> Self {
         let n = reduced.free.len();
         let mut blocks = vec![[[[0.0; 4]; B]; 4]; n];
         for (i, row) in reduced.inverse.chunks(n.max(1)).enumerate() {

@@ -10,13 +10,13 @@
 
 use super::Natural;
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
-use crate::dynamics::constraint::{Aim, Linearised, Posture};
+use crate::dynamics::constraint::{Aim, ConstraintArguments, Linearised};
 use crate::dynamics::{Mechanism, State, Time};
 use std::sync::Arc;
 
 /// A guide and the formula that is taken off it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Coupling {
+pub struct GuideCoupling {
     /// The number of the guide.
     pub guide: usize,
     aim: Arc<Aim>,
@@ -24,7 +24,7 @@ pub struct Coupling {
 
 /// Angles with their whole turns at a position from which others are less than half a turn away.
 #[derive(Clone, Debug, Default)]
-pub struct Whole {
+pub struct NearestTurns {
     z: Vec<Complex<DoubleDouble>>,
     /// One a body \[rad\].
     angles: Vec<DoubleDouble>,
@@ -32,7 +32,7 @@ pub struct Whole {
 
 /// What the formulas of all couplings come to at one position.
 #[derive(Clone, Debug, Default)]
-pub struct Coupled<T> {
+pub struct CouplingTerms<T> {
     /// Gradients (couplings × n).
     pub gradients: Vec<Complex<T>>,
     /// C, C_t and C'' at zero acceleration of -f, coupling by coupling.
@@ -43,21 +43,21 @@ pub struct Coupled<T> {
 }
 
 /// The couplings among guides with these rows of a mechanism.
-pub(super) fn couplings(mechanism: &Mechanism, rows: impl Iterator<Item = usize>) -> Vec<Coupling> {
+pub(super) fn couplings(mechanism: &Mechanism, rows: impl Iterator<Item = usize>) -> Vec<GuideCoupling> {
     let of = |(guide, row): (usize, usize)| {
-        Some(Coupling { guide, aim: Arc::clone(mechanism.constraints[row].aim.as_ref()?) })
+        Some(GuideCoupling { guide, aim: Arc::clone(mechanism.constraints[row].aim.as_ref()?) })
     };
     rows.enumerate().filter_map(of).collect()
 }
 
-impl Coupling {
+impl GuideCoupling {
     /// The bodies whose angle it gives; none where it gives a travel.
     pub fn angles(&self) -> &[usize] {
         &self.aim.angles
     }
 }
 
-impl Whole {
+impl NearestTurns {
     /// Takes over elements and the whole turns of bodies.
     pub fn set(&mut self, z: &[Complex<DoubleDouble>], turns: &[i64]) {
         self.z.clear();
@@ -82,12 +82,12 @@ impl Whole {
     }
 }
 
-impl<T: Real> Coupled<T> {
+impl<T: Real> CouplingTerms<T> {
     /// Finds all of it at elements `z` with rates `rate`, which count for C'' only and may be left out.
     pub fn evaluate(
         &mut self,
-        couplings: &[Coupling],
-        (t, whole): (Time, &Whole),
+        couplings: &[GuideCoupling],
+        (t, whole): (Time, &NearestTurns),
         z: &[Complex<T>],
         rate: &[Complex<T>],
     ) {
@@ -110,7 +110,7 @@ impl<T: Real> Coupled<T> {
         }
         for (coupling, gradient) in couplings.iter().zip(self.gradients.chunks_mut(n)) {
             self.slopes.fill(T::ZERO);
-            let at = Posture { phi: &self.phi, z, omega: &self.omega };
+            let at = ConstraintArguments { phi: &self.phi, z, omega: &self.omega };
             let mut row = Linearised { position: T::ZERO, drive: T::ZERO, convective: T::ZERO };
             coupling.aim.subtract(t, at, &mut self.slopes, &mut row);
             for k in coupling.aim.coordinates() {
@@ -144,7 +144,7 @@ impl Natural {
         if self.couplings.is_empty() {
             return;
         }
-        let (mut whole, mut coupled) = (Whole::default(), Coupled::default());
+        let (mut whole, mut coupled) = (NearestTurns::default(), CouplingTerms::default());
         let pairs: Vec<_> = z.iter().map(|&z| Complex::of(z)).collect();
         whole.set(&pairs, turns);
         coupled.evaluate(&self.couplings, (t, &whole), z, rate);
@@ -166,7 +166,7 @@ impl Natural {
         if self.couplings.is_empty() {
             return residuals;
         }
-        let (mut whole, mut coupled) = (Whole::default(), Coupled::default());
+        let (mut whole, mut coupled) = (NearestTurns::default(), CouplingTerms::default());
         whole.set(z, &state.turns);
         coupled.evaluate(&self.couplings, (state.time, &whole), z, &[]);
         for (number, coupling) in self.couplings.iter().enumerate() {

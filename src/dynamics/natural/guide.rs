@@ -11,7 +11,7 @@
 
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::Time;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::law::Law;
 
 /// A row in the loop.
@@ -22,7 +22,7 @@ pub struct Guide {
     /// Its name.
     pub name: String,
     /// What it measures.
-    pub measure: Measure,
+    pub measure: RowMeasure,
     /// What that is to be; `None`: zero.
     pub law: Option<Law>,
     /// True where C is an angle.
@@ -72,7 +72,7 @@ impl Guide {
         let still = Demand { unit: Complex::new(T::ONE, T::ZERO), ..Demand::default() };
         let Some(law) = &self.law else { return still };
         match &self.measure {
-            Measure::Angle { .. } => {
+            RowMeasure::Angle { .. } => {
                 let phase = law.at::<T>(t);
                 Demand {
                     unit: phase.unit,
@@ -81,7 +81,7 @@ impl Guide {
                     acceleration: phase.acceleration,
                 }
             }
-            Measure::Place(_) => {
+            RowMeasure::Place(_) => {
                 let (rate, acceleration) = law.rates::<T>(t);
                 Demand { travel: law.value(t), rate, acceleration, ..still }
             }
@@ -92,8 +92,8 @@ impl Guide {
     #[inline(always)]
     pub fn value<T: Scalar>(&self, demand: &Demand<T>, z: &[Complex<T>]) -> T {
         match &self.measure {
-            Measure::Angle { .. } => self.mismatch(demand, z).im,
-            Measure::Place(place) => place.value(z) - demand.travel,
+            RowMeasure::Angle { .. } => self.mismatch(demand, z).im,
+            RowMeasure::Place(place) => place.value(z) - demand.travel,
         }
     }
 
@@ -101,11 +101,11 @@ impl Guide {
     #[inline(always)]
     pub fn mismatch<T: Scalar>(&self, demand: &Demand<T>, z: &[Complex<T>]) -> Complex<T> {
         match &self.measure {
-            Measure::Angle { body, base } => {
+            RowMeasure::Angle { body, base } => {
                 let direct = demand.unit.conj() * z[*body];
                 base.map_or(direct, |base| direct * z[base].conj())
             }
-            Measure::Place(_) => Complex::new(T::ONE, T::ZERO),
+            RowMeasure::Place(_) => Complex::new(T::ONE, T::ZERO),
         }
     }
 
@@ -113,8 +113,8 @@ impl Guide {
     #[inline(always)]
     pub fn slip<T: Scalar>(&self, demand: &Demand<T>, z: &[Complex<T>], x: &[Complex<T>]) -> T {
         match &self.measure {
-            Measure::Angle { .. } => self.turned(demand, z, x).im,
-            Measure::Place(place) => {
+            RowMeasure::Angle { .. } => self.turned(demand, z, x).im,
+            RowMeasure::Place(place) => {
                 let mut sum = T::ZERO;
                 place.gradients(z, |k, gradient| sum += gradient.dot(x[k]));
                 sum
@@ -126,11 +126,11 @@ impl Guide {
     #[inline(always)]
     fn turned<T: Scalar>(&self, demand: &Demand<T>, z: &[Complex<T>], x: &[Complex<T>]) -> Complex<T> {
         match &self.measure {
-            Measure::Angle { body, base: None } => demand.unit.conj() * x[*body],
-            Measure::Angle { body, base: Some(base) } => {
+            RowMeasure::Angle { body, base: None } => demand.unit.conj() * x[*body],
+            RowMeasure::Angle { body, base: Some(base) } => {
                 demand.unit.conj() * (x[*body] * z[*base].conj() + z[*body] * x[*base].conj())
             }
-            Measure::Place(_) => Complex::ZERO,
+            RowMeasure::Place(_) => Complex::ZERO,
         }
     }
 
@@ -138,9 +138,11 @@ impl Guide {
     #[inline(always)]
     pub fn square<T: Scalar>(&self, demand: &Demand<T>, x: &[Complex<T>]) -> T {
         match &self.measure {
-            Measure::Angle { body, base: Some(base) } => (demand.unit.conj() * x[*body] * x[*base].conj()).im,
-            Measure::Angle { base: None, .. } => T::ZERO,
-            Measure::Place(place) => {
+            RowMeasure::Angle { body, base: Some(base) } => {
+                (demand.unit.conj() * x[*body] * x[*base].conj()).im
+            }
+            RowMeasure::Angle { base: None, .. } => T::ZERO,
+            RowMeasure::Place(place) => {
                 place.bilinear.iter().fold(T::ZERO, |sum, &(j, k, h)| sum + x[j].dot(x[k].turn(h)))
             }
         }
@@ -156,12 +158,12 @@ impl Guide {
     #[inline(always)]
     pub fn gradient<T: Scalar>(&self, demand: &Demand<T>, z: &[Complex<T>], gradient: &mut [Complex<T>]) {
         match &self.measure {
-            Measure::Angle { body, base: None } => gradient[*body] += demand.unit.left(),
-            Measure::Angle { body, base: Some(base) } => {
+            RowMeasure::Angle { body, base: None } => gradient[*body] += demand.unit.left(),
+            RowMeasure::Angle { body, base: Some(base) } => {
                 gradient[*body] += (demand.unit * z[*base]).left();
                 gradient[*base] -= (demand.unit.conj() * z[*body]).left();
             }
-            Measure::Place(place) => place.gradients(z, |k, part| gradient[k] += part),
+            RowMeasure::Place(place) => place.gradients(z, |k, part| gradient[k] += part),
         }
     }
 
@@ -170,14 +172,14 @@ impl Guide {
         let cross = 2.0 * self.square(demand, rate);
         match &self.measure {
             // u' = i theta' u and u'' = (i theta'' - theta'²) u, conjugated.
-            Measure::Angle { .. } => {
+            RowMeasure::Angle { .. } => {
                 let first = Complex::new(0.0, -demand.rate);
                 let second = Complex::new(-demand.rate * demand.rate, -demand.acceleration);
                 cross
                     + (first * self.turned(demand, z, rate)).times(2.0).im
                     + (second * self.mismatch(demand, z)).im
             }
-            Measure::Place(_) => cross - demand.acceleration,
+            RowMeasure::Place(_) => cross - demand.acceleration,
         }
     }
 }

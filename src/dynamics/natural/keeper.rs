@@ -9,8 +9,8 @@
 //! The shortest way in the metric of the mass matrix, as that of the angle form to first order; with one set
 //! of factors for both levels.
 
-use super::columns::{self, Columns};
-use super::reduced::{self, Reduced};
+use super::columns::{self, LaneColumns};
+use super::reduced::{self, ReducedMatrices};
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::row::{Row, at, load, store};
@@ -22,11 +22,11 @@ pub const CLOSE: f64 = 1e-9;
 
 /// Constants of the mechanism, and its matrices at a posture; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
-pub struct Keeper<const B: usize> {
+pub struct NaturalKeeper<const B: usize> {
     /// W.
-    pub columns: Columns<B>,
+    pub columns: LaneColumns<B>,
     /// The linear rows.
-    rows: Vec<Linear<B>>,
+    rows: Vec<LinearTerms<B>>,
     /// S, then S⁻¹, column by column.
     pub schur: Vec<Row<B>>,
     /// V: x and y, column by column.
@@ -35,7 +35,7 @@ pub struct Keeper<const B: usize> {
 
 /// Elements and gradients of a row, its constant, and its column of R.
 #[derive(Clone, Debug)]
-struct Linear<const B: usize> {
+struct LinearTerms<const B: usize> {
     terms: Vec<(usize, Complex<f64>)>,
     constant: f64,
     back: [Row<B>; 2],
@@ -52,20 +52,20 @@ pub struct Moved<const B: usize> {
     pub left: f64,
 }
 
-impl<const B: usize> Keeper<B> {
+impl<const B: usize> NaturalKeeper<B> {
     /// Of a mechanism's matrices; there must be room, and no translational coordinates.
-    pub fn new(reduced: &Reduced) -> Self {
+    pub fn new(reduced: &ReducedMatrices) -> Self {
         let n = reduced.free.len();
         let zero = [[0.0; 4]; B];
-        let row = |(row, back): (&reduced::Linear, &[Complex<f64>])| {
+        let row = |(row, back): (&reduced::LinearRow, &[Complex<f64>])| {
             let mut lanes = [zero; 2];
             for (i, back) in back.iter().enumerate() {
                 (lanes[0][i / 4][i % 4], lanes[1][i / 4][i % 4]) = (back.re, back.im);
             }
-            Linear { terms: row.place.linear.clone(), constant: row.place.constant, back: lanes }
+            LinearTerms { terms: row.place.linear.clone(), constant: row.place.constant, back: lanes }
         };
         Self {
-            columns: Columns::new(reduced),
+            columns: LaneColumns::new(reduced),
             rows: reduced.rows.iter().zip(reduced.back.chunks(n.max(1))).map(row).collect(),
             schur: vec![zero; n],
             minv_jt: vec![[zero; 2]; n],
@@ -130,7 +130,7 @@ impl<const B: usize> Keeper<B> {
 
     /// R (C x + c).
     #[inline(always)]
-    fn onto_rows<L: Lanes>(&self, x: &[Row<B>; 2], constant: impl Fn(&Linear<B>) -> f64) -> [[L; B]; 2] {
+    fn onto_rows<L: Lanes>(&self, x: &[Row<B>; 2], constant: impl Fn(&LinearTerms<B>) -> f64) -> [[L; B]; 2] {
         let mut change = [[L::ZERO; B]; 2];
         for row in &self.rows {
             let far = row

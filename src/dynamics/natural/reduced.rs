@@ -27,7 +27,7 @@ pub type Block = [f64; 4];
 
 /// A linear row with constant coefficients.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Linear {
+pub struct LinearRow {
     /// Its number in the mechanism.
     pub row: usize,
     /// C, without bilinear terms.
@@ -36,7 +36,7 @@ pub struct Linear {
 
 /// The matrices.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reduced {
+pub struct ReducedMatrices {
     /// Number of elements n.
     elements: usize,
     /// W, block by block (n × n) \[1/(kg·m²)\].
@@ -44,7 +44,7 @@ pub struct Reduced {
     /// Largest entry of D⁻¹ on the diagonal of each element (n): what pivots are measured against.
     pub free: Vec<f64>,
     /// The linear rows that are not dependent on others.
-    pub rows: Vec<Linear>,
+    pub rows: Vec<LinearRow>,
     /// R, row by row of C (rows × n).
     pub back: Vec<Complex<f64>>,
 }
@@ -55,9 +55,9 @@ pub fn times(block: &Block, x: Complex<f64>) -> Complex<f64> {
     Complex::new(block[0] * x.re + block[1] * x.im, block[2] * x.re + block[3] * x.im)
 }
 
-impl Reduced {
+impl ReducedMatrices {
     /// Of a mechanism and its linear rows; the error is the body whose pivot vanishes.
-    pub fn new(mechanism: &Mechanism, linear: Vec<Linear>) -> Result<Self, usize> {
+    pub fn new(mechanism: &Mechanism, linear: Vec<LinearRow>) -> Result<Self, usize> {
         let n = mechanism.coordinates();
         let inverse = invert(mechanism)?;
         let spread = |x: &[Complex<DoubleDouble>]| -> Vec<Complex<DoubleDouble>> {

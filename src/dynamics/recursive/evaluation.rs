@@ -1,15 +1,15 @@
 //! One evaluation of the equations body by body, in place of the dense matrices of
 //! [`Kernel`](crate::dynamics::kernel::Kernel).
 
-use super::load::{Order, Passes};
-use super::rows::{Rows, Ways};
+use super::load::{InwardRequest, Passes};
+use super::rows::{RecursiveRows, Ways};
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::compile::Body;
-use crate::dynamics::constraint::{ConstraintEquation, Linearised, Posture};
+use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation, Linearised};
 use crate::dynamics::forest::Forest;
 use crate::dynamics::kernel::Bias;
-use crate::dynamics::rank::{Metric, Verdict};
+use crate::dynamics::rank::{Metric, RankVerdict};
 use crate::dynamics::schur::Weakest;
 use crate::dynamics::{Mechanism, Time};
 use std::sync::Arc;
@@ -52,7 +52,7 @@ impl Recursion {
 pub struct Evaluation<T> {
     recursion: Arc<Recursion>,
     trees: Recursive<T>,
-    rows: Rows<T>,
+    rows: RecursiveRows<T>,
     /// One row's Jacobian on its way (n), zero in between.
     jacobian: Vec<T>,
 }
@@ -63,7 +63,7 @@ impl<T: Real> Evaluation<T> {
     pub fn new(recursion: &Arc<Recursion>, scales: &[f64], metric: Metric) -> Self {
         Self {
             trees: Recursive::new(&recursion.links),
-            rows: Rows::new(&recursion.ways, scales, metric),
+            rows: RecursiveRows::new(&recursion.ways, scales, metric),
             jacobian: vec![T::ZERO; recursion.links.coordinates()],
             recursion: Arc::clone(recursion),
         }
@@ -97,7 +97,7 @@ impl<T: Real> Evaluation<T> {
         &mut self,
         mechanism: &Mechanism,
         t: Time,
-        at: Posture<T>,
+        at: ConstraintArguments<T>,
         stretch: &[T],
         load: &mut [T],
     ) -> T {
@@ -125,7 +125,7 @@ impl<T: Real> Evaluation<T> {
         &mut self,
         mechanism: &Mechanism,
         t: Time,
-        at: Posture<T>,
+        at: ConstraintArguments<T>,
         bias: Bias,
         found: (&mut [Linearised<T>], &mut [T], &mut [T]),
     ) -> Weakest {
@@ -177,7 +177,7 @@ impl<T: Real> Evaluation<T> {
 
     /// What is left of the load of one order of a series.
     #[inline]
-    pub fn inward_loads(&mut self, passes: &mut Passes<T>, order: Order<T>) {
+    pub fn inward_loads(&mut self, passes: &mut Passes<T>, order: InwardRequest<T>) {
         passes.inward_loads(&self.recursion.links, &mut self.trees, order);
     }
 
@@ -194,7 +194,13 @@ impl<T: Real> Evaluation<T> {
     }
 
     /// C, G, C_t, gamma of every row, and nothing else.
-    pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, at: Posture<T>, rows: &mut [Linearised<T>]) {
+    pub fn rows_at(
+        &mut self,
+        mechanism: &Mechanism,
+        t: Time,
+        at: ConstraintArguments<T>,
+        rows: &mut [Linearised<T>],
+    ) {
         for (r, row) in mechanism.constraints.iter().enumerate() {
             rows[r] = row.linearise(t, at, &mut self.jacobian);
             self.rows.take(&self.recursion.ways, r, &mut self.jacobian);
@@ -207,7 +213,7 @@ impl<T: Real> Evaluation<T> {
     }
 
     /// The rank of the rows, after [`rows_at`](Self::rows_at).
-    pub fn judge(&self) -> Verdict {
+    pub fn judge(&self) -> RankVerdict {
         self.rows.judge(&self.recursion.ways)
     }
 

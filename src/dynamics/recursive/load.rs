@@ -32,14 +32,14 @@ struct Brace<T> {
 
 /// What a body passes on inwards: F, u·F with its moment, G and conj(r) G.
 #[derive(Clone, Copy, Debug, Default)]
-struct Passed<T> {
+struct InwardLoad<T> {
     force: Complex<T>,
     torque: T,
     carried: Complex<T>,
     felt: Complex<T>,
 }
 
-impl<T: Real> Passed<T> {
+impl<T: Real> InwardLoad<T> {
     fn join(&mut self, other: Self) {
         self.force += other.force;
         self.torque += other.torque;
@@ -50,7 +50,7 @@ impl<T: Real> Passed<T> {
 
 /// What a body is asked for on the way inwards, element by element.
 #[derive(Clone, Copy, Debug)]
-pub struct Order<'a, T> {
+pub struct InwardRequest<'a, T> {
     /// z.
     pub z: &'a [Complex<T>],
     /// x, as far as it is known.
@@ -73,7 +73,7 @@ pub struct Passes<T> {
     /// a and alpha of what forks.
     forks: Vec<(Complex<T>, T)>,
     /// Sums over the bodies that hang on a fork; zero between passes.
-    outer: Vec<Passed<T>>,
+    outer: Vec<InwardLoad<T>>,
 }
 
 impl<T: Real> Passes<T> {
@@ -85,7 +85,7 @@ impl<T: Real> Passes<T> {
             braces: vec![Brace::default(); n],
             inner: vec![Complex::ZERO; n],
             forks: vec![(Complex::ZERO, T::ZERO); n],
-            outer: vec![Passed::default(); n],
+            outer: vec![InwardLoad::default(); n],
         }
     }
 
@@ -100,12 +100,12 @@ impl<T: Real> Passes<T> {
 
     /// A of what is known of x, and what is left of the load, into the joints.
     #[inline]
-    pub fn inward_loads(&mut self, links: &Links, trees: &mut Recursive<T>, order: Order<T>) {
+    pub fn inward_loads(&mut self, links: &Links, trees: &mut Recursive<T>, order: InwardRequest<T>) {
         let all = &links.links[..];
         let n = all.len();
         let (carried, braces, inner) = (&self.carried[..n], &self.braces[..n], &mut self.inner[..n]);
         let (joints, forks) = (&mut trees.joints[..], &mut self.outer[..n]);
-        let Order { z, known, rest, load } = order;
+        let InwardRequest { z, known, rest, load } = order;
         let (mut at, mut last) = (Complex::ZERO, Complex::ZERO);
         for k in 1..n {
             let link = &all[k];
@@ -120,7 +120,7 @@ impl<T: Real> Passes<T> {
             inner[k] = at;
             last = known[link.body];
         }
-        let mut outer = Passed::default();
+        let mut outer = InwardLoad::default();
         for k in (1..n).rev() {
             let (link, brace) = (&all[k], &braces[k]);
             if link.forks {
@@ -130,7 +130,7 @@ impl<T: Real> Passes<T> {
             let excess = load[link.body] - z[link.body].cross(rest_here) - outer.torque;
             joints[link.body].excess = excess;
             let sum = outer.carried + known[link.body] * carried[k];
-            let passed = Passed {
+            let passed = InwardLoad {
                 force: outer.force + brace.share.times(excess),
                 torque: brace.lever.dot(outer.force) + brace.back * excess,
                 carried: sum,
@@ -149,7 +149,7 @@ impl<T: Real> Passes<T> {
                 joints[x].excess = along;
                 joints[x + 1].excess = load[x + 1] - force.im - joints[x].moment.re * along;
             }
-            outer = Passed::default();
+            outer = InwardLoad::default();
         }
     }
 

@@ -13,12 +13,12 @@
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::envelope::{Envelope, compact_order};
-use crate::dynamics::rank::{Metric, Verdict};
+use crate::dynamics::rank::{Metric, RankVerdict};
 use crate::dynamics::schur::{DROPPED, NEAR, Weakest};
 
 /// One coordinate on a row's way to the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Step {
+struct RowCoordinate {
     /// The coordinate.
     coordinate: usize,
     /// Place of the body; 0 for the coordinates of an origin.
@@ -31,7 +31,7 @@ struct Step {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ways {
     /// Outer bodies first, row by row.
-    steps: Vec<Step>,
+    steps: Vec<RowCoordinate>,
     /// Where each row's steps begin, and where the last one's end.
     first: Vec<usize>,
     /// Place of each row in S.
@@ -121,10 +121,10 @@ impl Ways {
             if (here.origin_point, here.parent) == (0, 0) {
                 branches.push(here.body);
             }
-            self.steps.push(Step { coordinate: here.body, link, onto });
+            self.steps.push(RowCoordinate { coordinate: here.body, link, onto });
         }
         self.steps.extend(
-            translations.iter().flat_map(|&x| [(x, 1), (x + 1, 0)]).map(|(coordinate, onto)| Step {
+            translations.iter().flat_map(|&x| [(x, 1), (x + 1, 0)]).map(|(coordinate, onto)| RowCoordinate {
                 coordinate,
                 link: 0,
                 onto,
@@ -181,9 +181,9 @@ impl Ways {
     }
 }
 
-/// Rows at one moment; nothing is allocated after [`Rows::new`].
+/// Rows at one moment; nothing is allocated after [`RecursiveRows::new`].
 #[derive(Clone, Debug)]
-pub struct Rows<T> {
+pub struct RecursiveRows<T> {
     /// G, step by step.
     gradient: Vec<T>,
     /// e, step by step.
@@ -202,7 +202,7 @@ pub struct Rows<T> {
     right: Vec<T>,
 }
 
-impl<T: Real> Rows<T> {
+impl<T: Real> RecursiveRows<T> {
     /// Scratch space for the rows of these ways, with their
     /// [scales](crate::dynamics::row::ConstraintEquation::scale).
     pub fn new(ways: &Ways, scales: &[f64], metric: Metric) -> Self {
@@ -280,7 +280,7 @@ impl<T: Real> Rows<T> {
     }
 
     /// The rank of the rows, in the order of S.
-    pub fn judge(&self, ways: &Ways) -> Verdict {
+    pub fn judge(&self, ways: &Ways) -> RankVerdict {
         let gradient: Vec<f64> = self.gradient.iter().map(|gradient| gradient.value()).collect();
         let (mut matrix, mut shares) = (vec![0.0; ways.entries()], vec![0.0; ways.rows()]);
         let mut pivot = shares.clone();

@@ -10,8 +10,8 @@ use super::coefficient::SeriesNumber;
 use super::factors::{CauchyFactor, Scale, VectorFactor};
 use super::polynomial::{copy, copy_vectors, product, zeros};
 use crate::arithmetic::Complex;
-use crate::dynamics::force::action::Kind;
-use crate::dynamics::force::{Action, Torsion};
+use crate::dynamics::force::action::Applied;
+use crate::dynamics::force::{AppliedAction, Torsion};
 
 /// Series of one applied force or torque, powers 0 to P.
 #[derive(Clone, Debug)]
@@ -57,8 +57,8 @@ impl<T: SeriesNumber> ActionFactors<T> {
 
 impl<T: SeriesNumber> ActionSeries<T> {
     /// Room for powers up to `order`.
-    pub fn new(action: &Action<T::Constant>, order: usize) -> Self {
-        let is_force = matches!(action.kind, Kind::Force { .. });
+    pub fn new(action: &AppliedAction<T::Constant>, order: usize) -> Self {
+        let is_force = matches!(action.kind, Applied::Force { .. });
         let vectors = || vec![Complex::ZERO; if is_force { order + 1 } else { 0 }];
         Self {
             factor: zeros(order + 1),
@@ -80,7 +80,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
     }
 
     /// The law's series about time `t`.
-    pub fn begin(&mut self, action: &Action<T::Constant>, t: T::Time) {
+    pub fn begin(&mut self, action: &AppliedAction<T::Constant>, t: T::Time) {
         self.factor.fill(T::ZERO);
         if let Some(law) = &action.law {
             T::add_law(law, 1.0, t, &mut self.factor, 0, 1);
@@ -95,7 +95,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
     #[inline(always)]
     pub fn act(
         &mut self,
-        action: &Action<T::Constant>,
+        action: &AppliedAction<T::Constant>,
         m: usize,
         z: &[Complex<T>],
         n: usize,
@@ -109,7 +109,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
             factors.factor.push(scale, self.factor[m]);
         }
         match &action.kind {
-            Kind::Force { point, force, follows } => {
+            Applied::Force { point, force, follows } => {
                 self.force[m] = if let (true, Some(factors)) = (*follows, &mut self.factors) {
                     factors.turned.push(scale, z[m * n + action.body].turn(*force));
                     factors.turned.times(&factors.factor, scale, m, 0..=m)
@@ -122,7 +122,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
                 self.velocity[m] = point.turned(&z[(m + 1) * n..(m + 2) * n]).times(T::of((m + 1) as f64));
                 point.take_off(self.force[m], rest);
             }
-            Kind::Torque { torque, base } => {
+            Applied::Torque { torque, base } => {
                 let torque = self.factor[m].by(*torque);
                 load[action.body] += torque;
                 if let Some(base) = base {
@@ -134,9 +134,15 @@ impl<T: SeriesNumber> ActionSeries<T> {
 
     /// Power m of its power \[W/s^m\], from power m of all rates.
     #[inline(always)]
-    pub fn power(&mut self, action: &Action<T::Constant>, m: usize, omega: &[T], scale: &Scale<T>) -> T {
+    pub fn power(
+        &mut self,
+        action: &AppliedAction<T::Constant>,
+        m: usize,
+        omega: &[T],
+        scale: &Scale<T>,
+    ) -> T {
         match &action.kind {
-            Kind::Force { .. } => match &mut self.factors {
+            Applied::Force { .. } => match &mut self.factors {
                 Some(factors) => {
                     factors.force.push(scale, self.force[m]);
                     factors.velocity.push(scale, self.velocity[m]);
@@ -144,7 +150,7 @@ impl<T: SeriesNumber> ActionSeries<T> {
                 }
                 None => product(&self.force[..=m], &self.velocity[..=m], |a, b| a.dot(b)),
             },
-            Kind::Torque { torque, base } => {
+            Applied::Torque { torque, base } => {
                 self.rate[m] = base.map_or(omega[action.body], |base| omega[action.body] - omega[base]);
                 let power = match &mut self.factors {
                     Some(factors) => {

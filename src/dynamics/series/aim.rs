@@ -10,18 +10,18 @@
 
 use super::coefficient::SeriesNumber;
 use super::factors::Scale;
-use super::tape::Powers;
-use super::user::At;
+use super::tape::TapePowers;
+use super::user::PowersAt;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::Aim;
-use crate::dynamics::constraint::aim::Input;
+use crate::dynamics::constraint::aim::AimInput;
 use std::sync::Arc;
 
 /// Series of one aim, powers 0 to P.
 #[derive(Clone, Debug)]
 pub struct AimSeries<T: SeriesNumber> {
     aim: Arc<Aim<T::Constant>>,
-    powers: Powers<T>,
+    powers: TapePowers<T>,
     /// Elements from this one on are translational coordinates.
     angles: usize,
     /// What f'' has at the present power without the accelerations of that power.
@@ -31,8 +31,8 @@ pub struct AimSeries<T: SeriesNumber> {
 impl<T: SeriesNumber> AimSeries<T> {
     /// Room for powers up to `order`, of a motion whose first so many elements are angles.
     pub fn new(aim: &Arc<Aim<T::Constant>>, angles: usize, order: usize) -> Self {
-        let is_number = |input: u32| matches!(aim.inputs[input as usize], Input::Number(_));
-        let powers = Powers::new(&aim.tape, order, is_number);
+        let is_number = |input: u32| matches!(aim.inputs[input as usize], AimInput::Number(_));
+        let powers = TapePowers::new(&aim.tape, order, is_number);
         Self { aim: Arc::clone(aim), powers, angles, known: T::ZERO }
     }
 
@@ -44,7 +44,7 @@ impl<T: SeriesNumber> AimSeries<T> {
     /// Finds power m of the aim and its derivatives, from the powers up to m of the motion's elements and
     /// rates.
     #[inline(always)]
-    pub fn advance(&mut self, m: usize, at: At<T>, scale: &Scale<T>) {
+    pub fn advance(&mut self, m: usize, at: PowersAt<T>, scale: &Scale<T>) {
         self.advance_tape(m, at, scale);
         let n = at.n;
         let mut accelerations = T::ZERO;
@@ -58,7 +58,7 @@ impl<T: SeriesNumber> AimSeries<T> {
     }
 
     /// All powers of the aim of a motion that is expanded, as many as there is room for.
-    pub fn values(&mut self, order: usize, at: At<T>) -> &[T] {
+    pub fn values(&mut self, order: usize, at: PowersAt<T>) -> &[T] {
         for m in 0..=order {
             self.advance_tape(m, at, &Scale::<T>::default());
         }
@@ -66,22 +66,22 @@ impl<T: SeriesNumber> AimSeries<T> {
     }
 
     #[inline(always)]
-    fn advance_tape(&mut self, m: usize, at: At<T>, scale: &Scale<T>) {
+    fn advance_tape(&mut self, m: usize, at: PowersAt<T>, scale: &Scale<T>) {
         let (n, aim, angles) = (at.n, &*self.aim, self.angles);
         let input = |number: u32| match (aim.inputs[number as usize], m) {
-            (Input::Number(number), 0) => T::constant(aim.numbers[number]),
-            (Input::Number(_), _) => T::ZERO,
-            (Input::Time, 0) => at.time,
-            (Input::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
-            (Input::Angle(k), 0) => at.phi[k],
-            (Input::Angle(k), m) => at.omega[(m - 1) * n + k] / T::of(m as f64),
-            (Input::Cosine(k), m) => at.z[m * n + k].re,
-            (Input::Sine(k), m) => at.z[m * n + k].im,
+            (AimInput::Number(number), 0) => T::constant(aim.numbers[number]),
+            (AimInput::Number(_), _) => T::ZERO,
+            (AimInput::Time, 0) => at.time,
+            (AimInput::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
+            (AimInput::Angle(k), 0) => at.phi[k],
+            (AimInput::Angle(k), m) => at.omega[(m - 1) * n + k] / T::of(m as f64),
+            (AimInput::Cosine(k), m) => at.z[m * n + k].re,
+            (AimInput::Sine(k), m) => at.z[m * n + k].im,
             // A coordinate of an origin is part of the element at the place of its x.
-            (Input::Origin(k), m) if (k - angles).is_multiple_of(2) => at.z[m * n + k].re,
-            (Input::Origin(k), m) => at.z[m * n + k - 1].im,
+            (AimInput::Origin(k), m) if (k - angles).is_multiple_of(2) => at.z[m * n + k].re,
+            (AimInput::Origin(k), m) => at.z[m * n + k - 1].im,
             // Elements are known to one power more, and the aim with them.
-            (Input::Rate(k), m) => at.omega.get(m * n + k).copied().unwrap_or(T::ZERO),
+            (AimInput::Rate(k), m) => at.omega.get(m * n + k).copied().unwrap_or(T::ZERO),
         };
         self.powers.advance(&aim.tape, m, scale, input);
     }

@@ -9,7 +9,7 @@ use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::Mechanism;
 use crate::dynamics::recursive::Evaluation;
-use crate::dynamics::recursive::load::{Order, Passes};
+use crate::dynamics::recursive::load::{InwardRequest, Passes};
 
 /// Elements that are worked on at once.
 const BLOCK: usize = 8;
@@ -79,7 +79,8 @@ impl<T: SeriesNumber> Series<T> {
             *load -= sum.re + sum.im;
         }
         let rest = &mut self.rest[m * n..(m + 1) * n];
-        evaluation.inward_loads(passes, Order { z: &self.z[..n], known: bend, rest, load: &self.load });
+        evaluation
+            .inward_loads(passes, InwardRequest { z: &self.z[..n], known: bend, rest, load: &self.load });
         if !self.rows.is_empty() {
             evaluation.settle(self.rows.known(m, &self.z, bend));
             self.rows.push(m, &self.z[..n], rest);

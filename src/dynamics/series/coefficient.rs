@@ -2,13 +2,13 @@
 
 use super::factors::Factored;
 use super::{Series, bodywise, drive};
-use crate::arithmetic::lanes::wide::Task;
+use crate::arithmetic::lanes::wide::SlotTask;
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Over, Real};
 use crate::dynamics::compile::Body;
 use crate::dynamics::constraint::ConstraintEquation;
-use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
+use crate::dynamics::force::{AppliedAction, CompiledSpring, Torsion, UserForce};
 use crate::dynamics::forest::Forest;
-use crate::dynamics::friction::Friction;
+use crate::dynamics::friction::CompiledFriction;
 use crate::dynamics::law::{Law, Phase};
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::tree::Tree;
@@ -24,11 +24,11 @@ pub struct Terms<'a, C> {
     /// The driven angles.
     pub partition: &'a CoordinatePartition<C>,
     /// Springs and dampers.
-    pub springs: &'a [Spring<C>],
+    pub springs: &'a [CompiledSpring<C>],
     /// Torsion springs and dampers.
     pub torsions: &'a [Torsion<C>],
     /// Applied forces and torques.
-    pub actions: &'a [Action<C>],
+    pub actions: &'a [AppliedAction<C>],
     /// Forces by formulas and from outside the crate.
     pub forces: &'a [UserForce<C>],
     /// Constraint equations.
@@ -41,7 +41,7 @@ pub struct Terms<'a, C> {
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionTerms<'a, C> {
     /// The places it acts at, in the modes of the mechanism.
-    pub places: &'a [Friction<C>],
+    pub places: &'a [CompiledFriction<C>],
     /// The bodies, which need forces.
     pub bodies: &'a [Body<C>],
     /// How they hang.
@@ -121,7 +121,7 @@ pub trait SeriesNumber: Factored + Constants + Over<<Self as Constants>::Constan
 
     /// Performs a task by itself, compiled as the numbers' orders are.
     #[inline(never)]
-    fn perform<K: Task>(task: K) -> K::Output {
+    fn perform<K: SlotTask>(task: K) -> K::Output {
         task.perform()
     }
 

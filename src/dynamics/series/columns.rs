@@ -7,7 +7,7 @@ use super::tangent::Tangent;
 use super::varied::Number;
 use super::{Series, Terms};
 use crate::arithmetic::eight::LANES;
-use crate::arithmetic::lanes::wide::{EightLanes, Single, Slots, Task, Vectors, WideCode};
+use crate::arithmetic::lanes::wide::{EightLanes, Single, SlotTask, Slots, Vectors, WideCode};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::schur::Weakest;
@@ -97,17 +97,17 @@ pub fn columns(
     order: usize,
     count: usize,
 ) -> Box<dyn Columns> {
-    Vectors::default().run(Room { terms, coordinates, order, count })
+    Vectors::default().run(NewColumns { terms, coordinates, order, count })
 }
 
-struct Room<'a, 'b> {
+struct NewColumns<'a, 'b> {
     terms: &'a Terms<'b, Number>,
     coordinates: Coordinates,
     order: usize,
     count: usize,
 }
 
-impl Room<'_, '_> {
+impl NewColumns<'_, '_> {
     fn of<S: Slots + Send>(&self) -> Box<dyn Columns> {
         let fractions = (0..=self.order).map(|m| 1.0 / (m + 1) as f64).collect();
         if let Some(expansion) = Tangent::<S>::new(self.terms, self.coordinates, self.order) {
@@ -115,12 +115,12 @@ impl Room<'_, '_> {
         }
         let series = Series::<InSlots<S>>::of_terms(self.terms, self.coordinates, self.order);
         let room = || vec![InSlots::ZERO; series.coordinates()];
-        let expansion = Whole { begin: [room(), room(), room()], series };
+        let expansion = WholeSeries { begin: [room(), room(), room()], series };
         Box::new(InColumns { expansion, fractions, slots: PhantomData })
     }
 }
 
-impl WideCode for Room<'_, '_> {
+impl WideCode for NewColumns<'_, '_> {
     type Output = Box<dyn Columns>;
 
     #[inline(always)]
@@ -130,7 +130,7 @@ impl WideCode for Room<'_, '_> {
 }
 
 /// Powers of a motion with their derivatives, of one kind or another.
-trait Expansion<S: Slots>: Debug + Send {
+trait ColumnExpansion<S: Slots>: Debug + Send {
     fn coordinates(&self) -> usize;
     fn order(&self) -> usize;
     fn expand_up_to(&mut self, order: usize);
@@ -146,12 +146,12 @@ trait Expansion<S: Slots>: Debug + Send {
 /// Series of numbers with derivatives, and where they begin: coordinates, what the leading part leaves out of
 /// them, and rates.
 #[derive(Debug)]
-struct Whole<S: Slots> {
+struct WholeSeries<S: Slots> {
     series: Series<InSlots<S>>,
     begin: [Vec<InSlots<S>>; 3],
 }
 
-impl<S: Slots + Send> Expansion<S> for Whole<S> {
+impl<S: Slots + Send> ColumnExpansion<S> for WholeSeries<S> {
     fn coordinates(&self) -> usize {
         self.series.coordinates()
     }
@@ -196,7 +196,7 @@ impl<S: Slots + Send> Expansion<S> for Whole<S> {
     }
 }
 
-impl<S: Slots + Send> Expansion<S> for Tangent<S> {
+impl<S: Slots + Send> ColumnExpansion<S> for Tangent<S> {
     fn coordinates(&self) -> usize {
         self.coordinates()
     }
@@ -240,14 +240,14 @@ struct InColumns<S, E> {
     slots: PhantomData<S>,
 }
 
-struct Expand<'a, 'b, S, E> {
+struct ExpandColumns<'a, 'b, S, E> {
     columns: &'a mut InColumns<S, E>,
     terms: &'a Terms<'b, Number>,
     begin: Begin<'a>,
     known: Option<&'a MotionPowers>,
 }
 
-impl<S: Slots, E: Expansion<S>> Task for Expand<'_, '_, S, E> {
+impl<S: Slots, E: ColumnExpansion<S>> SlotTask for ExpandColumns<'_, '_, S, E> {
     type Output = ();
 
     #[inline(always)]
@@ -271,7 +271,7 @@ fn note<S: Slots>(sizes: &mut [f64; LANES], slope: &[f64; LANES], factor: f64) {
     }
 }
 
-impl<S: Slots, E: Expansion<S>> Task for Shares<'_, S, E> {
+impl<S: Slots, E: ColumnExpansion<S>> SlotTask for Shares<'_, S, E> {
     type Output = ();
 
     #[inline(always)]
@@ -314,7 +314,7 @@ struct Advance<'a, S, E> {
     own: &'a mut [Vec<Number>; 2],
 }
 
-impl<S: Slots, E: Expansion<S>> Task for Advance<'_, S, E> {
+impl<S: Slots, E: ColumnExpansion<S>> SlotTask for Advance<'_, S, E> {
     type Output = ();
 
     #[inline(always)]
@@ -336,7 +336,7 @@ impl<S: Slots, E: Expansion<S>> Task for Advance<'_, S, E> {
     }
 }
 
-impl<S: Slots + Send, E: Expansion<S>> Columns for InColumns<S, E> {
+impl<S: Slots + Send, E: ColumnExpansion<S>> Columns for InColumns<S, E> {
     fn coordinates(&self) -> usize {
         self.expansion.coordinates()
     }
@@ -351,7 +351,7 @@ impl<S: Slots + Send, E: Expansion<S>> Columns for InColumns<S, E> {
 
     fn expand(&mut self, terms: &Terms<Number>, begin: Begin, known: Option<&MotionPowers>) -> Weakest {
         self.expansion.prepare(terms, begin, known);
-        S::perform(Expand { columns: self, terms, begin, known });
+        S::perform(ExpandColumns { columns: self, terms, begin, known });
         self.expansion.weakest()
     }
 

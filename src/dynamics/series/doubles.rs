@@ -3,7 +3,7 @@
 use super::polynomial::{copy, copy_vectors};
 use super::{Coefficient, Series, drive};
 use crate::arithmetic::{Complex, DoubleDouble};
-use crate::dynamics::constraint::Measure;
+use crate::dynamics::constraint::RowMeasure;
 use crate::dynamics::impact::{AWAY, Contact};
 use crate::dynamics::{Coordinates, Mechanism, Time};
 
@@ -60,7 +60,7 @@ impl<T: Coefficient> Series<T> {
     /// vectors.
     pub fn gap(&self, contact: &Contact, t: Time, powers: &mut Vec<f64>) {
         powers.clear();
-        let Measure::Place(place) = &contact.row.measure else { return };
+        let RowMeasure::Place(place) = &contact.row.measure else { return };
         if contact.is_off {
             powers.extend([AWAY, 0.0]);
             return;

@@ -233,7 +233,7 @@ pub(super) type Coupled<C> = Vec<(usize, Complex<C>)>;
 
 /// The series of a mechanism's bodies as factors: none of numbers that are multiplied where they stand.
 #[derive(Clone, Debug)]
-pub struct Factors<T: SeriesNumber> {
+pub struct BodyFactors<T: SeriesNumber> {
     pub(super) scale: Scale<T>,
     /// z, w, R, s' and torques of the bodies.
     pub(super) z: Vec<VectorFactor<T>>,
@@ -250,7 +250,7 @@ pub struct Factors<T: SeriesNumber> {
     pub(super) coupled: Vec<Coupled<T::Constant>>,
 }
 
-impl<T: SeriesNumber> Factors<T> {
+impl<T: SeriesNumber> BodyFactors<T> {
     /// Room for so many bodies, up to power `order` of the rates.
     pub fn new(bodies: usize, is_tied: bool, order: usize) -> Self {
         let bodies = if T::HAS_CONSTANTS { bodies } else { 0 };

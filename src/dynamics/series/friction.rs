@@ -33,12 +33,12 @@ use super::Series;
 use super::coefficient::{SeriesNumber, Terms};
 use super::polynomial::copy;
 use super::rows::{RowSeries, turning_terms};
-use super::user::At;
+use super::user::PowersAt;
 use crate::arithmetic::{Complex, Over, Real};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::Body;
-use crate::dynamics::constraint::{ConstraintEquation, Measure, Push, Way};
-use crate::dynamics::friction::{self, Friction, Mode, Normal};
+use crate::dynamics::constraint::{ConstraintEquation, ConstraintForce, ForceDirection, RowMeasure};
+use crate::dynamics::friction::{self, CompiledFriction, FrictionMode, Normal};
 use crate::dynamics::point::Point;
 
 /// Share of the time in which a normal force changes by itself below which a zero ahead counts as passed, in
@@ -77,14 +77,14 @@ pub struct FrictionSeries<T: SeriesNumber> {
 /// A place that sticks, and its normal force.
 #[derive(Clone, Debug)]
 struct Sticking<T: SeriesNumber> {
-    friction: Friction<T::Constant>,
+    friction: CompiledFriction<T::Constant>,
     normal: Vec<Complex<T>>,
 }
 
 /// One place and its series.
 #[derive(Clone, Debug)]
 struct Sliding<T: SeriesNumber> {
-    friction: Friction<T::Constant>,
+    friction: CompiledFriction<T::Constant>,
     /// c.
     coefficient: T,
     /// tau and s'.
@@ -120,7 +120,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
     /// Room for the series of what slides; `None` where nothing does.
     pub fn new(terms: &Terms<T::Constant>, order: usize) -> Option<Self> {
         let (mechanism, known) = (terms.structure, terms.friction?);
-        let place = |friction: &Friction<T::Constant>, coefficient: T::Constant| Sliding {
+        let place = |friction: &CompiledFriction<T::Constant>, coefficient: T::Constant| Sliding {
             friction: friction.clone(),
             coefficient: T::constant(coefficient),
             force: Vec::with_capacity(order),
@@ -134,7 +134,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         let all = || known.places.iter().zip(&mechanism.modes);
         let sliding = all().filter_map(|(friction, mode)| Some(place(friction, mode.coefficient(friction)?)));
         let places: Vec<Sliding<T>> = sliding.collect();
-        let sticks = all().filter(|(_, mode)| T::HAS_CONSTANTS && matches!(mode, Mode::Stick(_)));
+        let sticks = all().filter(|(_, mode)| T::HAS_CONSTANTS && matches!(mode, FrictionMode::Stick(_)));
         let stuck: Vec<Sticking<T>> =
             sticks.map(|(friction, _)| Sticking { friction: friction.clone(), normal: Vec::new() }).collect();
         let centre = |(bar, body): (usize, &Body<T::Constant>)| known.forest.walk(bar, body.centre);
@@ -158,7 +158,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
     /// Adds what the tau below power m put on the elements as these turn to `rest`.
     pub fn geometric_terms(&self, m: usize, z: &[Complex<T>], n: usize, rest: &mut [Complex<T>]) {
         for place in &self.places {
-            if let Measure::Place(tangent) = &place.friction.tangent.measure {
+            if let RowMeasure::Place(tangent) = &place.friction.tangent.measure {
                 turning_terms(tangent, m, z, n, |l| place.force[l], rest);
             }
         }
@@ -173,11 +173,11 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         rest: &mut [Complex<T>],
     ) {
         match &tangent.measure {
-            Measure::Place(place) => {
+            RowMeasure::Place(place) => {
                 place.slopes(z, |k, slope| load[k] -= slope * tau);
                 place.gradients(z, |k, gradient| rest[k] += gradient.times(tau));
             }
-            Measure::Angle { body, base } => {
+            RowMeasure::Angle { body, base } => {
                 load[*body] -= tau;
                 if let Some(base) = base {
                     load[*base] += tau;
@@ -205,7 +205,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
             let acceleration = centre.turned(newest).times(factor) - gravity;
             needed.push(acceleration.times(T::constant(body.mass)) - applied);
         }
-        let mut add = |push: &Option<Push<T::Constant>>, multiplier: &dyn Fn(usize) -> T| {
+        let mut add = |push: &Option<ConstraintForce<T::Constant>>, multiplier: &dyn Fn(usize) -> T| {
             let Some(push) = push else { return };
             let force = (0..=m).fold(Complex::ZERO, |sum, l| {
                 sum + direction(push, &z[(m - l) * n..(m - l + 1) * n], m - l).times(multiplier(l))
@@ -226,7 +226,7 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         self.at_points.add(terms, m, rows, &mut needed);
         let mut carried = Vec::with_capacity(mechanism.joints.len());
         mechanism.pass_on(rows.multipliers(m), &mut needed, &mut carried);
-        let normal = |friction: &Friction<T::Constant>| {
+        let normal = |friction: &CompiledFriction<T::Constant>| {
             mechanism.normal_force(friction, rows.multipliers(m), &carried)
         };
         let slide = self.places.iter().map(|place| normal(&place.friction)).collect();
@@ -310,8 +310,10 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         let n = omega.len();
         for place in &mut self.places {
             let speed = match &place.friction.tangent.measure {
-                Measure::Angle { body, base } => base.map_or(omega[*body], |base| omega[*body] - omega[base]),
-                Measure::Place(tangent) => tangent.power(m + 1, z, n).scale((m + 1) as f64),
+                RowMeasure::Angle { body, base } => {
+                    base.map_or(omega[*body], |base| omega[*body] - omega[base])
+                }
+                RowMeasure::Place(tangent) => tangent.power(m + 1, z, n).scale((m + 1) as f64),
             };
             place.speed.push(speed);
             lost += (0..=m).fold(T::ZERO, |sum, l| sum + place.force[l] * place.speed[m - l]);
@@ -330,12 +332,12 @@ impl<T: SeriesNumber> FrictionSeries<T> {
 }
 
 /// Power m of the direction of a force, from that of the elements.
-fn direction<T: Over<C>, C: Real>(push: &Push<C>, z: &[Complex<T>], m: usize) -> Complex<T> {
+fn direction<T: Over<C>, C: Real>(push: &ConstraintForce<C>, z: &[Complex<T>], m: usize) -> Complex<T> {
     match &push.way {
         _ if m == 0 => push.direction(z),
-        Way::Ground(_) => Complex::ZERO,
-        Way::Body(body, direction) => z[*body].turn(*direction),
-        Way::Span(span, length) => span.turned(z).times(T::constant(C::ONE / *length)),
+        ForceDirection::Ground(_) => Complex::ZERO,
+        ForceDirection::Body(body, direction) => z[*body].turn(*direction),
+        ForceDirection::Span(span, length) => span.turned(z).times(T::constant(C::ONE / *length)),
     }
 }
 
@@ -365,7 +367,7 @@ impl<T: SeriesNumber> Series<T> {
             place.size.push(T::ZERO);
             place.normal.push(Complex::ZERO);
         }
-        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        let at = PowersAt { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
         friction.at_points.advance(terms, m, at, &self.factors.scale);
         self.solve::<0>(terms, m);
         if f > 0 {

@@ -10,11 +10,11 @@ mod number;
 
 use self::constants::{LaneConstants, TermSet};
 pub use self::constants::{OwnNumbers, are_equal};
-use self::landing::{Land, Regularity};
+use self::landing::{ProjectLanes, Regularity};
 use self::number::InLanes;
 use super::Series;
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::wide::{EightLanes, Task, Vectors, WideCode};
+use crate::arithmetic::lanes::wide::{EightLanes, SlotTask, Vectors, WideCode};
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::{Coordinates, Mechanism, Time};
 use std::fmt::Debug;
@@ -24,7 +24,7 @@ pub type Times = [Time; LANES];
 
 /// Motions at the end of a step, about to be brought back onto the constraint equations.
 #[derive(Debug)]
-pub struct Landing<'a> {
+pub struct StepEnds<'a> {
     /// Angles and rates (2f), and what they leave out.
     pub high: &'a mut [Octet],
     /// See [`high`](Self::high).
@@ -51,7 +51,7 @@ pub trait SeriesInLanes: Debug {
 
     /// Brings motions back onto the constraint equations; tells which are on them then.  Of the powers,
     /// [`rates`](Self::rates) and [`power`](Self::power) stay as they are.
-    fn land(&mut self, mechanism: &Mechanism, times: Times, landing: Landing) -> [bool; LANES];
+    fn land(&mut self, mechanism: &Mechanism, times: Times, landing: StepEnds) -> [bool; LANES];
 
     /// Powers 0 … P of the coordinates' rates \[rad/s^(m+1)\], coordinate by coordinate ((P+1) × f).
     fn rates(&self) -> &[Octet];
@@ -82,16 +82,16 @@ pub fn in_lanes(
     order: usize,
     vectors: Vectors,
 ) -> Box<dyn SeriesInLanes> {
-    vectors.run(Room { mechanism, own, order })
+    vectors.run(NewSeriesInLanes { mechanism, own, order })
 }
 
-struct Room<'a> {
+struct NewSeriesInLanes<'a> {
     mechanism: &'a Mechanism,
     own: &'a OwnNumbers,
     order: usize,
 }
 
-impl WideCode for Room<'_> {
+impl WideCode for NewSeriesInLanes<'_> {
     type Output = Box<dyn SeriesInLanes>;
 
     #[inline(always)]
@@ -110,7 +110,7 @@ impl WideCode for Room<'_> {
         if let Some(measures) = &self.own.measures {
             (0..LANES).for_each(|lane| regularity.take_in(lane, measures));
         }
-        Box::new(Whole {
+        Box::new(WholeLanes {
             begin: [room(), room(), room()],
             rates: vec![Octet::default(); (self.order + 1) * f],
             power: vec![Octet::default(); self.order],
@@ -128,7 +128,7 @@ impl WideCode for Room<'_> {
 
 /// Series, where they begin, and what is asked of them.
 #[derive(Debug)]
-struct Whole<W: EightLanes> {
+struct WholeLanes<W: EightLanes> {
     constants: LaneConstants,
     /// True where the terms and the series still have others.
     are_others: bool,
@@ -144,20 +144,21 @@ struct Whole<W: EightLanes> {
     regularity: Regularity,
 }
 
-struct Expand<'a, 'b, W: EightLanes> {
-    whole: &'a mut Whole<W>,
+struct ExpandLanes<'a, 'b, W: EightLanes> {
+    whole: &'a mut WholeLanes<W>,
     mechanism: &'b Mechanism,
     times: Times,
     begin: [&'a [Octet]; 3],
 }
 
-impl<W: EightLanes> Task for Expand<'_, '_, W> {
+impl<W: EightLanes> SlotTask for ExpandLanes<'_, '_, W> {
     type Output = ();
 
     #[inline(always)]
     fn perform(self) {
-        let Whole { series, begin: [u, rest, rate], rates, power, omega, units, regularity, terms, .. } =
-            self.whole;
+        let WholeLanes {
+            series, begin: [u, rest, rate], rates, power, omega, units, regularity, terms, ..
+        } = self.whole;
         let terms = &terms.terms(self.mechanism);
         let [from_u, from_rest, from_rate] = self.begin;
         for c in 0..u.len() {
@@ -185,13 +186,13 @@ impl<W: EightLanes> Task for Expand<'_, '_, W> {
     }
 }
 
-impl<W: EightLanes> SeriesInLanes for Whole<W> {
+impl<W: EightLanes> SeriesInLanes for WholeLanes<W> {
     fn expand(&mut self, mechanism: &Mechanism, times: Times, begin: [&[Octet]; 3]) {
         if std::mem::take(&mut self.are_others) {
             self.terms = self.constants.terms(mechanism);
             self.series.renew(&self.terms.terms(mechanism));
         }
-        W::perform(Expand { whole: self, mechanism, times, begin });
+        W::perform(ExpandLanes { whole: self, mechanism, times, begin });
     }
 
     fn take_in(&mut self, lane: usize, own: &OwnNumbers) {
@@ -205,9 +206,9 @@ impl<W: EightLanes> SeriesInLanes for Whole<W> {
         self.series.rows.is_empty() || self.regularity.holds(lane)
     }
 
-    fn land(&mut self, mechanism: &Mechanism, times: Times, landing: Landing) -> [bool; LANES] {
+    fn land(&mut self, mechanism: &Mechanism, times: Times, landing: StepEnds) -> [bool; LANES] {
         let Self { series, begin, regularity, terms, .. } = self;
-        W::perform(Land { series, regularity, begin, terms: &terms.terms(mechanism), times, landing })
+        W::perform(ProjectLanes { series, regularity, begin, terms: &terms.terms(mechanism), times, landing })
     }
 
     fn rates(&self) -> &[Octet] {

@@ -3,7 +3,7 @@
 use super::factors::{CauchyFactor, Factored};
 use super::{Constants, Series, SeriesNumber, Terms, bodywise, own};
 use crate::arithmetic::Complex;
-use crate::arithmetic::digits::{Digits, Factor, Scale};
+use crate::arithmetic::digits::{Digits, Factor, TimeScale};
 use crate::dynamics::law::{Law, Phase};
 use std::ops::RangeInclusive;
 
@@ -29,29 +29,29 @@ impl<const W: usize> Constants for Digits<W> {
 }
 
 impl<const W: usize> CauchyFactor<Digits<W>> for Factor<W> {
-    type Scale = Scale;
+    type Scale = TimeScale;
     type Ahead = ();
 
     fn new(order: usize) -> Self {
         Self::new(order)
     }
 
-    fn restart(&mut self, scale: &Scale) {
+    fn restart(&mut self, scale: &TimeScale) {
         self.restart(scale);
     }
 
-    fn push(&mut self, scale: &Scale, power: Digits<W>) {
+    fn push(&mut self, scale: &TimeScale, power: Digits<W>) {
         self.push(scale, power);
     }
 
-    fn product(&self, other: &Self, scale: &Scale, total: usize, of: RangeInclusive<usize>) -> Digits<W> {
+    fn product(&self, other: &Self, scale: &TimeScale, total: usize, of: RangeInclusive<usize>) -> Digits<W> {
         self.product(other, scale, total, of)
     }
 
     fn sum_of_products(
         [[a, b], [c, d]]: [[&Self; 2]; 2],
         sign: f64,
-        scale: &Scale,
+        scale: &TimeScale,
         total: usize,
         of: RangeInclusive<usize>,
     ) -> Digits<W> {

@@ -2,23 +2,23 @@
 //! completes.
 
 use super::action;
-use super::factors::{Coupled, Factors};
+use super::factors::{BodyFactors, Coupled};
 use super::polynomial::{UNROLLED, convolve, width};
-use super::{At, Series, SeriesNumber, Terms};
+use super::{PowersAt, Series, SeriesNumber, Terms};
 use crate::arithmetic::Complex;
-use crate::arithmetic::lanes::wide::Task;
+use crate::arithmetic::lanes::wide::SlotTask;
 use crate::dynamics::schur;
 use crate::dynamics::tree::{self, Tree, size};
 use std::ops::Range;
 
 /// A part of an order that is compiled by itself.
-enum Part<'a, 'b, T: SeriesNumber> {
+enum OrderPart<'a, 'b, T: SeriesNumber> {
     Factors { series: &'a mut Series<T>, terms: &'a Terms<'b, T::Constant> },
     Forces { series: &'a mut Series<T>, terms: &'a Terms<'b, T::Constant>, m: usize },
     Rows { series: &'a mut Series<T>, m: usize },
 }
 
-impl<T: SeriesNumber> Task for Part<'_, '_, T> {
+impl<T: SeriesNumber> SlotTask for OrderPart<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -55,7 +55,7 @@ impl<T: SeriesNumber> Series<T> {
             self.invert();
         }
         if !self.rows.is_empty() {
-            T::perform(Part::Factors { series: self, terms });
+            T::perform(OrderPart::Factors { series: self, terms });
         }
     }
 
@@ -128,7 +128,7 @@ impl<T: SeriesNumber> Series<T> {
         let factor = T::of((m + 1) as f64);
         bend[angles..].fill(Complex::ZERO);
         if T::HAS_CONSTANTS {
-            let Factors { scale, z, omega, ahead, .. } = &mut self.factors;
+            let BodyFactors { scale, z, omega, ahead, .. } = &mut self.factors;
             for i in 0..angles {
                 let sum = z[i].turned(&omega[i], scale, m, &mut ahead[i]);
                 let left = sum.left();
@@ -173,7 +173,7 @@ impl<T: SeriesNumber> Series<T> {
         }
         if T::HAS_CONSTANTS {
             // Of l = 0 only, R is not complete yet.
-            let Factors { scale, z: factors, rest: known, ahead, .. } = &mut self.factors;
+            let BodyFactors { scale, z: factors, rest: known, ahead, .. } = &mut self.factors;
             for k in 0..angles {
                 let sum = factors[k].crossed(&known[k], scale, m, &mut ahead[k]);
                 load[k] -= sum + z[k].cross(rest[k]);
@@ -218,7 +218,7 @@ impl<T: SeriesNumber> Series<T> {
                 ends.for_each(|(body, force)| body.iter().for_each(|&body| on_bodies[body] += force));
             }
         }
-        T::perform(Part::Forces { series: self, terms, m });
+        T::perform(OrderPart::Forces { series: self, terms, m });
     }
 
     /// All but springs.
@@ -239,7 +239,7 @@ impl<T: SeriesNumber> Series<T> {
                     on_bodies[action.body] += series.force(m);
                 }
             }
-            let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+            let at = PowersAt { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
             for (force, series) in terms.forces.iter().zip(&mut self.forces) {
                 series.act(force, m, at, (&mut *rest, &mut *applied), &self.factors.scale);
                 if let Some(on_bodies) = &mut on_bodies {
@@ -252,7 +252,7 @@ impl<T: SeriesNumber> Series<T> {
         }
         self.rows.geometric_terms(m, &self.z, n, rest);
         if m > 0 {
-            let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+            let at = PowersAt { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
             self.rows.advance_aims(m, at, &self.factors.scale, &mut self.load);
         }
         if let Some(friction) = &self.friction {
@@ -281,7 +281,7 @@ impl<T: SeriesNumber> Series<T> {
             tree::solve::<T, N>(n, &self.reduced, &self.pivot, &mut self.solution);
         }
         if !self.rows.is_empty() {
-            T::perform(Part::Rows { series: self, m });
+            T::perform(OrderPart::Rows { series: self, m });
         }
         let rest = &mut self.rest[Self::row(m, n)];
         if let Some(&limbs) = self.limbs.get(m + 1) {
@@ -369,7 +369,7 @@ pub(super) fn rows_times<T: SeriesNumber>(matrix: &[T], x: &[T], product: &mut [
 #[inline(always)]
 fn mass_terms<T: SeriesNumber, const N: usize>(
     tree: &Tree<T::Constant>,
-    factors: &Factors<T>,
+    factors: &BodyFactors<T>,
     x: &[Complex<T>],
     rest: &mut [Complex<T>],
 ) {

@@ -18,9 +18,9 @@ pub struct VariedFactor<S> {
 
 /// Powers of a series, values and derivatives.
 #[derive(Clone, Copy)]
-struct Powers<'a, S>(&'a [f64], &'a [S]);
+struct SeriesPowers<'a, S>(&'a [f64], &'a [S]);
 
-impl<S> Powers<'_, S> {
+impl<S> SeriesPowers<'_, S> {
     /// The first ones, so many.
     #[inline(always)]
     fn first(self, count: usize) -> Self {
@@ -28,7 +28,7 @@ impl<S> Powers<'_, S> {
     }
 }
 
-impl<S: Slots> Powers<'_, S> {
+impl<S: Slots> SeriesPowers<'_, S> {
     /// One of them.
     #[inline(always)]
     fn at(self, m: usize) -> InSlots<S> {
@@ -49,7 +49,7 @@ impl<S: Slots> Sum<S> {
 
     /// Adds the product of power j of a and power k of b.
     #[inline(always)]
-    fn add(&mut self, a: Powers<S>, j: usize, b: Powers<S>, k: usize) {
+    fn add(&mut self, a: SeriesPowers<S>, j: usize, b: SeriesPowers<S>, k: usize) {
         let (x, y) = (a.0[j], b.0[k]);
         self.value += x * y;
         self.by_a = a.1[j].mul_add(S::splat(y), self.by_a);
@@ -74,7 +74,7 @@ impl<S: Slots> Sum<S> {
 
 /// `Σ_j a_j b_{m-j}`, and `Σ_j c_j d_{m-j}`.
 #[inline(always)]
-fn two_sums<S: Slots>([[a, b], [c, d]]: [[Powers<S>; 2]; 2]) -> [InSlots<S>; 2] {
+fn two_sums<S: Slots>([[a, b], [c, d]]: [[SeriesPowers<S>; 2]; 2]) -> [InSlots<S>; 2] {
     let count = a.0.len();
     let (a, b, c, d) = (a.first(count), b.first(count), c.first(count), d.first(count));
     let (mut first, mut second) = (Sum::<S>::ZERO, Sum::<S>::ZERO);
@@ -89,19 +89,19 @@ fn two_sums<S: Slots>([[a, b], [c, d]]: [[Powers<S>; 2]; 2]) -> [InSlots<S>; 2] 
 
 impl<S: Slots> VariedFactor<S> {
     #[inline(always)]
-    fn powers(&self, (first, last): (usize, usize)) -> Powers<'_, S> {
-        Powers(&self.values[first..=last], &self.slopes[first..=last])
+    fn powers(&self, (first, last): (usize, usize)) -> SeriesPowers<'_, S> {
+        SeriesPowers(&self.values[first..=last], &self.slopes[first..=last])
     }
 }
 
 /// Sums of the next order on their way: of the two components of z w, and of the two terms of z × R.
 #[derive(Clone, Copy, Debug)]
-pub struct Ahead<S> {
+pub struct SumsAhead<S> {
     turned: [Sum<S>; 2],
     crossed: [Sum<S>; 2],
 }
 
-impl<S: Slots> Default for Ahead<S> {
+impl<S: Slots> Default for SumsAhead<S> {
     fn default() -> Self {
         Self { turned: [Sum::ZERO; 2], crossed: [Sum::ZERO; 2] }
     }
@@ -109,7 +109,7 @@ impl<S: Slots> Default for Ahead<S> {
 
 impl<S: Slots> CauchyFactor<InSlots<S>> for VariedFactor<S> {
     type Scale = ();
-    type Ahead = Ahead<S>;
+    type Ahead = SumsAhead<S>;
 
     fn new(order: usize) -> Self {
         Self { values: vec![0.0; order + 1], slopes: vec![S::ZERO; order + 1], count: 0 }
@@ -185,7 +185,7 @@ impl<S: Slots> CauchyFactor<InSlots<S>> for VariedFactor<S> {
         omega: &Self,
         _scale: &(),
         m: usize,
-        ahead: &mut Ahead<S>,
+        ahead: &mut SumsAhead<S>,
     ) -> [InSlots<S>; 2] {
         let (x, y, w) = (re.powers((0, m + 1)), im.powers((0, m + 1)), omega.powers((0, m)));
         if m % 2 == 1 {
@@ -219,7 +219,7 @@ impl<S: Slots> CauchyFactor<InSlots<S>> for VariedFactor<S> {
         [rest_re, rest_im]: [&Self; 2],
         _scale: &(),
         m: usize,
-        ahead: &mut Ahead<S>,
+        ahead: &mut SumsAhead<S>,
     ) -> InSlots<S> {
         if m == 0 {
             ahead.crossed = [Sum::ZERO; 2];

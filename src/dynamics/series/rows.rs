@@ -23,9 +23,9 @@ use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
 use super::factors::Scale;
 use super::polynomial::{copy, zeros};
-use super::user::At;
+use super::user::PowersAt;
 use crate::arithmetic::{Complex, DoubleDouble, Over, Real};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::law::Law;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::quadratic::Quadratic;
@@ -123,12 +123,12 @@ impl<T: SeriesNumber> RowSeries<T> {
     ) -> Self {
         let mechanism = terms.structure;
         let kind = |row: &ConstraintEquation<T::Constant>| match (&row.measure, &row.law) {
-            (Measure::Angle { .. }, _) if partition.driven() => None,
-            (&Measure::Angle { body, base }, law) => {
+            (RowMeasure::Angle { .. }, _) if partition.driven() => None,
+            (&RowMeasure::Angle { body, base }, law) => {
                 let law = law.clone().unwrap_or_default();
                 Some(Kind::Angle { body, base, law, drive: zeros(order + 1), speed: zeros(order + 1) })
             }
-            (Measure::Place(place), law) => Some(Kind::Place {
+            (RowMeasure::Place(place), law) => Some(Kind::Place {
                 place: place.clone(),
                 law: law.clone(),
                 drive: zeros(if law.is_some() { order + 1 } else { 0 }),
@@ -202,7 +202,7 @@ impl<T: SeriesNumber> RowSeries<T> {
     /// Power m of the aims, and what multipliers below that power exert on the coordinates by them into
     /// `load`.
     #[inline(always)]
-    pub fn advance_aims(&mut self, m: usize, at: At<T>, scale: &Scale<T>, load: &mut [T]) {
+    pub fn advance_aims(&mut self, m: usize, at: PowersAt<T>, scale: &Scale<T>, load: &mut [T]) {
         let r = self.kinds.len();
         for (i, kind) in self.kinds.iter_mut().enumerate() {
             if let Kind::Place { aim: Some(aim), .. } = kind {

@@ -9,7 +9,7 @@ use super::coefficient::SeriesNumber;
 use super::factors::{CauchyFactor, Scale, VectorFactor};
 use super::polynomial::{copy, copy_vectors, product, zeros};
 use crate::arithmetic::{Complex, Scalar};
-use crate::dynamics::force::Spring;
+use crate::dynamics::force::CompiledSpring;
 
 /// Series of one spring, powers 0 to P.
 #[derive(Clone, Debug)]
@@ -74,7 +74,7 @@ impl<T: SeriesNumber> SpringFactors<T> {
 
 impl<T: SeriesNumber> SpringSeries<T> {
     /// Room for the series of a spring up to power `order`.
-    pub fn new(spring: &Spring<T::Constant>, order: usize) -> Self {
+    pub fn new(spring: &CompiledSpring<T::Constant>, order: usize) -> Self {
         let room = |is_wanted: bool| zeros(if is_wanted { order + 1 } else { 0 });
         let (is_long, is_damped) =
             (spring.free_length != T::Constant::ZERO, spring.damping != T::Constant::ZERO);
@@ -108,7 +108,7 @@ impl<T: SeriesNumber> SpringSeries<T> {
     #[inline(always)]
     pub fn force(
         &mut self,
-        spring: &Spring<T::Constant>,
+        spring: &CompiledSpring<T::Constant>,
         m: usize,
         z: &[Complex<T>],
         n: usize,
@@ -167,7 +167,7 @@ impl<T: SeriesNumber> SpringSeries<T> {
     #[inline(always)]
     fn factored_force(
         &mut self,
-        spring: &Spring<T::Constant>,
+        spring: &CompiledSpring<T::Constant>,
         m: usize,
         z: &[Complex<T>],
         n: usize,
@@ -222,7 +222,7 @@ impl<T: SeriesNumber> SpringSeries<T> {
 
     /// Power of the damper at power m \[W/s^m\].
     #[inline(always)]
-    pub fn loss(&self, spring: &Spring<T::Constant>, m: usize, scale: &Scale<T>) -> T {
+    pub fn loss(&self, spring: &CompiledSpring<T::Constant>, m: usize, scale: &Scale<T>) -> T {
         let power = match &self.factors {
             Some(factors) => factors.strain_rate.product(&factors.closing, scale, m, 0..=m),
             None => product(&self.strain_rate[..=m], &self.closing[..=m], |a, b| a * b),

@@ -23,8 +23,8 @@ mod single;
 mod tree;
 mod values;
 
-use self::known::{Gradient, Known};
-use self::products::{Sums, minus_product};
+use self::known::{RowGradient, TangentConstants};
+use self::products::{TangentSums, minus_product};
 use self::single::SinglePair;
 use super::columns::{Begin, MotionPowers};
 use super::varied::Number;
@@ -44,7 +44,7 @@ const BLOCK: usize = 8;
 pub struct Tangent<S> {
     values: Series<f64>,
     begin: [Vec<f64>; 3],
-    known: Known<S>,
+    known: TangentConstants<S>,
     bodies: usize,
     rows: usize,
     /// Room for so many powers of each body.
@@ -67,7 +67,7 @@ pub struct Tangent<S> {
     rate: Vec<S>,
     rest: [Vec<S>; 2],
     /// Sums of the next order on their way.
-    ahead: Vec<Sums<S>>,
+    ahead: Vec<TangentSums<S>>,
     /// All of these of a pair by a single direction.
     single: Option<Box<SinglePair>>,
     /// Of one order: what is left of the equations, the derivatives of z'' so far, and what is new.
@@ -84,7 +84,7 @@ pub struct Tangent<S> {
 impl<S: Slots> Tangent<S> {
     /// Room for the powers of terms, where these are of this kind.
     pub fn new(terms: &Terms<Number>, coordinates: Coordinates, order: usize) -> Option<Self> {
-        let known = Known::of(terms)?;
+        let known = TangentConstants::of(terms)?;
         let values = Series::<f64>::of_terms(&terms.structure.terms(), coordinates, order);
         let (n, r) = (terms.tree.coordinates, terms.constraints.len());
         let is_own = |(k, body): (usize, &DependentAngle)| body.base == Some(k) && body.laws.is_empty();
@@ -117,7 +117,7 @@ impl<S: Slots> Tangent<S> {
             angle: slots(n * room),
             rate: slots(n * room),
             rest: [slots(n * room), slots(n * room)],
-            ahead: vec![Sums::ZERO; n],
+            ahead: vec![TangentSums::ZERO; n],
             single: SinglePair::new(n, r, S::COUNT, order),
             left: slots(size),
             bend: [slots(n), slots(n)],
@@ -300,7 +300,7 @@ impl<S: Slots> Tangent<S> {
         self.left[n..].fill(S::ZERO);
         let [rest_re, rest_im] = &mut self.rest;
         let multipliers = if self.rows > 0 { self.values.multipliers(m) } else { &[] };
-        for &Gradient { row, body, value, slope: [re, im] } in &self.known.gradient {
+        for &RowGradient { row, body, value, slope: [re, im] } in &self.known.gradient {
             let place = body * room + m;
             let z = Complex::new(self.curve[0][place], self.curve[1][place]);
             let multiplier = S::splat(multipliers[row]);
@@ -342,7 +342,7 @@ impl<S: Slots> Tangent<S> {
         }
         self.known.coupling.add(&self.bend, &mut self.rest, room, m);
         let [rest_re, rest_im] = &mut self.rest;
-        for &Gradient { row, body, value, .. } in &self.known.gradient {
+        for &RowGradient { row, body, value, .. } in &self.known.gradient {
             let (place, multiplier) = (body * room + m, self.new[n + row]);
             rest_re[place] = multiplier.mul_add(S::splat(value.re), rest_re[place]);
             rest_im[place] = multiplier.mul_add(S::splat(value.im), rest_im[place]);

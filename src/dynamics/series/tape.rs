@@ -10,14 +10,14 @@ use crate::arithmetic::tape::{Operation, Slot, Tape, TapeSeries};
 
 /// The series of a tape, as the numbers they are of multiply series.
 #[derive(Clone, Debug)]
-pub enum Powers<T: Factored> {
+pub enum TapePowers<T: Factored> {
     /// Plainly.
     Plain(TapeSeries<T>),
     /// As factors.
     Factored(FactorTape<T>),
 }
 
-impl<T: Factored> Powers<T> {
+impl<T: Factored> TapePowers<T> {
     /// Room for powers up to `order`; `is_number` tells the inputs that do not change with time.
     pub fn new(tape: &Tape, order: usize, is_number: impl Fn(u32) -> bool) -> Self {
         match T::HAS_CONSTANTS {
@@ -62,8 +62,8 @@ impl<T: Factored> Powers<T> {
     }
 
     /// The first powers from a series in more digits.
-    pub fn take(&mut self, other: &Powers<DoubleDouble>) {
-        if let (Self::Plain(series), Powers::Plain(other)) = (self, other) {
+    pub fn take(&mut self, other: &TapePowers<DoubleDouble>) {
+        if let (Self::Plain(series), TapePowers::Plain(other)) = (self, other) {
             series.take(other);
         }
     }

@@ -2,15 +2,15 @@
 
 use super::coefficient::SeriesNumber;
 use super::factors::Scale;
-use super::tape::Powers;
+use super::tape::TapePowers;
 use crate::arithmetic::tape::TapeSeries;
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::force::UserForce;
-use crate::dynamics::force::user::Input;
+use crate::dynamics::force::user::ForceInput;
 
 /// Series of one force, powers 0 to P.
 #[derive(Clone, Debug)]
-pub struct UserSeries<T: SeriesNumber>([Powers<T>; 2]);
+pub struct UserSeries<T: SeriesNumber>([TapePowers<T>; 2]);
 
 /// The series of a formula that is recorded as a torque, powers 0 to P.
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ impl<T: SeriesNumber> FormulaSeries<T> {
     }
 
     /// Its powers in a motion that is expanded, as many as there is room for; none where it is 0.
-    pub fn values(&mut self, formula: &UserForce<T::Constant>, order: usize, at: At<T>) -> &[T] {
+    pub fn values(&mut self, formula: &UserForce<T::Constant>, order: usize, at: PowersAt<T>) -> &[T] {
         let part = &formula.parts[1];
         for m in 0..=order {
             let input = |number: u32| at.power(formula, formula.inputs[number as usize], m);
@@ -35,7 +35,7 @@ impl<T: SeriesNumber> FormulaSeries<T> {
 
 /// What the powers of a motion of `n` elements are, as far as they are known.
 #[derive(Clone, Copy)]
-pub struct At<'a, T> {
+pub struct PowersAt<'a, T> {
     /// The time at the start \[s\].
     pub time: T,
     /// Angles at the start \[rad\].
@@ -48,10 +48,10 @@ pub struct At<'a, T> {
     pub n: usize,
 }
 
-impl<T: SeriesNumber> At<'_, T> {
+impl<T: SeriesNumber> PowersAt<'_, T> {
     /// Power `m` of an input.
     #[inline(always)]
-    fn power(&self, force: &UserForce<T::Constant>, input: Input, m: usize) -> T {
+    fn power(&self, force: &UserForce<T::Constant>, input: ForceInput, m: usize) -> T {
         let z = |m: usize| &self.z[m * self.n..(m + 1) * self.n];
         let omega = |m: usize| &self.omega[m * self.n..(m + 1) * self.n];
         let place = |site: usize| {
@@ -60,19 +60,19 @@ impl<T: SeriesNumber> At<'_, T> {
         };
         let velocity = |site: usize| force.sites[site].point.turned(z(m + 1)).times(T::of((m + 1) as f64));
         match (input, m) {
-            (Input::Number(number), 0) => T::constant(force.numbers[number]),
-            (Input::Number(_), _) => T::ZERO,
-            (Input::Time, 0) => self.time,
-            (Input::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
-            (Input::Angle(body), 0) => self.phi[body],
-            (Input::Angle(body), m) => omega(m - 1)[body] / T::of(m as f64),
-            (Input::Rate(body), m) => omega(m)[body],
-            (Input::Cosine(body), m) => z(m)[body].re,
-            (Input::Sine(body), m) => z(m)[body].im,
-            (Input::X(site), _) => place(site).re,
-            (Input::Y(site), _) => place(site).im,
-            (Input::XRate(site), _) => velocity(site).re,
-            (Input::YRate(site), _) => velocity(site).im,
+            (ForceInput::Number(number), 0) => T::constant(force.numbers[number]),
+            (ForceInput::Number(_), _) => T::ZERO,
+            (ForceInput::Time, 0) => self.time,
+            (ForceInput::Time, m) => T::of(if m == 1 { 1.0 } else { 0.0 }),
+            (ForceInput::Angle(body), 0) => self.phi[body],
+            (ForceInput::Angle(body), m) => omega(m - 1)[body] / T::of(m as f64),
+            (ForceInput::Rate(body), m) => omega(m)[body],
+            (ForceInput::Cosine(body), m) => z(m)[body].re,
+            (ForceInput::Sine(body), m) => z(m)[body].im,
+            (ForceInput::X(site), _) => place(site).re,
+            (ForceInput::Y(site), _) => place(site).im,
+            (ForceInput::XRate(site), _) => velocity(site).re,
+            (ForceInput::YRate(site), _) => velocity(site).im,
         }
     }
 }
@@ -80,18 +80,18 @@ impl<T: SeriesNumber> At<'_, T> {
 impl<T: SeriesNumber> UserSeries<T> {
     /// Room for powers up to `order`.
     pub fn new(force: &UserForce<T::Constant>, order: usize) -> Self {
-        let is_number = |input: u32| matches!(force.inputs[input as usize], Input::Number(_));
-        Self(force.parts.each_ref().map(|part| Powers::new(&part.tape, order, is_number)))
+        let is_number = |input: u32| matches!(force.inputs[input as usize], ForceInput::Number(_));
+        Self(force.parts.each_ref().map(|part| TapePowers::new(&part.tape, order, is_number)))
     }
 
     /// False where powers grow by more than products are made for.
     pub fn is_sound(&self) -> bool {
-        self.0.iter().all(Powers::is_sound)
+        self.0.iter().all(TapePowers::is_sound)
     }
 
     /// Finds power m of its forces and torques.
     #[inline(always)]
-    pub fn advance(&mut self, force: &UserForce<T::Constant>, m: usize, at: At<T>, scale: &Scale<T>) {
+    pub fn advance(&mut self, force: &UserForce<T::Constant>, m: usize, at: PowersAt<T>, scale: &Scale<T>) {
         for (part, series) in force.parts.iter().zip(&mut self.0) {
             let input = |number: u32| at.power(force, force.inputs[number as usize], m);
             series.advance(&part.tape, m, scale, input);
@@ -104,7 +104,7 @@ impl<T: SeriesNumber> UserSeries<T> {
         &mut self,
         force: &UserForce<T::Constant>,
         m: usize,
-        at: At<T>,
+        at: PowersAt<T>,
         (rest, load): (&mut [Complex<T>], &mut [T]),
         scale: &Scale<T>,
     ) {

@@ -8,7 +8,7 @@ use super::products::VariedFactor;
 use super::slots::InSlots;
 use super::{Constants, Series, SeriesNumber, Terms, bodywise, own};
 use crate::arithmetic::eight::LANES;
-use crate::arithmetic::lanes::wide::{Slots, Task};
+use crate::arithmetic::lanes::wide::{SlotTask, Slots};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar, Varied};
 use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Phase};
@@ -89,7 +89,7 @@ impl<S: Slots> SeriesNumber for InSlots<S> {
     const HAS_COUPLINGS: bool = true;
 
     #[inline(never)]
-    fn perform<K: Task>(task: K) -> K::Output {
+    fn perform<K: SlotTask>(task: K) -> K::Output {
         S::perform(task)
     }
 

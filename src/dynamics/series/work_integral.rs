@@ -1,7 +1,7 @@
 //! The account of work in the series.
 
 use super::coefficient::{SeriesNumber, Terms};
-use super::factors::{CauchyFactor, Factors};
+use super::factors::{BodyFactors, CauchyFactor};
 use super::{Series, action};
 use crate::arithmetic::Scalar;
 
@@ -21,7 +21,7 @@ impl<T: SeriesNumber> Series<T> {
             {
                 let mut torque =
                     (self.omega[(m + 1) * n + i] * T::of((m + 1) as f64)).by(terms.tree.diagonal[i]);
-                let Factors { scale, z, rest, .. } = &self.factors;
+                let BodyFactors { scale, z, rest, .. } = &self.factors;
                 if T::HAS_CONSTANTS {
                     torque += z[i].cross(&rest[i], scale, m, 0..=m);
                 } else {
@@ -32,7 +32,7 @@ impl<T: SeriesNumber> Series<T> {
                 torque -= self.applied[m * n + i];
                 self.torque[m * n + i] = torque;
                 if T::HAS_CONSTANTS {
-                    let Factors { scale, drive, torque: torques, .. } = &mut self.factors;
+                    let BodyFactors { scale, drive, torque: torques, .. } = &mut self.factors;
                     torques[i].push(scale, torque);
                     power += torques[i].product(&drive[i], scale, m, 0..=m);
                 } else {

@@ -8,9 +8,9 @@ use crate::scene::{listed, nearest};
 
 /// Where columns stand in a row, with their names and units.
 #[derive(Debug)]
-pub struct Columns(Vec<(usize, String, String)>);
+pub struct RowColumns(Vec<(usize, String, String)>);
 
-impl Columns {
+impl RowColumns {
     /// Looks them up by their names in the table, with or without the unit.
     ///
     /// # Errors
@@ -43,7 +43,7 @@ fn parted(head: &str) -> (&str, &str) {
 
 impl Finished<'_> {
     /// These columns.
-    pub fn columns(&self, columns: &Columns) -> OutputsChart {
+    pub fn columns(&self, columns: &RowColumns) -> OutputsChart {
         let (samples, more) = self.window();
         let rows: Vec<Vec<f64>> = samples.iter().map(|sample| row(self.mechanism, sample)).collect();
         let outputs = columns.0.iter().map(|(k, name, unit)| OutputSeries {

@@ -5,7 +5,7 @@ mod drift;
 mod motion;
 mod outputs;
 
-pub use columns::Columns;
+pub use columns::RowColumns;
 pub use drift::{drifts, overlay};
 
 use crate::chart::{
@@ -14,7 +14,7 @@ use crate::chart::{
 use crate::dynamics::Mechanism;
 use crate::dynamics::forest::BodyOrigin;
 use crate::report::curves::{furthest, is_coarse, smoothed, span};
-use crate::report::drawing::Drawing;
+use crate::report::drawing::MechanismDrawing;
 use crate::report::page::{figure, rough};
 use crate::run::{Outcome, Sample};
 use crate::scene::{Place, Scene};
@@ -128,7 +128,7 @@ pub fn columns(
     scene: &Scene,
     mechanism: &Mechanism,
     outcome: &Outcome,
-    columns: &Columns,
+    columns: &RowColumns,
 ) -> Result<Picture, ChartError> {
     chart::outputs(&Finished { scene, mechanism, outcome }.columns(columns), FILE_RESOLUTION)
 }
@@ -157,8 +157,8 @@ struct Finished<'a> {
 }
 
 impl Finished<'_> {
-    fn drawing(&self) -> Drawing<'_> {
-        Drawing { scene: self.scene, mechanism: self.mechanism }
+    fn drawing(&self) -> MechanismDrawing<'_> {
+        MechanismDrawing { scene: self.scene, mechanism: self.mechanism }
     }
 
     fn caption(&self, more: Option<String>) -> Vec<String> {

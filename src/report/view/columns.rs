@@ -28,7 +28,7 @@ pub(super) enum Role {
 
 /// A column of the page.
 #[derive(Clone, Debug)]
-pub(super) struct Shown {
+pub(super) struct ShownColumn {
     pub name: String,
     pub unit: String,
     /// Its number in the trajectory.
@@ -63,7 +63,7 @@ pub(super) fn fits(found: &[String], expected: &[String], folder: &Path) -> Resu
 }
 
 /// The columns of a page, from those of the trajectory; velocities of the centres are left out.
-pub(super) fn columns(mechanism: &Mechanism) -> Vec<Shown> {
+pub(super) fn columns(mechanism: &Mechanism) -> Vec<ShownColumn> {
     let heads = table::header(mechanism);
     let bodies = mechanism.own_bodies().len();
     let motors: Vec<&str> = (0..mechanism.constraints.len())
@@ -80,7 +80,7 @@ pub(super) fn columns(mechanism: &Mechanism) -> Vec<Shown> {
         let (name, unit) = head
             .rsplit_once(" [")
             .map_or((head.as_str(), ""), |(name, unit)| (name, unit.trim_end_matches(']')));
-        let shown = |role| Shown {
+        let shown = |role| ShownColumn {
             name: name.to_owned(),
             unit: if unit == "1" { String::new() } else { unit.to_owned() },
             source,

@@ -3,7 +3,7 @@
 use super::columns::Role;
 use super::{DECADE, Viewed};
 use crate::arithmetic::Complex;
-use crate::html::Column;
+use crate::html::PackedColumn;
 use serde_json::{Value, json};
 
 /// Series of a chart before their own are asked for.
@@ -12,7 +12,7 @@ const SERIES: usize = 12;
 impl Viewed {
     /// How far another run of as many bodies is from this one, as its decimal logarithm: of the ends of all
     /// bars those furthest apart \[m\], at rows of the same time.
-    pub(super) fn distance(&self, other: &Self) -> Option<Column> {
+    pub(super) fn distance(&self, other: &Self) -> Option<PackedColumn> {
         let [mine, theirs] = [self, other].map(Self::poses);
         if mine.len() != theirs.len() {
             return None;
@@ -38,7 +38,7 @@ impl Viewed {
             let apart = if is_same { apart(row, near) } else { 0.0 };
             if apart > 0.0 { libm::log10(apart) } else { f64::NAN }
         });
-        Some(Column {
+        Some(PackedColumn {
             name: format!("distance of {}", other.label),
             unit: "m".to_owned(),
             values: values.collect(),

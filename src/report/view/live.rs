@@ -1,6 +1,6 @@
 //! Runs that are integrated for a page: the reference of one, points of a sweep.
 
-use super::columns::{Role, Shown, columns};
+use super::columns::{Role, ShownColumn, columns};
 use super::{Gathering, ViewError, Viewed};
 use crate::dynamics::Mechanism;
 use crate::report::result::record;
@@ -55,7 +55,7 @@ impl Viewed {
         window: Option<[f64; 2]>,
     ) -> Result<Self, ViewError> {
         let failed = |why: String| ViewError::Run { what: label.to_owned(), why };
-        let mut columns: Vec<Shown> = columns(&mechanism);
+        let mut columns: Vec<ShownColumn> = columns(&mechanism);
         columns.retain(|column| wanted(column.role));
         let mut gathering = Gathering::of(&mechanism, &columns, [plan.until, plan.every], window);
         let scene = Scene { until: plan.until, every: plan.every, ..scene };

@@ -18,14 +18,14 @@ pub use sweep::{holds, swept};
 
 use super::geometry::geometry;
 use crate::dynamics::Mechanism;
-use crate::html::{Column, Document};
+use crate::html::{Document, PackedColumn};
 use crate::run::Sample;
 use crate::run::files::{RECORD, TRAJECTORY, quoted};
 use crate::run::table;
 use crate::run::table_reader::TableReader;
 use crate::scene::{Scene, parse_scene};
-use columns::{Role, Shown, columns, fits};
-use rows::{Kept, Thinning};
+use columns::{Role, ShownColumn, columns, fits};
+use rows::{KeptRows, Thinning};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -46,8 +46,8 @@ pub struct Viewed {
     record: Value,
     scene: Scene,
     mechanism: Arc<Mechanism>,
-    columns: Vec<Shown>,
-    kept: Kept,
+    columns: Vec<ShownColumn>,
+    kept: KeptRows,
 }
 
 /// Rows of a run under way, thinned out for its page.
@@ -65,7 +65,7 @@ impl Gathering {
     }
 
     /// The same with these columns alone.
-    fn of(mechanism: &Mechanism, columns: &[Shown], span: [f64; 2], window: Option<[f64; 2]>) -> Self {
+    fn of(mechanism: &Mechanism, columns: &[ShownColumn], span: [f64; 2], window: Option<[f64; 2]>) -> Self {
         let thinning = thinning(columns, span, window);
         Self { numbers: table::Shown::new(mechanism), row: Vec::new(), thinning }
     }
@@ -83,7 +83,7 @@ impl Gathering {
     }
 }
 
-fn thinning(columns: &[Shown], [until, every]: [f64; 2], window: Option<[f64; 2]>) -> Thinning {
+fn thinning(columns: &[ShownColumn], [until, every]: [f64; 2], window: Option<[f64; 2]>) -> Thinning {
     let rows = (until / every).ceil().clamp(1.0, 1e12) as u64 + 1;
     let treatments = columns.iter().map(|column| (column.source, column.role.treatment())).collect();
     Thinning::new(treatments, rows, window)
@@ -92,11 +92,11 @@ fn thinning(columns: &[Shown], [until, every]: [f64; 2], window: Option<[f64; 2]
 /// The rows of the trajectory in a folder.
 fn kept(
     mechanism: &Mechanism,
-    columns: &[Shown],
+    columns: &[ShownColumn],
     folder: &Path,
     span: [f64; 2],
     window: Option<[f64; 2]>,
-) -> Result<Kept, ViewError> {
+) -> Result<KeptRows, ViewError> {
     let mut reader = TableReader::open(&folder.join(TRAJECTORY))?;
     fits(reader.names(), &table::header(mechanism), folder)?;
     reader.only(columns.iter().map(|column| column.source));
@@ -198,17 +198,17 @@ impl Viewed {
     }
 
     /// Its table.
-    fn table(&self) -> Vec<Column> {
+    fn table(&self) -> Vec<PackedColumn> {
         let range = |k: usize| {
             let values = self.kept.columns[k].iter().copied().filter(|value| value.is_finite());
             let [low, high] =
                 values.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
             (high - low).max(0.0)
         };
-        let is_place = |column: &Shown| column.role == Role::Position;
+        let is_place = |column: &ShownColumn| column.role == Role::Position;
         let reach =
             (0..self.columns.len()).filter(|&k| is_place(&self.columns[k])).map(range).fold(0.0, f64::max);
-        let column = |(k, shown): (usize, &Shown)| Column {
+        let column = |(k, shown): (usize, &ShownColumn)| PackedColumn {
             name: shown.name.clone(),
             unit: shown.unit.clone(),
             values: self.kept.columns[k].clone(),
@@ -263,7 +263,7 @@ impl Viewed {
 pub fn page(runs: &[Viewed]) -> Document {
     let names: Vec<&str> = runs.iter().map(|run| run.label.as_str()).collect();
     let mut data: Vec<Value> = runs.iter().map(Viewed::data).collect();
-    let mut tables: Vec<Vec<Column>> = runs.iter().map(Viewed::table).collect();
+    let mut tables: Vec<Vec<PackedColumn>> = runs.iter().map(Viewed::table).collect();
     let Some((first, others)) = runs.split_first() else { return Document::default() };
     for other in others {
         let distance = first.distance(other);

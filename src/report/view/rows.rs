@@ -22,7 +22,7 @@ pub(super) enum Treatment {
 
 /// The rows kept.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Kept {
+pub(super) struct KeptRows {
     /// Columns, all of one length.
     pub columns: Vec<Vec<f64>>,
     /// The first row kept as it was, and the one after the last.
@@ -41,23 +41,23 @@ pub(super) struct Thinning {
     stretch: u64,
     /// Rows of the window that may be kept.
     most: usize,
-    kept: Kept,
+    kept: KeptRows,
     /// Of the stretch under way: rows seen, its first row and one of its middle, and what is extreme in each
     /// column.
     seen: u64,
     first: Vec<f64>,
     middle: Vec<f64>,
-    extremes: Vec<Extremes>,
+    extremes: Vec<RowExtremes>,
 }
 
 /// The smallest and the largest number of a stretch, each with the number of its row.
 #[derive(Clone, Copy, Debug)]
-struct Extremes {
+struct RowExtremes {
     low: (f64, u64),
     high: (f64, u64),
 }
 
-impl Extremes {
+impl RowExtremes {
     /// Of nothing.
     const NONE: Self = Self { low: (f64::INFINITY, 0), high: (f64::NEG_INFINITY, 0) };
 
@@ -89,11 +89,11 @@ impl Thinning {
             },
             stretch: if is_short { 1 } else { rows.div_ceil(STRETCHES) },
             most: if is_short { usize::MAX } else { (WINDOW * all as f64) as usize },
-            kept: Kept { columns: vec![Vec::new(); count], ..Kept::default() },
+            kept: KeptRows { columns: vec![Vec::new(); count], ..KeptRows::default() },
             seen: 0,
             first: Vec::new(),
             middle: Vec::new(),
-            extremes: vec![Extremes::NONE; count],
+            extremes: vec![RowExtremes::NONE; count],
         }
     }
 
@@ -145,7 +145,7 @@ impl Thinning {
         for ((column, &(source, treatment)), extremes) in
             self.kept.columns.iter_mut().zip(&self.treatments).zip(&mut self.extremes)
         {
-            let Extremes { low, high } = *extremes;
+            let RowExtremes { low, high } = *extremes;
             let pair = if low.1 <= high.1 { [low.0, high.0] } else { [high.0, low.0] };
             let is_missing = low.0 > high.0;
             column.extend((0..count).map(|k| match treatment {
@@ -153,7 +153,7 @@ impl Thinning {
                 _ if is_missing => f64::NAN,
                 _ => treated(pair[k], treatment),
             }));
-            *extremes = Extremes::NONE;
+            *extremes = RowExtremes::NONE;
         }
         self.seen = 0;
     }
@@ -163,7 +163,7 @@ impl Thinning {
     }
 
     /// The rows kept.
-    pub fn finish(mut self) -> Kept {
+    pub fn finish(mut self) -> KeptRows {
         self.close();
         self.kept
     }
@@ -185,7 +185,7 @@ mod tests {
         [(0, Treatment::Row), (1, Treatment::Extremes), (1, Treatment::Row), (2, Treatment::Logarithm)];
 
     /// Rows at whole seconds: a peak a thousand rows, and a drift that is zero at first.
-    fn kept(rows: u64, window: Option<[f64; 2]>) -> Kept {
+    fn kept(rows: u64, window: Option<[f64; 2]>) -> KeptRows {
         let mut thinning = Thinning::new(COLUMNS.to_vec(), rows, window);
         for k in 0..rows {
             let peak = if k % 1000 == 777 { 5.0 } else { (k as f64).sin() };

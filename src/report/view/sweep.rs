@@ -2,8 +2,8 @@
 
 use super::columns::Role;
 use super::{ViewError, Viewed};
-use crate::html::{Column, Document};
-use crate::report::sweep::{Curve, text};
+use crate::html::{Document, PackedColumn};
+use crate::report::sweep::{SweepChart, text};
 use crate::run::{Sweep, Totals};
 use serde_json::{Value, json};
 
@@ -27,7 +27,7 @@ pub fn holds(sweep: &Sweep) -> Result<(), ViewError> {
 }
 
 /// The page: a click on a point shows its motion, or that of the nearest of which it is kept.
-pub fn swept(sweep: &Sweep, curve: &Curve, totals: &Totals) -> Document {
+pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals) -> Document {
     let labels = curve.labels(sweep);
     let axes: Vec<Value> = (sweep.grid().axes().iter().zip(sweep.variables()))
         .map(|(axis, variable)| {
@@ -47,7 +47,7 @@ pub fn swept(sweep: &Sweep, curve: &Curve, totals: &Totals) -> Document {
             runs.push(run);
         }
     }
-    let mut tables: Vec<Vec<Column>> = runs.iter().map(Viewed::table).collect();
+    let mut tables: Vec<Vec<PackedColumn>> = runs.iter().map(Viewed::table).collect();
     let values: Vec<f64> = curve.values().iter().map(|&value| logarithm(value, labels.is_log)).collect();
     tables.push(vec![
         column(&labels.value, values, labels.is_log),
@@ -121,15 +121,15 @@ fn logarithm(value: f64, is_log: bool) -> f64 {
     if is_log { libm::log10(value.abs()) } else { value }
 }
 
-fn column(name: &str, values: Vec<f64>, is_logarithm: bool) -> Column {
+fn column(name: &str, values: Vec<f64>, is_logarithm: bool) -> PackedColumn {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
     let [low, high] = finite().fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], v| [a.min(v), b.max(v)]);
-    Column {
+    PackedColumn {
         name: name.to_owned(),
         quantum: (high - low).max(0.0) / STEPS,
         values,
         is_logarithm,
-        ..Column::default()
+        ..PackedColumn::default()
     }
 }
 

@@ -1,6 +1,6 @@
 //! One setting of one method: how far off it is, and how long it takes.
 
-use super::truth::{Room, Truth};
+use super::truth::{TimeLimit, Truth};
 use crate::arithmetic::sum::larger;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::Limits;
@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 /// What a run was found to be.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Found {
+pub struct RunMeasurement {
     /// Largest distance from the reference as far as that reaches: of an angle \[rad\], or a place over the
     /// mechanism's size.  Not a number where there is no reference.
     pub error: f64,
@@ -30,11 +30,11 @@ pub struct Found {
 }
 
 /// How a measurement ended.
-pub(super) enum Ended {
+pub(super) enum MeasurementEnd {
     /// At the horizon, with the plan as it was carried out.
-    Whole(Found, Box<Plan>),
+    Whole(RunMeasurement, Box<Plan>),
     /// The method stopped on the way.
-    Stopped(Found, StepError),
+    Stopped(RunMeasurement, StepError),
     /// Its time was over, at so many seconds of the motion.
     Late(f64),
     /// It was to be given up.
@@ -47,12 +47,12 @@ pub(super) fn measure(
     start: &Motion,
     plan: Plan,
     truth: &Truth,
-    room: Room,
+    room: TimeLimit,
     is_over: &dyn Fn() -> bool,
-) -> Result<Ended, StepError> {
+) -> Result<MeasurementEnd, StepError> {
     let mut running = Running::new(Run::new(Arc::clone(mechanism), plan, Limits::default(), start)?);
     let plan = running.plan().clone();
-    let mut found = Found {
+    let mut found = RunMeasurement {
         error: f64::NAN,
         rate_error: f64::NAN,
         errors: Vec::new(),
@@ -77,12 +77,12 @@ pub(super) fn measure(
         }
         match gone {
             Ok(true) => break,
-            Ok(false) if is_over() => return Ok(Ended::Over),
-            Ok(false) if is_late() => return Ok(Ended::Late(running.time())),
+            Ok(false) if is_over() => return Ok(MeasurementEnd::Over),
+            Ok(false) if is_late() => return Ok(MeasurementEnd::Late(running.time())),
             Ok(false) => {}
             Err(RunError::Step(stop)) => return Err(stop),
             // Nothing observes that could fail.
-            Err(_) => return Ok(Ended::Over),
+            Err(_) => return Ok(MeasurementEnd::Over),
         }
     }
     let outcome = running.finish();
@@ -92,8 +92,8 @@ pub(super) fn measure(
     found.energy = outcome.drift.energy.max;
     found.statistics = outcome.statistics;
     Ok(match outcome.stop {
-        None => Ended::Whole(found, Box::new(plan)),
-        Some(stop) => Ended::Stopped(found, stop),
+        None => MeasurementEnd::Whole(found, Box::new(plan)),
+        Some(stop) => MeasurementEnd::Stopped(found, stop),
     })
 }
 
@@ -112,7 +112,7 @@ pub(super) fn time(
     start: &Motion,
     plan: &Plan,
     before: Option<f64>,
-    room: Room,
+    room: TimeLimit,
     is_over: &dyn Fn() -> bool,
 ) -> Option<f64> {
     let once = || {

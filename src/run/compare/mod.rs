@@ -19,13 +19,13 @@ mod task;
 mod truth;
 mod verdict;
 
-pub use measure::Found;
+pub use measure::RunMeasurement;
 pub use task::compare;
 pub use truth::Truth;
 pub use verdict::{Advice, LOST, ROUNDING, TARGETS, front};
 
 use super::methods::{MethodId, Stabilization};
-use super::plan::{Plan, Refusal, Request};
+use super::plan::{Plan, Request, RequestRefusal};
 use crate::dynamics::Mechanism;
 use crate::scene::Scene;
 use crate::stepping::StepError;
@@ -52,7 +52,7 @@ impl Asked {
     ///
     /// # Errors
     /// It makes no sense.
-    pub fn horizon(&self, scene: &Scene, mechanism: &Mechanism) -> Result<f64, Refusal> {
+    pub fn horizon(&self, scene: &Scene, mechanism: &Mechanism) -> Result<f64, RequestRefusal> {
         let request = Request { until: self.until, every: self.until, ..Request::default() };
         Plan::new(scene, mechanism, &request).map(|plan| plan.until)
     }
@@ -66,7 +66,7 @@ pub enum Fate {
     /// The method stopped on the way.
     Stopped(StepError),
     /// The method is not for this scene, or not with this stabilization.
-    Refused(Refusal),
+    Refused(RequestRefusal),
     /// It had come to this time \[s\] when its share of the budget was used up; 0 where it was not begun,
     /// since a coarser one took too long.
     Late(f64),
@@ -86,7 +86,7 @@ pub struct Entry {
     /// What became of it.
     pub fate: Fate,
     /// What was found; of a run that stopped, up to there.
-    pub found: Option<Found>,
+    pub found: Option<RunMeasurement>,
     /// Time of a run in each block \[s\].
     pub blocks: Vec<f64>,
 }

@@ -1,12 +1,12 @@
 //! The comparison itself: lines of settings, measured rung by rung and timed round by round.
 
-use super::measure::{Ended, Found};
-use super::truth::{Room, Truth, together};
+use super::measure::{MeasurementEnd, RunMeasurement};
+use super::truth::{TimeLimit, Truth, together};
 use super::{Asked, Comparison, Entry, Fate, Stage, ladder, measure, name};
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::drift::Limits;
 use crate::run::methods::{METHODS, MethodId, Stabilization};
-use crate::run::plan::{Plan, Refusal, Request};
+use crate::run::plan::{Plan, Request, RequestRefusal};
 use crate::run::running::{Run, Running};
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ const GUESS: [f64; 2] = [8.0, 8.0];
 const PARTS: f64 = 200.0;
 
 /// A method with a stabilization, and the settings it has yet to be tried at.
-struct Line {
+struct MethodLine {
     method: MethodId,
     extended: bool,
     stabilize: Option<Stabilization>,
@@ -56,14 +56,14 @@ pub fn compare(
     clock: &dyn Fn() -> Duration,
     see: &mut dyn FnMut(&Stage),
     is_over: &dyn Fn() -> bool,
-) -> Result<Comparison, Refusal> {
+) -> Result<Comparison, RequestRefusal> {
     let until = asked.horizon(scene, mechanism)?;
     let start = mechanism.start(scene);
-    let task = Task { scene, mechanism, start: &start, asked, begin: clock(), clock, is_over };
+    let task = CompareTask { scene, mechanism, start: &start, asked, begin: clock(), clock, is_over };
     Ok(task.run(until, see))
 }
 
-struct Task<'a> {
+struct CompareTask<'a> {
     scene: &'a Scene,
     mechanism: &'a Arc<Mechanism>,
     start: &'a Motion,
@@ -73,7 +73,7 @@ struct Task<'a> {
     is_over: &'a dyn Fn() -> bool,
 }
 
-impl Task<'_> {
+impl CompareTask<'_> {
     fn run(&self, mut until: f64, see: &mut dyn FnMut(&Stage)) -> Comparison {
         let mut notes = Vec::new();
         if let Some((event, t)) = self.ended_by(until) {
@@ -155,8 +155,8 @@ impl Task<'_> {
         steps: impl Fn(MethodId, f64) -> Vec<f64>,
         entries: &mut Vec<Entry>,
         until: f64,
-    ) -> Vec<Line> {
-        let mut lines: Vec<Line> = Vec::new();
+    ) -> Vec<MethodLine> {
+        let mut lines: Vec<MethodLine> = Vec::new();
         let all: Vec<MethodId> = METHODS.iter().map(|info| info.id).collect();
         let methods = if self.asked.methods.is_empty() { &all } else { &self.asked.methods };
         let kinds: Vec<Option<Stabilization>> = match self.asked.stabilize.is_empty() {
@@ -209,7 +209,7 @@ impl Task<'_> {
                         .collect(),
                 };
                 rungs.reverse();
-                lines.push(Line {
+                lines.push(MethodLine {
                     method,
                     extended,
                     stabilize,
@@ -241,12 +241,12 @@ impl Task<'_> {
         };
         let plan = Plan::new(self.scene, self.mechanism, &request).ok()?;
         let begin = (self.clock)();
-        let room = Room { clock: self.clock, seconds: 0.1 };
+        let room = TimeLimit { clock: self.clock, seconds: 0.1 };
         let truth = Truth::none(self.mechanism);
         let reached = match measure::measure(self.mechanism, self.start, plan, &truth, room, self.is_over) {
-            Ok(Ended::Late(t)) => t,
-            Ok(Ended::Stopped(_, stop)) | Err(stop) => stop.t,
-            Ok(Ended::Whole(..) | Ended::Over) => until,
+            Ok(MeasurementEnd::Late(t)) => t,
+            Ok(MeasurementEnd::Stopped(_, stop)) | Err(stop) => stop.t,
+            Ok(MeasurementEnd::Whole(..) | MeasurementEnd::Over) => until,
         };
         let spent = (self.clock)().saturating_sub(begin).as_secs_f64();
         let cost = GUESS[0] * GUESS[1] * lines as f64 * spent / reached.max(f64::MIN_POSITIVE);
@@ -255,7 +255,7 @@ impl Task<'_> {
     }
 
     /// Measures all settings, rung by rung, and times each once.
-    fn measure(&self, comparison: &mut Comparison, lines: &mut [Line], see: &mut dyn FnMut(&Stage)) {
+    fn measure(&self, comparison: &mut Comparison, lines: &mut [MethodLine], see: &mut dyn FnMut(&Stage)) {
         while lines.iter().any(|line| !line.rungs.is_empty()) {
             for number in 0..lines.len() {
                 if (self.is_over)() {
@@ -266,7 +266,7 @@ impl Task<'_> {
                 let Some(request) = line.rungs.pop() else { continue };
                 see(&self.stage(&line.name()));
                 let left = SHARES[2] * self.asked.budget.as_secs_f64() - self.spent().as_secs_f64();
-                let room = Room { clock: self.clock, seconds: (left / open as f64).max(QUANTUM) };
+                let room = TimeLimit { clock: self.clock, seconds: (left / open as f64).max(QUANTUM) };
                 let (entry, is_over) = self.entry(line, &request, &comparison.truth, room);
                 comparison.entries.extend(entry);
                 if is_over {
@@ -277,7 +277,13 @@ impl Task<'_> {
     }
 
     /// Measures one setting; the second is true where it was given up.
-    fn entry(&self, line: &mut Line, request: &Request, truth: &Truth, room: Room) -> (Option<Entry>, bool) {
+    fn entry(
+        &self,
+        line: &mut MethodLine,
+        request: &Request,
+        truth: &Truth,
+        room: TimeLimit,
+    ) -> (Option<Entry>, bool) {
         let plan = match Plan::new(self.scene, self.mechanism, request) {
             Ok(plan) => plan,
             Err(refusal) => {
@@ -295,21 +301,21 @@ impl Task<'_> {
         }
         let begin = (self.clock)();
         match measure::measure(self.mechanism, self.start, plan, truth, room, self.is_over) {
-            Ok(Ended::Over) => return (None, true),
-            Ok(Ended::Late(t)) => {
+            Ok(MeasurementEnd::Over) => return (None, true),
+            Ok(MeasurementEnd::Late(t)) => {
                 entry.fate = Fate::Late(t);
                 line.last = f64::INFINITY;
             }
-            Ok(Ended::Stopped(found, stop)) => {
+            Ok(MeasurementEnd::Stopped(found, stop)) => {
                 entry.fate = Fate::Stopped(stop);
                 entry.found = Some(found);
             }
             Err(stop) => entry.fate = Fate::Stopped(stop),
-            Ok(Ended::Whole(found, plan)) => {
+            Ok(MeasurementEnd::Whole(found, plan)) => {
                 line.last = (self.clock)().saturating_sub(begin).as_secs_f64();
                 line.judge(&found);
                 entry.fate = Fate::Done;
-                let room = Room { clock: self.clock, seconds: QUANTUM };
+                let room = TimeLimit { clock: self.clock, seconds: QUANTUM };
                 let block =
                     measure::time(self.mechanism, self.start, &plan, Some(line.last), room, self.is_over);
                 entry.blocks.extend(block);
@@ -353,7 +359,7 @@ impl Task<'_> {
                 see(&stage);
                 let entry = &mut comparison.entries[number];
                 let Some(plan) = &entry.plan else { continue };
-                let room = Room { clock: self.clock, seconds: QUANTUM };
+                let room = TimeLimit { clock: self.clock, seconds: QUANTUM };
                 let before = entry.blocks.last().copied();
                 entry.blocks.extend(measure::time(
                     self.mechanism,
@@ -372,8 +378,8 @@ impl Task<'_> {
         (self.clock)().saturating_sub(self.begin)
     }
 
-    fn room(&self, share: f64) -> Room<'_> {
-        Room { clock: self.clock, seconds: share * self.asked.budget.as_secs_f64() }
+    fn room(&self, share: f64) -> TimeLimit<'_> {
+        TimeLimit { clock: self.clock, seconds: share * self.asked.budget.as_secs_f64() }
     }
 
     /// What can be told before it is known what all of it takes: no more than the budget.
@@ -384,14 +390,14 @@ impl Task<'_> {
     }
 }
 
-impl Line {
+impl MethodLine {
     fn name(&self) -> String {
         name(self.method, self.extended, self.stabilize)
     }
 
     /// Ends the line where finer settings bring nothing: twice in a row the error, or where there is none to
     /// be had the drift, is no better.
-    fn judge(&mut self, found: &Found) {
+    fn judge(&mut self, found: &RunMeasurement) {
         let figure = if found.error.is_finite() { found.error } else { found.energy };
         // A setting that takes no more evaluations than the one before has made the same steps, and says
         // nothing.
@@ -412,7 +418,7 @@ mod tests {
 
     #[test]
     fn finer_settings_are_tried_as_long_as_they_bring_something() {
-        let mut line = Line {
+        let mut line = MethodLine {
             method: MethodId::Taylor,
             extended: false,
             stabilize: None,
@@ -425,7 +431,7 @@ mod tests {
         let mut statistics = crate::stepping::Statistics::default();
         let mut goes_on = |error: f64| {
             statistics.evaluations += 10;
-            let found = Found {
+            let found = RunMeasurement {
                 error,
                 rate_error: error,
                 errors: Vec::new(),

@@ -5,7 +5,7 @@ use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::methods::MethodId;
 use crate::run::plan::MANY_COORDINATES;
-use crate::run::reference::{Reference, Walk, reference_while, side_by_side};
+use crate::run::reference::{Reference, ReferenceWalk, reference_while, side_by_side};
 use crate::run::trust::DistanceMetric;
 use crate::stepping::StepError;
 use std::sync::Arc;
@@ -103,7 +103,7 @@ impl Truth {
         start: &Motion,
         every: f64,
         until: f64,
-        room: Room,
+        room: TimeLimit,
         is_over: &dyn Fn() -> bool,
     ) -> Self {
         let count = (until / every * (1.0 + 1e-12)).floor() as usize;
@@ -114,8 +114,9 @@ impl Truth {
         let mut pause = room.runs_out(is_over);
         let is_plain = is_in_doubles(mechanism);
         let found = if is_plain {
-            let walk =
-                |tolerance| Walk::in_doubles(mechanism, start, MethodId::Dp8, tolerance, times[count - 1]);
+            let walk = |tolerance| {
+                ReferenceWalk::in_doubles(mechanism, start, MethodId::Dp8, tolerance, times[count - 1])
+            };
             let [fine, coarse] = FINE.map(walk);
             fine.and_then(|fine| Ok(side_by_side(mechanism, [fine, coarse?], &times, 0.0, &mut pause)))
         } else {
@@ -163,13 +164,13 @@ impl Truth {
 
 /// What time there is for something.
 #[derive(Clone, Copy)]
-pub(super) struct Room<'a> {
+pub(super) struct TimeLimit<'a> {
     pub clock: &'a dyn Fn() -> Duration,
     /// \[s\]
     pub seconds: f64,
 }
 
-impl<'a> Room<'a> {
+impl<'a> TimeLimit<'a> {
     /// True from when that time is over, or all is.
     pub(super) fn runs_out(self, is_over: &'a dyn Fn() -> bool) -> impl Fn() -> bool + 'a {
         let begin = (self.clock)();
@@ -211,7 +212,7 @@ pub(super) fn together(
     start: &Motion,
     every: f64,
     until: f64,
-    room: Room,
+    room: TimeLimit,
     is_over: &dyn Fn() -> bool,
 ) -> Together {
     let (method, tolerance) =
@@ -224,11 +225,11 @@ pub(super) fn together(
     let is_late = room.runs_out(is_over);
     let mut reached = 0.0;
     let follow = |reached: &mut f64| -> Result<Option<f64>, StepError> {
-        let begin = |start| Walk::in_doubles(mechanism, start, method, tolerance, Time::from(until));
+        let begin = |start| ReferenceWalk::in_doubles(mechanism, start, method, tolerance, Time::from(until));
         let (mut one, mut other) = (begin(start)?, begin(&near)?);
         while *reached < until && !is_late() {
             let t = (*reached + every.max(GROWTH * *reached)).min(until);
-            let at = |walk: &mut Walk| walk.to(Time::from(t), &mut || is_late());
+            let at = |walk: &mut ReferenceWalk| walk.to(Time::from(t), &mut || is_late());
             let (Some(one), Some(other)) = (at(&mut one)?, at(&mut other)?) else { break };
             let apart = ruler.apart(&one, &other);
             if apart > PARTED || apart.is_nan() {

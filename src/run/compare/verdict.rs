@@ -84,7 +84,7 @@ impl Comparison {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Fate, Found, Truth};
+    use super::super::{Fate, RunMeasurement, Truth};
     use super::*;
     use crate::dynamics::Mechanism;
     use crate::run::MethodId;
@@ -108,7 +108,7 @@ mod tests {
 
     /// A run of `method` with this error and run time \[s\].
     fn entry(method: MethodId, error: f64, seconds: f64) -> Entry {
-        let found = Found {
+        let found = RunMeasurement {
             error,
             rate_error: 0.0,
             errors: Vec::new(),

@@ -8,7 +8,7 @@ use super::super::running::Outcome;
 use super::rest::{Flight, come_to_rest};
 use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
 use crate::arithmetic::{Complex, DoubleDouble};
-use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, Normal, Transition};
 use crate::dynamics::impact::Impact;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::multiplier::Multiplier;
@@ -70,7 +70,7 @@ impl ContactDriver {
         let PresentState { phi, omega, .. } = self.present_state();
         let (impact, striking) = loop {
             // Friction in hinges and sliders takes no part in impacts.
-            let modes = vec![Mode::Open; self.free.frictions.len()];
+            let modes = vec![FrictionMode::Open; self.free.frictions.len()];
             let striking = match modes == self.mechanism.modes {
                 true => Arc::clone(&self.mechanism),
                 false => in_modes(&self.free, &self.mechanism.held, &modes),
@@ -224,8 +224,8 @@ impl ContactDriver {
     /// Lets the point of a wall go that an impact would pull into it.
     fn release(&mut self, pulled: usize, outcome: &mut Outcome) -> Result<(), StepError> {
         let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
-        let open = |(friction, &mode): (&Friction, &Mode)| match friction.normal {
-            Normal::Contact(contact) if contact == pulled => Mode::Open,
+        let open = |(friction, &mode): (&CompiledFriction, &FrictionMode)| match friction.normal {
+            Normal::Contact(contact) if contact == pulled => FrictionMode::Open,
             _ => mode,
         };
         let modes = self.mechanism.frictions.iter().zip(&self.mechanism.modes).map(open).collect();
@@ -236,7 +236,7 @@ impl ContactDriver {
     pub(super) fn switch(
         &mut self,
         contacts: Vec<usize>,
-        modes: Vec<Mode>,
+        modes: Vec<FrictionMode>,
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
         let mut motion = self.motion();
@@ -368,8 +368,12 @@ impl ContactDriver {
 }
 
 /// The mechanism with these contacts held and in these modes; itself where that changes nothing.
-pub(in crate::run) fn in_modes(free: &Arc<Mechanism>, contacts: &[usize], modes: &[Mode]) -> Arc<Mechanism> {
-    if contacts.is_empty() && modes.iter().all(|mode| *mode == Mode::Open) {
+pub(in crate::run) fn in_modes(
+    free: &Arc<Mechanism>,
+    contacts: &[usize],
+    modes: &[FrictionMode],
+) -> Arc<Mechanism> {
+    if contacts.is_empty() && modes.iter().all(|mode| *mode == FrictionMode::Open) {
         return Arc::clone(free);
     }
     Arc::new(free.moving(contacts, modes))

@@ -19,9 +19,9 @@
 use super::super::running::Outcome;
 use super::{ContactDriver, NO_SPEED};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::constraint::Posture;
-use crate::dynamics::contact::metric::Gradient;
-use crate::dynamics::friction::{Mode, Normal};
+use crate::dynamics::constraint::ConstraintArguments;
+use crate::dynamics::contact::metric::MetricRow;
+use crate::dynamics::friction::{FrictionMode, Normal};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
 
@@ -72,12 +72,12 @@ impl Flight {
         let mut modes = held.modes.clone();
         for (friction, mode) in held.frictions.iter().zip(&mut modes) {
             if friction.normal == Normal::Contact(contact) {
-                *mode = Mode::Open;
+                *mode = FrictionMode::Open;
             }
         }
         let course = Course::of(&held.moving(&others, &modes), motion);
-        let Gradient { row, along } =
-            Gradient::of(&wall.row, motion.time, Posture { phi: &phi, z: &z, omega: &omega });
+        let MetricRow { row, along } =
+            MetricRow::of(&wall.row, motion.time, ConstraintArguments { phi: &phi, z: &z, omega: &omega });
         let inward = -(dot(&along, &course.accelerations) + row.convective);
         let last = 2.0 * speed / (inward * (1.0 - wall.restitution));
         (inward > 0.0 && last.is_finite()).then_some(Self { contact, last, course })

@@ -6,7 +6,7 @@ use super::super::running::Outcome;
 use super::impacts::PresentState;
 use super::{ContactDriver, ImpactRecord, NO_SPEED, in_modes};
 use crate::dynamics::Mechanism;
-use crate::dynamics::friction::Mode;
+use crate::dynamics::friction::FrictionMode;
 use crate::dynamics::impact::Impact;
 use crate::stepping::{Cause, StepError};
 
@@ -52,7 +52,7 @@ impl ContactDriver {
         outcome: &mut Outcome,
     ) -> Result<f64, StepError> {
         let PresentState { t, phi, omega, .. } = self.present_state();
-        let modes = vec![Mode::Open; self.free.frictions.len()];
+        let modes = vec![FrictionMode::Open; self.free.frictions.len()];
         let striking = in_modes(&self.free, &[], &modes);
         let Some(impacts) = striking.impact_at_several(contacts, t, &phi, &omega) else {
             let what =

@@ -2,7 +2,7 @@
 
 use super::{ContactDriver, Held, in_modes};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::friction::Mode;
+use crate::dynamics::friction::FrictionMode;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
 use crate::run::driver::DriverState;
@@ -22,7 +22,7 @@ pub(in crate::run) struct ContactDriverState {
     /// Contacts held, in the order of their rows.
     contacts: Vec<usize>,
     /// Modes of the places with friction.
-    modes: Vec<Mode>,
+    modes: Vec<FrictionMode>,
     held: Vec<Held>,
     holds_in_row: usize,
     events_in_row: usize,

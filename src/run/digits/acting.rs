@@ -4,14 +4,14 @@
 //! What closes does so plastically, as in all methods (`run/latch.rs`): its points have to meet, a motor and
 //! a lock without an angle go on from where they are, and the energy lost is booked with the event.
 
-use super::branches::Branches;
+use super::branches::BranchConditions;
 use super::confirm::Probe;
-use super::events::Watch;
+use super::events::EventWatch;
 use super::friction;
 use super::functions::Functions;
-use super::keep::Keeper;
-use super::motion::{LongState, Motion, coordinates_of};
-use super::posture::Posture;
+use super::keep::DigitsKeeper;
+use super::motion::{DigitsMotion, LongState, coordinates_of};
+use super::posture::DigitsCoordinates;
 use super::resting::{self, Unheld};
 use super::wall;
 use crate::arithmetic::digits::Digits;
@@ -28,7 +28,7 @@ const MEETS: f64 = 1e-6;
 /// How far behind a wall a point may be when it begins to stand in the way, over the size of the mechanism.
 const BEHIND: f64 = 1e-9;
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// Lets no event end the motion; where none changes what acts, none is looked for.
     pub(super) fn ends_nowhere(&mut self) {
         let ExactMechanism { events, functions, .. } = &mut self.mechanism;
@@ -36,7 +36,7 @@ impl<const W: usize> Motion<W> {
         if !events.iter().any(|event| event.changes) {
             events.clear();
             functions.clear();
-            self.watch = Watch::default();
+            self.watch = EventWatch::default();
         }
     }
 
@@ -47,8 +47,8 @@ impl<const W: usize> Motion<W> {
         loop {
             let step = self.expanded()?;
             let Some(modes) = self.branches.others(self, step) else { return Ok(step) };
-            if changes == Branches::most(self) {
-                return Err(Branches::slides(self, &modes));
+            if changes == BranchConditions::most(self) {
+                return Err(BranchConditions::slides(self, &modes));
             }
             changes += 1;
             self.let_act(Acting { modes, ..self.state.acting.clone() })?;
@@ -57,7 +57,7 @@ impl<const W: usize> Motion<W> {
 
     /// Lets an event take effect that changes what acts.
     pub(super) fn change(&mut self, event: usize) -> Result<(), StepError> {
-        let Posture { phi, omega, .. } = self.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = self.state_posture();
         let acting = self.mechanism.after(event, self.state.t, &phi, &omega);
         self.let_act(acting)?;
         self.settle_modes_again()
@@ -132,7 +132,7 @@ impl<const W: usize> Motion<W> {
         let coordinates = coordinates_of(&mechanism);
         if coordinates != self.coordinates {
             // A point that stays on its wall needs all coordinates.
-            let Posture { phi, omega, .. } = self.state_posture();
+            let DigitsCoordinates { phi, omega, .. } = self.state_posture();
             self.coordinates = coordinates;
             let none = [vec![false; phi.len()], vec![false; phi.len()]];
             (self.state.u, self.state.rate) = self.independent(&phi, &omega, &none);
@@ -143,8 +143,8 @@ impl<const W: usize> Motion<W> {
         self.series.resolve_reversals(self.precision.rounding(friction::SURE));
         self.probe = Probe::of(&mechanism, self.coordinates);
         self.watch = std::mem::take(&mut self.watch).renewed([&self.mechanism, &mechanism], order);
-        self.branches = Branches::new(Functions::new(&mechanism.conditions, order));
-        self.keeper = Keeper::new(&mechanism, self.precision);
+        self.branches = BranchConditions::new(Functions::new(&mechanism.conditions, order));
+        self.keeper = DigitsKeeper::new(&mechanism, self.precision);
         self.mechanism = mechanism;
         Ok(())
     }
@@ -171,7 +171,7 @@ impl<const W: usize> Motion<W> {
     }
 
     fn residuals_and_rates(&mut self) -> Vec<[Digits<W>; 2]> {
-        let Posture { phi, omega, .. } = self.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = self.state_posture();
         self.keeper.residuals(&self.mechanism, self.state.t, &phi, &omega)
     }
 
@@ -220,7 +220,7 @@ impl<const W: usize> Motion<W> {
 
     /// Kinetic and potential energy of the state \[J\].
     pub(super) fn energy(&self) -> Digits<W> {
-        let Posture { phi, omega, .. } = self.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = self.state_posture();
         let z = self.mechanism.elements(&phi);
         let [kinetic, potential] = self.mechanism.energy(&phi, &omega, &z);
         kinetic + potential

@@ -7,11 +7,11 @@
 //! ([`search`](crate::stepping::search)), as it is for events.
 
 use super::functions::{Functions, LEAVES, SAME, magnitude};
-use super::motion::Motion;
+use super::motion::DigitsMotion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::stepping::search::{Curve, Powers, root, sign};
+use crate::stepping::search::{Curve, PowerSeries, root, sign};
 use crate::stepping::{Cause, StepError};
 
 /// Part of the digits that a condition has to be zero in.
@@ -21,7 +21,7 @@ const CHANGES: usize = 8;
 
 /// The conditions of a mechanism's formulas.
 #[derive(Clone, Debug, Default)]
-pub struct Branches<const W: usize> {
+pub struct BranchConditions<const W: usize> {
     pub functions: Functions<W>,
 }
 
@@ -41,14 +41,14 @@ impl Condition {
         let first = powers.first().map_or(f64::NEG_INFINITY, Digits::log2);
         let is_at_zero = first <= libm::log2(magnitude(&shares)) + rounding;
         let begin = || powers.first().map_or(0, |first| sign(first.value()));
-        let left = || sign(Powers { powers: &shares, end: 1.0 }.at(LEAVES)[0]);
+        let left = || sign(PowerSeries { powers: &shares, end: 1.0 }.at(LEAVES)[0]);
         let side = if is_at_zero { left() } else { begin() };
         Self { side, is_at_zero, shares }
     }
 
     /// Where it first changes its side, as a share of the step.
     fn change(&self) -> Option<f64> {
-        let curve = Powers { powers: &self.shares, end: 1.0 };
+        let curve = PowerSeries { powers: &self.shares, end: 1.0 };
         let after = |share: f64| sign(curve.at(share)[0]);
         if self.side == 0 {
             return None;
@@ -70,14 +70,14 @@ impl Condition {
     }
 }
 
-impl<const W: usize> Branches<W> {
+impl<const W: usize> BranchConditions<W> {
     /// For the conditions of a mechanism.
     pub fn new(functions: Functions<W>) -> Self {
         Self { functions }
     }
 
     /// The branches as a step of so many seconds begins, where they are others than the motion is on.
-    pub fn others(&self, motion: &Motion<W>, step: f64) -> Option<Vec<bool>> {
+    pub fn others(&self, motion: &DigitsMotion<W>, step: f64) -> Option<Vec<bool>> {
         let known = &motion.mechanism.acting.modes;
         let rounding = motion.precision.rounding(SURE);
         let mode = |(powers, &mode): (&Vec<Digits<W>>, &bool)| {
@@ -89,7 +89,7 @@ impl<const W: usize> Branches<W> {
     }
 
     /// The time after which a condition first changes its side within a step of so many seconds \[s\].
-    pub fn change(&self, motion: &Motion<W>, step: f64) -> Option<Digits<W>> {
+    pub fn change(&self, motion: &DigitsMotion<W>, step: f64) -> Option<Digits<W>> {
         let rounding = motion.precision.rounding(SURE);
         let change = |powers: &Vec<Digits<W>>| {
             let share = Condition::new(powers, step, rounding).change()?;
@@ -99,12 +99,12 @@ impl<const W: usize> Branches<W> {
     }
 
     /// As many changes of branches as there may be at one moment.
-    pub fn most(motion: &Motion<W>) -> usize {
+    pub fn most(motion: &DigitsMotion<W>) -> usize {
         motion.mechanism.conditions.len() + CHANGES
     }
 
     /// An error where the branches that the motion is on and these drive it back to each other.
-    pub fn slides(motion: &Motion<W>, modes: &[bool]) -> StepError {
+    pub fn slides(motion: &DigitsMotion<W>, modes: &[bool]) -> StepError {
         let known = motion.mechanism.acting.modes.iter().zip(modes);
         let changing = known.zip(&motion.mechanism.conditions).find(|((known, mode), _)| known != mode);
         let name = changing.map_or("a law", |(_, condition)| &condition.name);

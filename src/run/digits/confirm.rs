@@ -6,7 +6,7 @@
 //! acceleration compared with that of the series; the step is shortened until they agree.  What rises and is
 //! flat again between these times is not seen.
 
-use super::motion::Motion;
+use super::motion::DigitsMotion;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::Coordinates;
@@ -35,7 +35,7 @@ impl<const W: usize> Probe<W> {
 }
 
 /// Of a step of so many seconds as much as the equations confirm.
-pub fn confirmed<const W: usize>(motion: &mut Motion<W>, mut step: f64) -> f64 {
+pub fn confirmed<const W: usize>(motion: &mut DigitsMotion<W>, mut step: f64) -> f64 {
     let Some(mut probe) = motion.probe.take() else { return step };
     for _ in 0..MOST {
         if !step.is_finite() || SHARES.iter().all(|share| agrees(motion, &mut probe, step, share * step)) {
@@ -48,7 +48,7 @@ pub fn confirmed<const W: usize>(motion: &mut Motion<W>, mut step: f64) -> f64 {
 }
 
 /// True where the acceleration of the series at a time after the state's is that of the equations there.
-fn agrees<const W: usize>(motion: &Motion<W>, probe: &mut Probe<W>, step: f64, after: f64) -> bool {
+fn agrees<const W: usize>(motion: &DigitsMotion<W>, probe: &mut Probe<W>, step: f64, after: f64) -> bool {
     let h = Digits::of(after);
     let there = motion.state_at(motion.state.t + h);
     let f = there.u.len();

@@ -8,13 +8,13 @@
 //! formulas converge in them, too.
 
 use super::functions::{Functions, LEAVES, SAME, magnitude};
-use super::motion::Motion;
+use super::motion::DigitsMotion;
 use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::{ExactEvent, ExactMechanism};
 use crate::scene::Direction;
-use crate::stepping::search::{Curve, Powers, root, sign};
+use crate::stepping::search::{Curve, PowerSeries, root, sign};
 
 /// Share of the largest value within a step up to which a formula is at its zero.
 const NO_VALUE: f64 = 1e-12;
@@ -38,10 +38,10 @@ pub struct Happened<const W: usize> {
 
 /// Watches the events of a motion.
 #[derive(Clone, Debug, Default)]
-pub struct Watch<const W: usize> {
+pub struct EventWatch<const W: usize> {
     pub functions: Functions<W>,
     /// What is in the step that is next, and the sides of zero the formulas are on at its end.
-    ahead: Vec<Ahead<W>>,
+    ahead: Vec<EventAhead<W>>,
     ends: Vec<i8>,
     /// The sides they were on at the end of the last one: -1, 1, or 0 where that is not known.
     pub sides: Vec<i8>,
@@ -55,14 +55,14 @@ pub struct Watch<const W: usize> {
 
 /// An event in the step that is next.
 #[derive(Clone, Copy, Debug)]
-struct Ahead<const W: usize> {
+struct EventAhead<const W: usize> {
     event: usize,
     /// How long after the step's begin \[s\].
     after: Digits<W>,
     rises: bool,
 }
 
-impl<const W: usize> Watch<W> {
+impl<const W: usize> EventWatch<W> {
     /// For the events of a mechanism.
     pub fn new(mechanism: &ExactMechanism<Digits<W>>, order: usize) -> Self {
         let functions = Functions::new(&mechanism.functions, order);
@@ -85,15 +85,15 @@ impl<const W: usize> Watch<W> {
     /// where the step `ends_at_corner` of a formula may only touch zero: that is told by the next step.
     pub fn look(
         &mut self,
-        motion: &Motion<W>,
+        motion: &DigitsMotion<W>,
         [step, made]: [f64; 2],
         ends_at_corner: bool,
     ) -> Option<Digits<W>> {
         (self.ahead, self.ends) = self.passing(motion, [step, made], ends_at_corner);
-        let due = self.due.iter().map(|&(event, rises)| Ahead { event, after: Digits::ZERO, rises });
+        let due = self.due.iter().map(|&(event, rises)| EventAhead { event, after: Digits::ZERO, rises });
         self.ahead.splice(0..0, due);
         self.put_off.clear();
-        let is_last = |ahead: &Ahead<W>| {
+        let is_last = |ahead: &EventAhead<W>| {
             let event = &motion.mechanism.events[ahead.event];
             event.stop || event.changes
         };
@@ -104,13 +104,13 @@ impl<const W: usize> Watch<W> {
             return None;
         }
         // What happens at this moment as well is left to the next step.
-        let is_now = |ahead: &&Ahead<W>| (ahead.after - last.after).value() <= SAME * made;
+        let is_now = |ahead: &&EventAhead<W>| (ahead.after - last.after).value() <= SAME * made;
         self.put_off = later.iter().filter(is_now).map(|ahead| (ahead.event, ahead.rises)).collect();
         self.put_off.retain(|(event, _)| *event != last.event);
         let (passing, ends) = self.passing(motion, [last.after.value(), made], false);
         self.ends = ends;
         for (event, side) in self.ends.iter_mut().enumerate() {
-            let of_event = |ahead: &&Ahead<W>| ahead.event == event;
+            let of_event = |ahead: &&EventAhead<W>| ahead.event == event;
             let kept = self.ahead.iter().filter(of_event).count();
             let seen = passing.iter().filter(of_event).count();
             let of = if seen > kept { &passing } else { &self.ahead };
@@ -129,10 +129,10 @@ impl<const W: usize> Watch<W> {
     /// all functions at its end.
     fn passing(
         &self,
-        motion: &Motion<W>,
+        motion: &DigitsMotion<W>,
         [step, made]: [f64; 2],
         ends_at_corner: bool,
-    ) -> (Vec<Ahead<W>>, Vec<i8>) {
+    ) -> (Vec<EventAhead<W>>, Vec<i8>) {
         let (mut ahead, mut ends) = (Vec::new(), Vec::new());
         let off = &motion.mechanism.acting.off;
         for (event, powers) in self.functions.powers.iter().enumerate() {
@@ -156,10 +156,10 @@ impl<const W: usize> Watch<W> {
             for (share, rises) in passages.into_iter().filter(|(_, rises)| counts(*rises)) {
                 let near = Digits::of(share * made);
                 let after = if share == 0.0 { Digits::ZERO } else { refined(motion, powers, near) };
-                ahead.push(Ahead { event, after, rises });
+                ahead.push(EventAhead { event, after, rises });
             }
         }
-        ahead.sort_by(|a: &Ahead<W>, b| {
+        ahead.sort_by(|a: &EventAhead<W>, b| {
             (a.after - b.after).value().total_cmp(&0.0).then(a.event.cmp(&b.event))
         });
         (ahead, ends)
@@ -178,8 +178,8 @@ impl<const W: usize> Watch<W> {
     }
 
     /// What happens in the step that is next, as far as there is room for it.
-    fn happening(&self, motion: &Motion<W>) -> impl Iterator<Item = Happened<W>> {
-        let happens = |&Ahead { event, after, .. }: &Ahead<W>| {
+    fn happening(&self, motion: &DigitsMotion<W>) -> impl Iterator<Item = Happened<W>> {
+        let happens = |&EventAhead { event, after, .. }: &EventAhead<W>| {
             let t = motion.state().t + after;
             let posture = motion.at(t);
             Happened { event, t, phi: posture.phi, omega: posture.omega }
@@ -188,13 +188,13 @@ impl<const W: usize> Watch<W> {
     }
 
     /// What has happened up to a time in the step that is next.
-    pub fn until(&self, motion: &Motion<W>, t: Digits<W>) -> Vec<Happened<W>> {
+    pub fn until(&self, motion: &DigitsMotion<W>, t: Digits<W>) -> Vec<Happened<W>> {
         let ahead = self.happening(motion).filter(|event| event.t <= t);
         self.happened.iter().cloned().chain(ahead).collect()
     }
 
     /// Takes what is in the step that is next, which is made.
-    pub fn pass(&mut self, motion: &Motion<W>) {
+    pub fn pass(&mut self, motion: &DigitsMotion<W>) {
         let passed: Vec<_> = self.happening(motion).collect();
         self.happened.extend(passed);
         self.sides.clone_from(&self.ends);
@@ -213,7 +213,7 @@ fn passages(
     least: f64,
     (before, began): (i8, bool),
 ) -> (Vec<(f64, bool)>, i8) {
-    let curve = Powers { powers: shares, end: 1.0 };
+    let curve = PowerSeries { powers: shares, end: 1.0 };
     let at = |share: f64| curve.at(share)[0];
     let most = magnitude(shares);
     let mut all = Vec::new();

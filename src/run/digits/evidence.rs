@@ -2,17 +2,17 @@
 //! relative velocities, of which what is rounding in three quarters of the digits is zero.
 
 use super::friction::SURE;
-use super::keep::Keeper;
-use super::motion::Motion;
-use super::posture::Posture;
+use super::keep::DigitsKeeper;
+use super::motion::DigitsMotion;
+use super::posture::DigitsCoordinates;
 use super::wall::gap;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
-use crate::dynamics::friction::modes::{Evidence, Told};
-use crate::dynamics::friction::{Friction, Mode, size};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
+use crate::dynamics::friction::modes::{ContactSigns, Evidence};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, size};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
 
@@ -21,9 +21,9 @@ const POWERS: usize = 2;
 
 /// What is known of a moment in many digits.
 pub(super) struct InDigits<'a, const W: usize> {
-    motion: &'a Motion<W>,
+    motion: &'a DigitsMotion<W>,
     /// All coordinates.
-    pub posture: Posture<W>,
+    pub posture: DigitsCoordinates<W>,
     z: Vec<Complex<Digits<W>>>,
     /// Where each place sticks, if it does.
     anchors: Vec<Digits<W>>,
@@ -32,12 +32,12 @@ pub(super) struct InDigits<'a, const W: usize> {
 }
 
 impl<'a, const W: usize> InDigits<'a, W> {
-    pub fn of(motion: &'a Motion<W>) -> Self {
+    pub fn of(motion: &'a DigitsMotion<W>) -> Self {
         let posture = motion.state_posture();
         let mechanism = &motion.mechanism;
         let z = mechanism.elements(&posture.phi);
-        let anchor = |(friction, mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| match mode {
-            Mode::Stick(at) => *at,
+        let anchor = |(friction, mode): (&CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| match mode {
+            FrictionMode::Stick(at) => *at,
             _ => friction.displacement(&posture.phi, &z),
         };
         let anchors = mechanism.frictions.iter().zip(&mechanism.acting.sliding).map(anchor).collect();
@@ -45,24 +45,24 @@ impl<'a, const W: usize> InDigits<'a, W> {
     }
 
     /// Modes with the displacements of what sticks in all digits.
-    pub fn exact(&self, modes: &[Mode]) -> Vec<Mode<Digits<W>>> {
-        let exact = |(mode, &at): (&Mode, &Digits<W>)| match *mode {
-            Mode::Open => Mode::Open,
-            Mode::Stick(_) => Mode::Stick(at),
-            Mode::Slip(sign) => Mode::Slip(sign),
-            Mode::Strained(sign) => Mode::Strained(sign),
+    pub fn exact(&self, modes: &[FrictionMode]) -> Vec<FrictionMode<Digits<W>>> {
+        let exact = |(mode, &at): (&FrictionMode, &Digits<W>)| match *mode {
+            FrictionMode::Open => FrictionMode::Open,
+            FrictionMode::Stick(_) => FrictionMode::Stick(at),
+            FrictionMode::Slip(sign) => FrictionMode::Slip(sign),
+            FrictionMode::Strained(sign) => FrictionMode::Strained(sign),
         };
         modes.iter().zip(&self.anchors).map(exact).collect()
     }
 
-    pub fn mechanism(&self, closed: &[usize], modes: &[Mode]) -> Option<ExactMechanism<Digits<W>>> {
+    pub fn mechanism(&self, closed: &[usize], modes: &[FrictionMode]) -> Option<ExactMechanism<Digits<W>>> {
         let (held, sliding) = (closed.to_vec(), self.exact(modes));
         self.motion.mechanism.with(Acting { held, sliding, ..self.motion.state.acting.clone() }).ok()
     }
 
     /// The first powers of the motion in these modes.
     pub fn series(&self, mechanism: &ExactMechanism<Digits<W>>) -> Series<Digits<W>> {
-        let Posture { phi, omega, .. } = &self.posture;
+        let DigitsCoordinates { phi, omega, .. } = &self.posture;
         let mut series = Series::of_terms(&mechanism.terms(), Coordinates::All, POWERS);
         series.resolve_reversals(self.rounding);
         let zeros = vec![Digits::ZERO; phi.len()];
@@ -102,8 +102,8 @@ pub(super) fn second<const W: usize>(
 ) -> Digits<W> {
     let n = series.elements();
     match row.measure {
-        Measure::Place(_) => gap(series, t, row)[2].scale(2.0),
-        Measure::Angle { body, base } => {
+        RowMeasure::Place(_) => gap(series, t, row)[2].scale(2.0),
+        RowMeasure::Angle { body, base } => {
             base.map_or(series.omega[n + body], |base| series.omega[n + body] - series.omega[n + base])
         }
     }
@@ -134,7 +134,7 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         (0..self.anchors.len()).map(|place| self.rate(place, &self.posture.omega)).collect()
     }
 
-    fn told(&self, closed: &[usize], modes: &[Mode], touching: &[usize]) -> Option<Told> {
+    fn told(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> Option<ContactSigns> {
         let mechanism = self.mechanism(closed, modes)?;
         let series = self.series(&mechanism);
         let (n, rows) = (self.z.len(), series.multipliers(0));
@@ -149,21 +149,22 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         };
         let most = rows.iter().map(Digits::log2).fold(f64::NEG_INFINITY, f64::max);
         let mut stuck = rows[standing + closed.len()..].iter().zip(series.sticks());
-        let grip = |(place, (friction, mode)): (usize, (&Friction<Digits<W>>, &Mode))| match mode {
-            Mode::Stick(_) => stuck.next().map_or(0, |(tau, normal)| {
-                let pressing = size(friction.normal, normal[0]).0;
-                let size = pressing.log2().max(most) + friction.stiction.log2();
-                let size = size.max(libm::log2(self.motion.friction_unit(place)));
-                sign(friction.stiction * pressing - tau.abs(), size + self.rounding)
-            }),
-            _ => 0,
-        };
+        let grip =
+            |(place, (friction, mode)): (usize, (&CompiledFriction<Digits<W>>, &FrictionMode))| match mode {
+                FrictionMode::Stick(_) => stuck.next().map_or(0, |(tau, normal)| {
+                    let pressing = size(friction.normal, normal[0]).0;
+                    let size = pressing.log2().max(most) + friction.stiction.log2();
+                    let size = size.max(libm::log2(self.motion.friction_unit(place)));
+                    sign(friction.stiction * pressing - tau.abs(), size + self.rounding)
+                }),
+                _ => 0,
+            };
         let time = structure.units.time;
         let gap = |&contact: &usize| {
             let unit = structure.contacts[contact].length / (time * time);
             self.speeding(&series, &mechanism.walls[contact].0, unit)
         };
-        let speeding = |(place, friction): (usize, &Friction<Digits<W>>)| {
+        let speeding = |(place, friction): (usize, &CompiledFriction<Digits<W>>)| {
             self.speeding(&series, &friction.tangent, self.motion.speed_unit(place) / time)
         };
         // At rest what is left of accelerations is rounding.
@@ -174,7 +175,7 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
                 _ => acceleration.value(),
             }
         };
-        Some(Told {
+        Some(ContactSigns {
             regularity: series.regularity(),
             pressures: closed.iter().zip(&rows[standing..]).map(pressure).collect(),
             leaving: touching.iter().map(gap).collect(),
@@ -184,18 +185,18 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         })
     }
 
-    fn is_still(&self, place: usize, closed: &[usize], modes: &[Mode], _is_driven: bool) -> bool {
+    fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], _is_driven: bool) -> bool {
         let mut modes = modes.to_vec();
-        modes[place] = Mode::Open;
+        modes[place] = FrictionMode::Open;
         self.told(closed, &modes, &[]).is_some_and(|told| told.speeding[place] == 0)
     }
 
     fn stands(&self, place: usize, closed: &[usize]) -> bool {
-        let Some(mechanism) = self.mechanism(closed, &vec![Mode::Open; self.anchors.len()]) else {
+        let Some(mechanism) = self.mechanism(closed, &vec![FrictionMode::Open; self.anchors.len()]) else {
             return false;
         };
-        let Posture { phi, mut omega, .. } = self.posture.clone();
-        let mut keeper = Keeper::new(&mechanism, self.motion.precision);
+        let DigitsCoordinates { phi, mut omega, .. } = self.posture.clone();
+        let mut keeper = DigitsKeeper::new(&mechanism, self.motion.precision);
         keeper.close(&mechanism, self.motion.state.t, &phi, &mut omega);
         self.rate(place, &omega) == 0.0
     }

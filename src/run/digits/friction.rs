@@ -6,16 +6,16 @@
 //! of geometry, is told in doubles.  A place that sticks is a row like any other, the last ones.
 
 use super::evidence::{InDigits, gradient, second};
-use super::keep::Keeper;
-use super::motion::{LongState, Motion};
-use super::posture::Posture;
+use super::keep::DigitsKeeper;
+use super::motion::{DigitsMotion, LongState};
+use super::posture::DigitsCoordinates;
 use super::wall::{GapRate, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::compile::exact::Acting;
 use crate::dynamics::friction::modes::HINT;
-use crate::dynamics::friction::{self, Mode, Moment, Normal, Transition};
+use crate::dynamics::friction::{self, FrictionMode, FrictionMoment, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
@@ -57,22 +57,24 @@ impl<const W: usize> Turn<W> {
 }
 
 /// A mode as it is saved: its kind, its sign, and where it sticks.
-pub fn mode_to_words<const W: usize>(mode: &Mode<Digits<W>>) -> (u8, f64, Vec<u64>) {
+pub fn mode_to_words<const W: usize>(mode: &FrictionMode<Digits<W>>) -> (u8, f64, Vec<u64>) {
     match mode {
-        Mode::Open => (0, 0.0, Vec::new()),
-        Mode::Stick(at) => (1, 0.0, at.to_words()),
-        Mode::Slip(sign) => (2, *sign, Vec::new()),
-        Mode::Strained(sign) => (3, *sign, Vec::new()),
+        FrictionMode::Open => (0, 0.0, Vec::new()),
+        FrictionMode::Stick(at) => (1, 0.0, at.to_words()),
+        FrictionMode::Slip(sign) => (2, *sign, Vec::new()),
+        FrictionMode::Strained(sign) => (3, *sign, Vec::new()),
     }
 }
 
 /// What was saved.
-pub fn mode_from_words<const W: usize>((kind, sign, at): &(u8, f64, Vec<u64>)) -> Option<Mode<Digits<W>>> {
+pub fn mode_from_words<const W: usize>(
+    (kind, sign, at): &(u8, f64, Vec<u64>),
+) -> Option<FrictionMode<Digits<W>>> {
     match kind {
-        0 => Some(Mode::Open),
-        1 => Digits::from_words(at).map(Mode::Stick),
-        2 => Some(Mode::Slip(*sign)),
-        3 => Some(Mode::Strained(*sign)),
+        0 => Some(FrictionMode::Open),
+        1 => Digits::from_words(at).map(FrictionMode::Stick),
+        2 => Some(FrictionMode::Slip(*sign)),
+        3 => Some(FrictionMode::Strained(*sign)),
         _ => None,
     }
 }
@@ -92,9 +94,9 @@ pub(super) struct Flown<const W: usize> {
 }
 
 /// Walls that hold a point, and what places with friction do.
-pub(super) type Decided<const W: usize> = (Vec<usize>, Vec<Mode<Digits<W>>>);
+pub(super) type Decided<const W: usize> = (Vec<usize>, Vec<FrictionMode<Digits<W>>>);
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// True where there is dry friction.
     pub(super) fn has_friction(&self) -> bool {
         !self.mechanism.frictions.is_empty()
@@ -113,11 +115,15 @@ impl<const W: usize> Motion<W> {
     }
 
     /// What is told in doubles of the present moment.
-    fn seen_in_doubles<R>(&self, posture: &Posture<W>, tell: impl FnOnce(Moment) -> R) -> R {
+    fn seen_in_doubles<R>(
+        &self,
+        posture: &DigitsCoordinates<W>,
+        tell: impl FnOnce(FrictionMoment) -> R,
+    ) -> R {
         let in_doubles = |x: &[Digits<W>]| -> Vec<f64> { x.iter().map(|x| x.value()).collect() };
         let (phi, omega) = (in_doubles(&posture.phi), in_doubles(&posture.omega));
         let z = self.mechanism.structure.elements(&phi);
-        tell(Moment { t: Time::from(self.state.t.value()), phi: &phi, z: &z, omega: &omega })
+        tell(FrictionMoment { t: Time::from(self.state.t.value()), phi: &phi, z: &z, omega: &omega })
     }
 
     /// True where motors and locks hold a place, whose velocity friction has no part in.
@@ -134,7 +140,8 @@ impl<const W: usize> Motion<W> {
         transition: Transition,
     ) -> Result<Decided<W>, StepError> {
         let (evidence, structure) = (InDigits::of(self), &self.mechanism.structure);
-        let before: Vec<Mode> = self.state.acting.sliding.iter().map(Mode::in_doubles).collect();
+        let before: Vec<FrictionMode> =
+            self.state.acting.sliding.iter().map(FrictionMode::in_doubles).collect();
         let found = self.seen_in_doubles(&evidence.posture, |at| {
             structure.modes_by(&evidence, at, &before, contacts, transition)
         });
@@ -152,7 +159,8 @@ impl<const W: usize> Motion<W> {
     pub(super) fn settle_modes(&mut self, transition: Transition) -> Result<(), StepError> {
         let held = self.state.acting.held.clone();
         // Without friction at walls it is known which are pressed.
-        let at_wall = |friction: &friction::Friction<_>| matches!(friction.normal, Normal::Contact(_));
+        let at_wall =
+            |friction: &friction::CompiledFriction<_>| matches!(friction.normal, Normal::Contact(_));
         let touching =
             if self.mechanism.frictions.iter().any(at_wall) { self.touching() } else { held.clone() };
         self.settle_modes_at(&held, &touching, transition)
@@ -190,7 +198,7 @@ impl<const W: usize> Motion<W> {
 
     /// How much longer a point would go on bouncing on its wall while these walls hold points and places are
     /// in these modes \[s\], and how it would fly.
-    fn flight(&self, wall: usize, walls: &[usize], modes: &[Mode<Digits<W>>]) -> Option<Flight<W>> {
+    fn flight(&self, wall: usize, walls: &[usize], modes: &[FrictionMode<Digits<W>>]) -> Option<Flight<W>> {
         let (speed, restitution) = (gap_rate(self, wall).rate, self.mechanism.walls[wall].1);
         if self.state.acting.held.contains(&wall) || speed <= Digits::ZERO || restitution >= Digits::ONE {
             return None;
@@ -204,10 +212,10 @@ impl<const W: usize> Motion<W> {
         };
         let others: Vec<usize> = walls.iter().copied().filter(presses).collect();
         let flies = |normal| matches!(normal, Normal::Contact(contact) if !others.contains(&contact));
-        let mode = |(friction, mode): (&friction::Friction<Digits<W>>, &Mode<Digits<W>>)| {
-            if flies(friction.normal) { Mode::Open } else { mode.in_doubles() }
+        let mode = |(friction, mode): (&friction::CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| {
+            if flies(friction.normal) { FrictionMode::Open } else { mode.in_doubles() }
         };
-        let modes: Vec<Mode> = self.mechanism.frictions.iter().zip(modes).map(mode).collect();
+        let modes: Vec<FrictionMode> = self.mechanism.frictions.iter().zip(modes).map(mode).collect();
         let mechanism = evidence.mechanism(&others, &modes)?;
         let series = evidence.series(&mechanism);
         let inward = -second(&series, self.state.t, &mechanism.walls[wall].0);
@@ -220,12 +228,12 @@ impl<const W: usize> Motion<W> {
         &self,
         flights: impl Iterator<Item = &'a Flight<W>>,
         walls: &[usize],
-        modes: &[Mode<Digits<W>>],
+        modes: &[FrictionMode<Digits<W>>],
     ) -> Option<Flown<W>> {
         let mut flights = flights.peekable();
         flights.peek()?;
         let evidence = InDigits::of(self);
-        let modes: Vec<Mode> = modes.iter().map(Mode::in_doubles).collect();
+        let modes: Vec<FrictionMode> = modes.iter().map(FrictionMode::in_doubles).collect();
         let held = evidence.series(&evidence.mechanism(walls, &modes)?);
         let n = held.elements();
         let first = |of: &[Digits<W>]| of.first().copied().unwrap_or(Digits::ZERO);
@@ -246,21 +254,23 @@ impl<const W: usize> Motion<W> {
         let LongState { t, acting, .. } = self.state.clone();
         let sliding: Vec<(usize, usize)> = (self.mechanism.frictions.iter().zip(&acting.sliding).enumerate())
             .filter_map(|(place, (friction, mode))| match (friction.normal, mode) {
-                (Normal::Contact(wall), Mode::Slip(_) | Mode::Strained(_)) => Some((place, wall)),
+                (Normal::Contact(wall), FrictionMode::Slip(_) | FrictionMode::Strained(_)) => {
+                    Some((place, wall))
+                }
                 _ => None,
             })
             .collect();
         let is_rubbed = |wall: &usize| sliding.iter().any(|(_, other)| other == wall);
         let held = acting.held.iter().copied().filter(|wall| !is_rubbed(wall)).collect();
-        let kept = |mode: &Mode<Digits<W>>| match mode {
-            Mode::Stick(at) => Mode::Stick(*at),
-            _ => Mode::Open,
+        let kept = |mode: &FrictionMode<Digits<W>>| match mode {
+            FrictionMode::Stick(at) => FrictionMode::Stick(*at),
+            _ => FrictionMode::Open,
         };
         let modes = acting.sliding.iter().map(kept).collect();
         let rest = self.mechanism.with(Acting { held, sliding: modes, ..acting.clone() });
         let rest = rest.map_err(|error| self.cannot_go_on(&error, "look at that formula"))?;
-        let mut keeper = Keeper::new(&rest, self.precision);
-        let Posture { phi, mut omega, .. } = self.state_posture();
+        let mut keeper = DigitsKeeper::new(&rest, self.precision);
+        let DigitsCoordinates { phi, mut omega, .. } = self.state_posture();
         let (mut work, _) = keeper.close(&rest, t, &phi, &mut omega);
         let z = self.mechanism.elements(&phi);
         let gaps: Vec<_> = sliding.iter().map(|&(_, wall)| gap_rate(self, wall)).collect();
@@ -289,9 +299,10 @@ impl<const W: usize> Motion<W> {
 
     /// Lists what places begin to do that were in these modes; at walls that are held from these times on,
     /// then.
-    pub(super) fn tell_turns(&mut self, before: &[Mode<Digits<W>>], begin: &[(usize, Digits<W>)]) {
+    pub(super) fn tell_turns(&mut self, before: &[FrictionMode<Digits<W>>], begin: &[(usize, Digits<W>)]) {
         let LongState { t: now, acting, turns, .. } = &mut self.state;
-        let does = |mode: &Mode<Digits<W>>| WORDS.iter().position(|word| *word == mode.word()).unwrap_or(0);
+        let does =
+            |mode: &FrictionMode<Digits<W>>| WORDS.iter().position(|word| *word == mode.word()).unwrap_or(0);
         for (place, (mode, before)) in acting.sliding.iter().zip(before).enumerate() {
             if does(mode) == does(before) {
                 continue;

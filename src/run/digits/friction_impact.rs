@@ -6,25 +6,25 @@
 
 use super::evidence::gradient;
 use super::friction::SURE;
-use super::keep::Keeper;
-use super::motion::Motion;
+use super::keep::DigitsKeeper;
+use super::motion::DigitsMotion;
 use super::resting;
 use super::several::Meeting;
-use super::wall::{GapRate, Jump, work_of_rows};
+use super::wall::{GapRate, ImpulseJump, work_of_rows};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::Acting;
 use crate::dynamics::friction::impact::Shock;
-use crate::dynamics::friction::{Friction, Mode, Normal};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, Normal};
 use crate::dynamics::kernel::dot;
 use crate::stepping::{Cause, StepError};
 
 /// What the impulses at one wall do.
 pub(super) fn alone<const W: usize>(
-    motion: &mut Motion<W>,
+    motion: &mut DigitsMotion<W>,
     wall: usize,
     gap: &GapRate<W>,
-) -> Result<Jump<W>, StepError> {
+) -> Result<ImpulseJump<W>, StepError> {
     loop {
         let (jump, pulls) = jump(motion, wall, gap)?;
         // A point that its wall would have to pull is let go.
@@ -48,24 +48,24 @@ pub(super) fn alone<const W: usize>(
 
 /// The jump, and the impulses of the constraints over that of the wall.
 fn jump<const W: usize>(
-    motion: &Motion<W>,
+    motion: &DigitsMotion<W>,
     wall: usize,
     GapRate { gradient: normal, travel, rate }: &GapRate<W>,
-) -> Result<(Jump<W>, Vec<Digits<W>>), StepError> {
+) -> Result<(ImpulseJump<W>, Vec<Digits<W>>), StepError> {
     let (t, posture) = (motion.state().t, motion.state_posture());
-    let sliding = vec![Mode::Open; motion.mechanism.frictions.len()];
+    let sliding = vec![FrictionMode::Open; motion.mechanism.frictions.len()];
     let striking = motion.mechanism.with(Acting { sliding, ..motion.state().acting.clone() });
     let striking = striking.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
-    let mut keeper = Keeper::new(&striking, motion.precision);
+    let mut keeper = DigitsKeeper::new(&striking, motion.precision);
     let at = [&posture.phi[..], &posture.omega[..]];
     let (response, pulls) = keeper.response(&striking, t, at, normal);
     let restitution = motion.mechanism.walls[wall].1;
-    let is_here = |friction: &&Friction<Digits<W>>| friction.normal == Normal::Contact(wall);
+    let is_here = |friction: &&CompiledFriction<Digits<W>>| friction.normal == Normal::Contact(wall);
     let Some(friction) = motion.mechanism.frictions.iter().find(is_here) else {
         let impulse = -(Digits::ONE + restitution) * *rate / dot(normal, &response);
         let change = response.iter().map(|&a| a * impulse).collect();
         let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
-        return Ok((Jump { change, work, walls: 1 }, pulls));
+        return Ok((ImpulseJump { change, work, walls: 1 }, pulls));
     };
     let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
     let (across, pulls_across) = keeper.response(&striking, t, at, &along);
@@ -87,5 +87,5 @@ fn jump<const W: usize>(
     let pulls: Vec<_> =
         pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
     let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
-    Ok((Jump { change, work, walls: 1 }, pulls))
+    Ok((ImpulseJump { change, work, walls: 1 }, pulls))
 }

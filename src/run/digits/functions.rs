@@ -1,11 +1,11 @@
 //! Functions of a motion in many digits, as series: those of events, and the conditions of formulas.
 
-use super::motion::Motion;
+use super::motion::DigitsMotion;
 use super::polynomial::JUDGES;
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::force::UserForce;
 use crate::dynamics::series::FormulaSeries;
-use crate::stepping::search::{Curve, Powers};
+use crate::stepping::search::{Curve, PowerSeries};
 
 /// Share of a step within which zeros are not told apart in doubles, and what began it does not happen again.
 pub(super) const SAME: f64 = 1e-9;
@@ -32,7 +32,7 @@ impl<const W: usize> Functions<W> {
     }
 
     /// Expands them where the motion is expanded.
-    pub fn expand(&mut self, motion: &Motion<W>, functions: &[UserForce<Digits<W>>]) {
+    pub fn expand(&mut self, motion: &DigitsMotion<W>, functions: &[UserForce<Digits<W>>]) {
         self.powers.clear();
         if self.series.is_empty() {
             return;
@@ -76,6 +76,6 @@ impl<const W: usize> Functions<W> {
 
 /// About the largest magnitude of a function whose powers are in shares of a step.
 pub(super) fn magnitude(shares: &[f64]) -> f64 {
-    let curve = Powers { powers: shares, end: 1.0 };
+    let curve = PowerSeries { powers: shares, end: 1.0 };
     (0..=LOOKS).map(|k| curve.at(k as f64 / LOOKS as f64)[0].abs()).fold(0.0, f64::max)
 }

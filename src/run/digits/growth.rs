@@ -5,12 +5,12 @@
 //! characteristic exponents*, Meccanica 15 (1980) 9).  The path itself is right for a few seconds only; what
 //! is wanted of it is how fast its neighbours leave it.
 
-use super::motion::{LongState, Motion};
+use super::motion::{DigitsMotion, LongState};
 use super::precision::{DIGITS, Precision};
-use super::{LongError, LongRun, Runner, Source};
+use super::{DigitsSource, LongError, LongRun, Runner};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::dynamics::friction::Mode;
+use crate::dynamics::friction::FrictionMode;
 use crate::stepping::StepError;
 use std::time::Instant;
 
@@ -54,7 +54,7 @@ pub struct Forecast {
 /// # Errors
 /// As a run in many digits, or more than 2000 digits would be needed (a refusal).
 pub fn forecast(
-    source: &Source,
+    source: &DigitsSource,
     within: f64,
     has_loops: bool,
     pause: &mut dyn FnMut() -> bool,
@@ -70,7 +70,7 @@ pub fn forecast(
 
 /// What it takes where errors grow by so many digits; `mean` \[s\] is the length of steps.
 pub fn planned(
-    source: &Source,
+    source: &DigitsSource,
     growth: f64,
     within: f64,
     has_loops: bool,
@@ -109,7 +109,7 @@ pub fn planned(
 /// ln of the largest growth of a small distance between any two times up to `until` \[s\]; `None` where it
 /// was paused.
 fn measured(
-    motion: &mut Motion<ROOM>,
+    motion: &mut DigitsMotion<ROOM>,
     until: f64,
     pause: &mut dyn FnMut() -> bool,
 ) -> Result<Option<f64>, StepError> {
@@ -153,7 +153,7 @@ fn measured(
                 *back = a + (b - a) * share;
             }
             for (back, there) in back.acting.sliding.iter_mut().zip(&there.acting.sliding) {
-                if let (Mode::Stick(a), Mode::Stick(b)) = (&mut *back, there) {
+                if let (FrictionMode::Stick(a), FrictionMode::Stick(b)) = (&mut *back, there) {
                     *a = *a + (*b - *a) * share;
                 }
             }
@@ -168,8 +168,8 @@ fn measured(
 
 /// True where all places with dry friction do the same in two states.
 fn move_alike<const W: usize>(a: &LongState<W>, b: &LongState<W>) -> bool {
-    let without_place = |mode: &Mode<Digits<W>>| match mode {
-        Mode::Stick(_) => Mode::Stick(0.0),
+    let without_place = |mode: &FrictionMode<Digits<W>>| match mode {
+        FrictionMode::Stick(_) => FrictionMode::Stick(0.0),
         mode => mode.in_doubles(),
     };
     a.acting.sliding.iter().map(without_place).eq(b.acting.sliding.iter().map(without_place))

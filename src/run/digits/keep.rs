@@ -12,7 +12,7 @@ use crate::arithmetic::digits::Digits;
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::{schur, tree};
 use crate::stepping::{Cause, StepError};
@@ -24,7 +24,7 @@ const LEAST_PIVOT: f64 = 1e-6;
 
 /// Room for the constraints.
 #[derive(Clone, Debug)]
-pub struct Keeper<const W: usize> {
+pub struct DigitsKeeper<const W: usize> {
     rows: usize,
     jacobian: Vec<Digits<W>>,
     minv_jt: Vec<Digits<W>>,
@@ -40,7 +40,7 @@ pub struct Keeper<const W: usize> {
     no_freedom: f64,
 }
 
-impl<const W: usize> Keeper<W> {
+impl<const W: usize> DigitsKeeper<W> {
     /// For a mechanism.
     pub fn new(mechanism: &ExactMechanism<Digits<W>>, precision: Precision) -> Self {
         let (r, n) = (mechanism.constraints.len(), mechanism.structure.coordinates());
@@ -239,7 +239,7 @@ impl<const W: usize> Keeper<W> {
         let mut impulses: Vec<_> = residuals.iter().map(|residual| residual[1]).collect();
         self.take_off(&mut impulses, omega);
         let z = mechanism.elements(phi);
-        let at = Posture { phi, z: &z, omega };
+        let at = ConstraintArguments { phi, z: &z, omega };
         let driven = mechanism.constraints.iter().zip(&impulses);
         let work =
             driven.fold(Digits::ZERO, |work, (row, &impulse)| work - impulse * travel_rate(row, t, at));

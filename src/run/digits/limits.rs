@@ -1,6 +1,6 @@
 //! Limits on the drift of a run in many digits, those of all runs.
 
-use super::Row;
+use super::ShownRow;
 use crate::dynamics::Mechanism;
 use crate::run::Limits;
 use crate::run::drift::{ENERGY_MOST, kind, units};
@@ -10,7 +10,7 @@ use crate::stepping::{Cause, StepError};
 ///
 /// Where no limit on the energy is stated it is that of runs whose tolerance explains nothing: digits that
 /// singular positions cost are no fault.
-pub fn exceeded(row: &Row, mechanism: &Mechanism, limits: &Limits, largest: f64) -> Option<StepError> {
+pub fn exceeded(row: &ShownRow, mechanism: &Mechanism, limits: &Limits, largest: f64) -> Option<StepError> {
     let off = row.drift.abs();
     let share = off * (mechanism.energy_scale / largest.max(mechanism.energy_scale));
     let units = units(mechanism);

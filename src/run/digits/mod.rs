@@ -1,7 +1,7 @@
 //! Runs in many digits: positions to as many digits as asked for, and up to any horizon with proof.
 //!
 //! [`Precision`] says what a number of digits asks of numbers and series; a [`LongRun`] takes a scene whose
-//! numbers are read as written from row to row; [`Pair`] runs two side by side and tells to how many digits
+//! numbers are read as written from row to row; [`DigitsPair`] runs two side by side and tells to how many digits
 //! they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
 mod acting;
@@ -30,18 +30,18 @@ mod wall;
 
 pub use self::growth::{Forecast, forecast, planned};
 pub use self::limits::exceeded;
-pub use self::pair::{Pair, Progress};
+pub use self::pair::{DigitsPair, PairProgress};
 pub use self::precision::{DIGITS, Precision};
-pub use self::saved::Saved;
-pub use self::shown::{LongEvent, LongHold, LongTurn, Row};
+pub use self::saved::SavedDigits;
+pub use self::shown::{LongEvent, LongHold, LongTurn, ShownRow};
 
 use self::events::Happened;
 use self::friction::Turn;
-use self::motion::Motion;
-use self::posture::Posture;
+use self::motion::DigitsMotion;
+use self::posture::DigitsCoordinates;
 use self::resting::Hold;
 use super::magnitude::changes;
-use super::plan::{Refusal, check_forces_of_joints};
+use super::plan::{RequestRefusal, check_forces_of_joints};
 use crate::arithmetic::digits::{Digits, MOST};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Real, Scalar};
@@ -59,7 +59,7 @@ pub type Wide = Digits<MOST>;
 
 /// What is run: the text of a scene, and what of it the command line says otherwise.
 #[derive(Clone, Debug)]
-pub struct Source {
+pub struct DigitsSource {
     /// The scene's text with its overrides.
     pub template: Template,
     /// The overrides as they were typed, `PATH=VALUE`.
@@ -82,7 +82,7 @@ pub enum LongError {
     Scene(#[from] SceneError),
     /// The scene, or a time, is not carried in many digits.
     #[error("{0}")]
-    Refused(#[from] Refusal),
+    Refused(#[from] RequestRefusal),
     /// The run stopped.
     #[error("{0}")]
     Step(#[from] StepError),
@@ -101,17 +101,17 @@ pub trait LongRun: Send {
     ///
     /// # Errors
     /// The run stops.
-    fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<Row>, StepError>;
+    fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<ShownRow>, StepError>;
 
     /// The row of the last state before a stop, under this number; `None` where that is not beyond the last
     /// row.
-    fn stopped(&mut self, number: u64) -> Option<Row>;
+    fn stopped(&mut self, number: u64) -> Option<ShownRow>;
 
     /// Everything it needs to go on, to the last bit.
-    fn save(&self) -> Saved;
+    fn save(&self) -> SavedDigits;
 
     /// Goes on from where another run of the same scene was; false where it cannot have been one.
-    fn resume(&mut self, saved: &Saved) -> bool;
+    fn resume(&mut self, saved: &SavedDigits) -> bool;
 
     /// Steps made and impacts passed.
     fn counts(&self) -> [u64; 2];
@@ -139,7 +139,7 @@ pub trait LongRun: Send {
 ///
 /// # Errors
 /// The scene is not carried in many digits, or its start cannot be brought onto its constraints.
-pub fn long_run(source: &Source, precision: Precision) -> Result<Box<dyn LongRun>, LongError> {
+pub fn long_run(source: &DigitsSource, precision: Precision) -> Result<Box<dyn LongRun>, LongError> {
     match precision.room() {
         5 => Ok(Box::new(Runner::<5>::new(source, precision)?)),
         8 => Ok(Box::new(Runner::<8>::new(source, precision)?)),
@@ -151,14 +151,14 @@ pub fn long_run(source: &Source, precision: Precision) -> Result<Box<dyn LongRun
 
 /// Output times, exactly.
 #[derive(Clone, Copy, Debug)]
-struct Rows<const W: usize> {
+struct OutputTimes<const W: usize> {
     until: Digits<W>,
     every: Digits<W>,
     last: u64,
 }
 
-impl<const W: usize> Rows<W> {
-    fn new(until: Digits<W>, every: Digits<W>) -> Result<Self, Refusal> {
+impl<const W: usize> OutputTimes<W> {
+    fn new(until: Digits<W>, every: Digits<W>) -> Result<Self, RequestRefusal> {
         let whole = (until / every).value();
         let is_sound = until > Digits::ZERO && every > Digits::ZERO && until >= every && whole < 1e15;
         if !is_sound {
@@ -179,14 +179,19 @@ impl<const W: usize> Rows<W> {
     }
 }
 
-fn refusal(what: &str, reason: &str, alternative: &str) -> Refusal {
-    Refusal { what: what.into(), reason: reason.into(), alternative: alternative.into(), is_usage: true }
+fn refusal(what: &str, reason: &str, alternative: &str) -> RequestRefusal {
+    RequestRefusal {
+        what: what.into(),
+        reason: reason.into(),
+        alternative: alternative.into(),
+        is_usage: true,
+    }
 }
 
 /// A run on numbers of `W` limbs.
 struct Runner<const W: usize> {
-    motion: Motion<W>,
-    rows: Rows<W>,
+    motion: DigitsMotion<W>,
+    rows: OutputTimes<W>,
     /// Energy at the start \[J\].
     energy: Digits<W>,
     /// Time of the last row that was asked for \[s\].
@@ -196,7 +201,7 @@ struct Runner<const W: usize> {
 }
 
 impl<const W: usize> Runner<W> {
-    fn new(source: &Source, precision: Precision) -> Result<Self, LongError> {
+    fn new(source: &DigitsSource, precision: Precision) -> Result<Self, LongError> {
         check_forces_of_joints(&source.mechanism)?;
         let (scene, times) = source.template.exact::<Digits<W>>(&source.typed)?;
         let time = |text: &Option<String>, other: Digits<W>| {
@@ -208,7 +213,7 @@ impl<const W: usize> Runner<W> {
             time(&source.until, times.until).ok_or_else(missing)?,
             time(&source.every, times.every).ok_or_else(missing)?,
         );
-        let rows = Rows::new(until, if every > until { until } else { every })?;
+        let rows = OutputTimes::new(until, if every > until { until } else { every })?;
         // Formulas begin on the branches of the start.
         let start = source.mechanism.start(&source.scene);
         let structure = match source.mechanism.on_branches_of(&start) {
@@ -217,7 +222,7 @@ impl<const W: usize> Runner<W> {
         };
         let mut mechanism = ExactMechanism::new(&scene, &structure).map_err(|reason| {
             let alternative = "run it without --digits".into();
-            Refusal { what: "--digits".into(), reason, alternative, is_usage: false }
+            RequestRefusal { what: "--digits".into(), reason, alternative, is_usage: false }
         })?;
         if let Some(Laws { formulas, parameters, .. }) = &structure.laws {
             let functions = 0..formulas.events.len();
@@ -229,7 +234,7 @@ impl<const W: usize> Runner<W> {
             events.for_each(|(event, magnitude)| event.magnitude = magnitude);
         }
         let start = mechanism.start(&scene, &source.scene);
-        let motion = Motion::new(mechanism, start, precision, until.value())?;
+        let motion = DigitsMotion::new(mechanism, start, precision, until.value())?;
         let posture = motion.state_posture();
         let z = motion.mechanism.elements(&posture.phi);
         let [kinetic, potential] = motion.mechanism.energy(&posture.phi, &posture.omega, &z);
@@ -240,7 +245,7 @@ impl<const W: usize> Runner<W> {
 
 impl<const W: usize> Runner<W> {
     /// The row of a moment.
-    fn shown(&mut self, number: u64, t: Digits<W>, posture: &Posture<W>) -> Row {
+    fn shown(&mut self, number: u64, t: Digits<W>, posture: &DigitsCoordinates<W>) -> ShownRow {
         let mechanism = &self.motion.mechanism;
         let z = mechanism.elements(&posture.phi);
         let [kinetic, potential] = mechanism.energy(&posture.phi, &posture.omega, &z);
@@ -256,7 +261,7 @@ impl<const W: usize> Runner<W> {
         let residual = [0, 1].map(|level| left.iter().fold(0.0, |most, left| larger(left[level], most)));
         let residuals = left.into_iter().take(mechanism.structure.standing_rows()).collect();
         let friction = self.motion.has_friction().then(|| posture.lost.resized());
-        Row { number, t: t.resized(), bodies, energy, friction, drift, residual, residuals }
+        ShownRow { number, t: t.resized(), bodies, energy, friction, drift, residual, residuals }
     }
 }
 
@@ -269,21 +274,21 @@ impl<const W: usize> LongRun for Runner<W> {
         self.rows.last
     }
 
-    fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<Row>, StepError> {
+    fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<ShownRow>, StepError> {
         let mut t = self.rows.time(number);
         if !self.motion.reach(t, pause)? {
             return Ok(None);
         }
         if let Some((_, end)) = self.motion.end().filter(|(_, end)| *end <= t) {
             (t, self.has_ended) = (end, true);
-            self.rows = Rows { until: end, last: number, ..self.rows };
+            self.rows = OutputTimes { until: end, last: number, ..self.rows };
         }
         self.seen = t;
         let posture = self.motion.at(t);
         Ok(Some(self.shown(number, t, &posture)))
     }
 
-    fn stopped(&mut self, number: u64) -> Option<Row> {
+    fn stopped(&mut self, number: u64) -> Option<ShownRow> {
         let (t, posture) = (self.motion.state().t, self.motion.state_posture());
         let is_finite = posture.phi.iter().chain(&posture.omega).all(|x| x.is_finite());
         // A row that is beside it by rounding has it.
@@ -295,11 +300,11 @@ impl<const W: usize> LongRun for Runner<W> {
         Some(self.shown(number, t, &posture))
     }
 
-    fn save(&self) -> Saved {
+    fn save(&self) -> SavedDigits {
         saved::save(self)
     }
 
-    fn resume(&mut self, saved: &Saved) -> bool {
+    fn resume(&mut self, saved: &SavedDigits) -> bool {
         saved::resume(self, saved)
     }
 

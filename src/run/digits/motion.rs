@@ -12,17 +12,17 @@
 //! (module `wall`), and so are events (module `events`) and the corners of formulas (module `branches`): a
 //! step ends where one of them changes the equations.
 
-use super::branches::Branches;
+use super::branches::BranchConditions;
 use super::confirm::{Probe, confirmed};
-use super::events::Watch;
+use super::events::EventWatch;
 use super::friction::{self, Turn};
 use super::functions::Functions;
-use super::keep::Keeper;
+use super::keep::DigitsKeeper;
 use super::precision::Precision;
 use super::resting::Hold;
 use super::transitions;
 use super::wall::{self, Ends};
-use crate::arithmetic::digits::{Digits, Scale};
+use crate::arithmetic::digits::{Digits, TimeScale};
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism, ExactStart};
@@ -71,19 +71,19 @@ pub struct LongState<const W: usize> {
 }
 
 /// A mechanism in motion.
-pub struct Motion<const W: usize> {
+pub struct DigitsMotion<const W: usize> {
     pub(super) mechanism: ExactMechanism<Digits<W>>,
     pub(super) precision: Precision,
     pub(super) coordinates: Coordinates,
     pub(super) series: Series<Digits<W>>,
     pub(super) state: LongState<W>,
-    pub(super) keeper: Keeper<W>,
+    pub(super) keeper: DigitsKeeper<W>,
     /// What confirms steps, where laws may be flat.
     pub(super) probe: Option<Probe<W>>,
     /// Watches for events.
-    pub(super) watch: Watch<W>,
+    pub(super) watch: EventWatch<W>,
     /// The branches of formulas.
-    pub(super) branches: Branches<W>,
+    pub(super) branches: BranchConditions<W>,
     /// The step the series is to make, where it is that of the state: its length \[s\], and what it ends with
     /// at a wall.
     step: Option<(Digits<W>, Option<Ends>)>,
@@ -96,7 +96,7 @@ pub struct Motion<const W: usize> {
     pub(super) zeros: Vec<Digits<W>>,
 }
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// At its start.
     ///
     /// # Errors
@@ -112,7 +112,7 @@ impl<const W: usize> Motion<W> {
         let kept = precision.kept();
         series.keep(kept.clone());
         series.resolve_reversals(precision.rounding(friction::SURE));
-        let keeper = Keeper::new(&mechanism, precision);
+        let keeper = DigitsKeeper::new(&mechanism, precision);
         let f = series.coordinates();
         let cut = |x: Digits<W>| x.shortened(precision.limbs);
         let mut motion = Self {
@@ -121,8 +121,8 @@ impl<const W: usize> Motion<W> {
             series,
             keeper,
             probe: Probe::of(&mechanism, coordinates),
-            watch: Watch::new(&mechanism, precision.order),
-            branches: Branches::new(Functions::new(&mechanism.conditions, precision.order)),
+            watch: EventWatch::new(&mechanism, precision.order),
+            branches: BranchConditions::new(Functions::new(&mechanism.conditions, precision.order)),
             step: None,
             radius: None,
             longest: until,
@@ -228,7 +228,7 @@ impl<const W: usize> Motion<W> {
                 return Ok(true);
             }
             let change = self.watch.change(&self.mechanism);
-            self.watched(Watch::pass);
+            self.watched(EventWatch::pass);
             self.advance(step)?;
             match ends {
                 Some(Ends::Met(wall)) => wall::impact(self, wall)?,
@@ -244,7 +244,7 @@ impl<const W: usize> Motion<W> {
     }
 
     /// Shows the motion to what watches for its events.
-    fn watched<R>(&mut self, show: impl FnOnce(&mut Watch<W>, &Self) -> R) -> R {
+    fn watched<R>(&mut self, show: impl FnOnce(&mut EventWatch<W>, &Self) -> R) -> R {
         let mut watch = std::mem::take(&mut self.watch);
         let result = show(&mut watch, self);
         self.watch = watch;
@@ -348,7 +348,7 @@ impl<const W: usize> Motion<W> {
         let far = -self.precision.tolerance() / order as f64;
         let found = |wanted: f64| Some(libm::log2(wanted) + far).filter(|radius| radius.is_finite());
         if let (Some(radius), Coordinates::Independent) = (self.state.radius, self.coordinates) {
-            let scale = Scale::new(radius, radius - far + SLACK, order, bits);
+            let scale = TimeScale::new(radius, radius - far + SLACK, order, bits);
             let longest = scale.longest();
             self.series.rescale(scale);
             let wanted = self.expand_once();
@@ -358,7 +358,7 @@ impl<const W: usize> Motion<W> {
                 return step;
             }
         }
-        self.series.rescale(Scale::default());
+        self.series.rescale(TimeScale::default());
         self.series.keep(Vec::new());
         let wanted = self.expand_once();
         self.series.keep(self.kept.clone());

@@ -1,6 +1,8 @@
 //! Runs side by side, from row to row: one, or two with other digits and orders that prove each other.
 
-use super::{LongError, LongEvent, LongHold, LongRun, LongTurn, Row, Saved, Source, Wide, long_run};
+use super::{
+    DigitsSource, LongError, LongEvent, LongHold, LongRun, LongTurn, SavedDigits, ShownRow, Wide, long_run,
+};
 use crate::arithmetic::Real;
 use crate::arithmetic::sum::larger;
 use crate::stepping::StepError;
@@ -13,34 +15,34 @@ const MOST: u64 = 64;
 const LONGEST: Duration = Duration::from_millis(400);
 
 /// Runs that go from row to row together.
-pub struct Pair {
+pub struct DigitsPair {
     runs: Vec<Box<dyn LongRun>>,
     next: u64,
     /// Rows gathered at a time.
     rows: u64,
     /// The runs as they were before the rows that are next.
-    saved: Vec<Saved>,
+    saved: Vec<SavedDigits>,
     /// Rows up to a stop.
-    stopped: Vec<(Row, Option<f64>)>,
+    stopped: Vec<(ShownRow, Option<f64>)>,
 }
 
 /// How far runs have come.
 #[derive(Clone, Debug)]
-pub enum Progress {
+pub enum PairProgress {
     /// Rows, each of the run with the most digits, with the digits to which all agree.
-    Rows(Vec<(Row, Option<f64>)>),
+    Rows(Vec<(ShownRow, Option<f64>)>),
     /// All rows are there.
     Over,
     /// A pause was asked for.
     Paused,
 }
 
-impl Pair {
+impl DigitsPair {
     /// Of a scene, with these precisions.
     ///
     /// # Errors
     /// As [`long_run`].
-    pub fn new(source: &Source, precisions: &[super::Precision]) -> Result<Self, LongError> {
+    pub fn new(source: &DigitsSource, precisions: &[super::Precision]) -> Result<Self, LongError> {
         let runs: Vec<_> =
             precisions.iter().map(|&precision| long_run(source, precision)).collect::<Result<_, _>>()?;
         let saved = runs.iter().map(|run| run.save()).collect();
@@ -49,10 +51,10 @@ impl Pair {
 
     /// Goes on where others were, before the row `next`; false where they cannot have been runs of this
     /// scene.
-    pub fn resume(&mut self, saved: &[Saved], next: u64) -> bool {
+    pub fn resume(&mut self, saved: &[SavedDigits], next: u64) -> bool {
         let is_sound = saved.len() == self.runs.len() && next <= self.last_row() + 1;
         // The row before tells again what had happened up to it, and whether that has ended the run.
-        let goes_on = |(run, saved): (&mut Box<dyn LongRun>, &Saved)| {
+        let goes_on = |(run, saved): (&mut Box<dyn LongRun>, &SavedDigits)| {
             let is_back =
                 |run: &mut Box<dyn LongRun>| matches!(run.row(next - 1, &mut || false), Ok(Some(_)));
             run.resume(saved) && (next == 0 || is_back(run))
@@ -65,7 +67,7 @@ impl Pair {
     }
 
     /// The runs before the next row, and its number.
-    pub fn save(&self) -> (&[Saved], u64) {
+    pub fn save(&self) -> (&[SavedDigits], u64) {
         (&self.saved, self.next)
     }
 
@@ -146,20 +148,20 @@ impl Pair {
         &self.runs
     }
 
-    /// Rows that all runs have up to the stop which [`Pair::go`] has told of, that of their last states among
+    /// Rows that all runs have up to the stop which [`DigitsPair::go`] has told of, that of their last states among
     /// them.
-    pub fn up_to_stop(&mut self) -> Vec<(Row, Option<f64>)> {
+    pub fn up_to_stop(&mut self) -> Vec<(ShownRow, Option<f64>)> {
         std::mem::take(&mut self.stopped)
     }
 
     /// The next rows, each run on a thread of its own.
     ///
     /// # Errors
-    /// A run stops; see [`Pair::up_to_stop`].
-    pub fn go(&mut self, pause: &(dyn Fn() -> bool + Sync)) -> Result<Progress, StepError> {
+    /// A run stops; see [`DigitsPair::up_to_stop`].
+    pub fn go(&mut self, pause: &(dyn Fn() -> bool + Sync)) -> Result<PairProgress, StepError> {
         let first = self.next;
         if first > self.last_row() {
-            return Ok(Progress::Over);
+            return Ok(PairProgress::Over);
         }
         let last = self.last_row().min(first + self.rows - 1);
         let begin = Instant::now();
@@ -172,7 +174,7 @@ impl Pair {
             }),
         };
         if let Some(stop) = found.iter().find_map(|gathered| gathered.stop.clone()) {
-            let mut rows: Vec<Vec<Row>> = found.into_iter().map(|gathered| gathered.rows).collect();
+            let mut rows: Vec<Vec<ShownRow>> = found.into_iter().map(|gathered| gathered.rows).collect();
             let common = rows.iter().map(Vec::len).min().unwrap_or(0);
             rows.iter_mut().for_each(|rows| rows.truncate(common));
             self.stopped = self.with_agreement(rows);
@@ -188,9 +190,9 @@ impl Pair {
                 }
             }
             self.resume(&saved, first);
-            return Ok(Progress::Paused);
+            return Ok(PairProgress::Paused);
         }
-        let found: Vec<Vec<Row>> = found.into_iter().map(|gathered| gathered.rows).collect();
+        let found: Vec<Vec<ShownRow>> = found.into_iter().map(|gathered| gathered.rows).collect();
         self.saved = self.runs.iter().map(|run| run.save()).collect();
         self.next = self.last_row().min(last) + 1;
         let spent = begin.elapsed();
@@ -202,15 +204,16 @@ impl Pair {
             self.rows
         };
         self.rows = self.rows.clamp(1, MOST);
-        Ok(Progress::Rows(self.with_agreement(found)))
+        Ok(PairProgress::Rows(self.with_agreement(found)))
     }
 
     /// The rows of the run with the most digits, with the digits to which all agree.
-    fn with_agreement(&self, mut found: Vec<Vec<Row>>) -> Vec<(Row, Option<f64>)> {
+    fn with_agreement(&self, mut found: Vec<Vec<ShownRow>>) -> Vec<(ShownRow, Option<f64>)> {
         let best = found.pop().unwrap_or_default();
         let most = self.most();
-        let with_agreement = |(i, row): (usize, Row)| {
-            let least = |other: &Vec<Row>| other.get(i).map_or(0.0, |other| agreement(other, &row).min(most));
+        let with_agreement = |(i, row): (usize, ShownRow)| {
+            let least =
+                |other: &Vec<ShownRow>| other.get(i).map_or(0.0, |other| agreement(other, &row).min(most));
             let least = found.iter().map(least).reduce(f64::min);
             (row, least)
         };
@@ -220,7 +223,7 @@ impl Pair {
 
 /// What one run has gathered.
 struct Gathered {
-    rows: Vec<Row>,
+    rows: Vec<ShownRow>,
     /// False where it paused or stopped.
     is_through: bool,
     stop: Option<StepError>,
@@ -252,7 +255,7 @@ impl Gathered {
 
 /// Decimal digits to which two rows agree, in angles, rates, positions and velocities: counted from the point
 /// where these are below one.
-fn agreement(a: &Row, b: &Row) -> f64 {
+fn agreement(a: &ShownRow, b: &ShownRow) -> f64 {
     agreed(a.bodies.as_flattened(), b.bodies.as_flattened())
 }
 

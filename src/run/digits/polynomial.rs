@@ -1,6 +1,6 @@
 //! The series of a step as polynomials: how far they reach, and their values inside the step.
 
-use super::motion::Motion;
+use super::motion::DigitsMotion;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::{Digits, sum_of_products};
 use crate::arithmetic::sum::larger;
@@ -10,7 +10,7 @@ const WORK: f64 = 10.0;
 /// Powers the step is taken from: by symmetry some of them may vanish.
 pub(super) const JUDGES: usize = 5;
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// log2 of the largest of power k of the rates.
     fn size(&self, k: usize) -> f64 {
         let f = self.state.u.len();

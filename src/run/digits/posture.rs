@@ -1,6 +1,6 @@
 //! All coordinates of a motion in many digits, from those that are independent.
 
-use super::motion::{LongState, Motion};
+use super::motion::{DigitsMotion, LongState};
 use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::Coordinates;
@@ -8,7 +8,7 @@ use crate::dynamics::series::Constants;
 
 /// All coordinates at a moment.
 #[derive(Clone, Debug)]
-pub struct Posture<const W: usize> {
+pub struct DigitsCoordinates<const W: usize> {
     /// Angles, then positions of origins \[rad, m\].
     pub phi: Vec<Digits<W>>,
     /// Their rates \[rad/s, m/s\].
@@ -19,7 +19,7 @@ pub struct Posture<const W: usize> {
     pub lost: Digits<W>,
 }
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// Independent coordinates and rates of a posture at t = 0, from the first of the bodies they move whose
     /// value is given.
     pub(super) fn independent(
@@ -51,17 +51,17 @@ impl<const W: usize> Motion<W> {
     }
 
     /// All coordinates at the last step's end.
-    pub(super) fn state_posture(&self) -> Posture<W> {
+    pub(super) fn state_posture(&self) -> DigitsCoordinates<W> {
         let LongState { t, u, rate, work, jump_energy, lost, .. } = &self.state;
         let (phi, omega) = self.bodies(*t, u, rate);
-        Posture { phi, omega, work: [*work, *jump_energy], lost: *lost }
+        DigitsCoordinates { phi, omega, work: [*work, *jump_energy], lost: *lost }
     }
 
     /// All coordinates at a time inside the step that is next.
-    pub fn at(&self, t: Digits<W>) -> Posture<W> {
+    pub fn at(&self, t: Digits<W>) -> DigitsCoordinates<W> {
         let (u, rate, [work, lost]) = self.evaluate(t - self.state.t);
         let (phi, omega) = self.bodies(t, &u, &rate);
-        Posture {
+        DigitsCoordinates {
             phi,
             omega,
             work: [self.state.work + work, self.state.jump_energy],

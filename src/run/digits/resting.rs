@@ -15,18 +15,18 @@
 //! they would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
 
 use super::friction::Flown;
-use super::keep::Keeper;
-use super::motion::{LongState, Motion};
-use super::posture::Posture;
+use super::keep::DigitsKeeper;
+use super::motion::{DigitsMotion, LongState};
+use super::posture::DigitsCoordinates;
 use super::several::{self, MOST};
-use super::touch::{self, Passage};
+use super::touch::{self, TouchPassage};
 use super::wall::{gap, gap_rate, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::dynamics::friction::simultaneous::Shocks;
-use crate::dynamics::friction::{Friction, Mode, Normal, Transition};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
 use crate::stepping::search::TOUCH;
@@ -84,42 +84,42 @@ pub enum Released<const W: usize> {
 /// The mechanism without holds and without dry friction.
 pub struct Unheld<const W: usize> {
     pub mechanism: ExactMechanism<Digits<W>>,
-    pub keeper: Keeper<W>,
+    pub keeper: DigitsKeeper<W>,
 }
 
 impl<const W: usize> Unheld<W> {
     /// That of a motion.
-    pub fn of(motion: &Motion<W>) -> Result<Self, StepError> {
+    pub fn of(motion: &DigitsMotion<W>) -> Result<Self, StepError> {
         Self::but(motion, Vec::new())
     }
 
     /// The same where points stay on the walls that hold them: dry friction in hinges and sliders takes no
     /// part in impulses.
-    pub fn but_held(motion: &Motion<W>) -> Result<Self, StepError> {
+    pub fn but_held(motion: &DigitsMotion<W>) -> Result<Self, StepError> {
         Self::but(motion, motion.state().acting.held.clone())
     }
 
-    fn but(motion: &Motion<W>, held: Vec<usize>) -> Result<Self, StepError> {
+    fn but(motion: &DigitsMotion<W>, held: Vec<usize>) -> Result<Self, StepError> {
         let LongState { acting, .. } = motion.state();
-        if acting.held == held && acting.sliding.iter().all(|mode| *mode == Mode::Open) {
+        if acting.held == held && acting.sliding.iter().all(|mode| *mode == FrictionMode::Open) {
             return Ok(Self { mechanism: motion.mechanism.clone(), keeper: motion.keeper.clone() });
         }
-        let sliding = vec![Mode::Open; acting.sliding.len()];
+        let sliding = vec![FrictionMode::Open; acting.sliding.len()];
         let acting = Acting { held, sliding, ..acting.clone() };
         let mechanism = motion.mechanism.with(acting);
         let mechanism = mechanism.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
-        let keeper = Keeper::new(&mechanism, motion.precision);
+        let keeper = DigitsKeeper::new(&mechanism, motion.precision);
         Ok(Self { mechanism, keeper })
     }
 }
 
 /// log2 of the part of a force, or of a velocity, that is rounding.
-fn sure<const W: usize>(motion: &Motion<W>) -> f64 {
+fn sure<const W: usize>(motion: &DigitsMotion<W>) -> f64 {
     motion.precision.rounding(SURE)
 }
 
 /// log2 of the height, over the length of its contact, that a point has to rebound to.
-fn least<const W: usize>(motion: &Motion<W>, wall: usize) -> f64 {
+fn least<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> f64 {
     let lost = 1.0 - motion.mechanism.walls[wall].1.value();
     let sums = if lost > 0.0 { 2.0 * libm::log2(0.5 * lost) } else { f64::NEG_INFINITY };
     (motion.precision.tolerance() + sums).max(ABOVE - motion.precision.bits as f64)
@@ -127,21 +127,21 @@ fn least<const W: usize>(motion: &Motion<W>, wall: usize) -> f64 {
 
 /// What a point does in a step that begins near its wall, from the powers of its gap.
 pub fn passage<const W: usize>(
-    motion: &Motion<W>,
+    motion: &DigitsMotion<W>,
     wall: usize,
     powers: &[Digits<W>],
     step: f64,
-) -> Passage<W> {
+) -> TouchPassage<W> {
     let (length, least) = (motion.mechanism.structure.contacts[wall].length, least(motion, wall));
     let found = touch::passage(powers, length, step, least);
-    let Passage::At(near) = found else { return found };
+    let TouchPassage::At(near) = found else { return found };
     let is_open = powers[0] > Digits::ZERO && powers[0].log2() - libm::log2(length) > least;
     // Where it begins on its wall, what is left of the gap is rounding.
-    Passage::At(refined(motion, if is_open { powers } else { &powers[1..] }, near))
+    TouchPassage::At(refined(motion, if is_open { powers } else { &powers[1..] }, near))
 }
 
 /// True where a point comes from its wall, or goes there, so slowly that it stays: by the powers of its gap.
-fn is_slow<const W: usize>(motion: &Motion<W>, wall: usize, powers: &[Digits<W>]) -> bool {
+fn is_slow<const W: usize>(motion: &DigitsMotion<W>, wall: usize, powers: &[Digits<W>]) -> bool {
     let length = libm::log2(motion.mechanism.structure.contacts[wall].length);
     let still = sure(motion) + length - libm::log2(motion.mechanism.structure.units.time);
     let falls = 0.5 * (least(motion, wall) + length + 3.0 + powers[2].log2());
@@ -149,17 +149,17 @@ fn is_slow<const W: usize>(motion: &Motion<W>, wall: usize, powers: &[Digits<W>]
 }
 
 /// True where a point that touches its wall goes into it, and not so slowly that it stays.
-pub fn is_struck<const W: usize>(motion: &Motion<W>, wall: usize, powers: &[Digits<W>]) -> bool {
+pub fn is_struck<const W: usize>(motion: &DigitsMotion<W>, wall: usize, powers: &[Digits<W>]) -> bool {
     powers[1] < Digits::ZERO && !is_slow(motion, wall, powers)
 }
 
 /// The first row of walls.
-fn standing<const W: usize>(motion: &Motion<W>) -> usize {
+fn standing<const W: usize>(motion: &DigitsMotion<W>) -> usize {
     motion.mechanism.structure.standing_rows()
 }
 
 /// When the force of the wall at this place among those that hold a point passes zero.
-pub fn pressure_ends<const W: usize>(motion: &Motion<W>, place: usize, step: f64) -> Released<W> {
+pub fn pressure_ends<const W: usize>(motion: &DigitsMotion<W>, place: usize, step: f64) -> Released<W> {
     let (row, order) = (standing(motion) + place, motion.precision.order);
     let wall = motion.state().acting.held[place];
     let powers: Vec<Digits<W>> = (0..order).map(|m| -motion.series.multipliers(m)[row]).collect();
@@ -168,15 +168,15 @@ pub fn pressure_ends<const W: usize>(motion: &Motion<W>, place: usize, step: f64
         return Released::Pulled;
     }
     match touch::passage(&powers, unit, step, least) {
-        Passage::Nothing => Released::Not,
-        Passage::At(near) => Released::After(refined(motion, &powers, near)),
-        Passage::Sinks => Released::After(Digits::ZERO),
+        TouchPassage::Nothing => Released::Not,
+        TouchPassage::At(near) => Released::After(refined(motion, &powers, near)),
+        TouchPassage::Sinks => Released::After(Digits::ZERO),
     }
 }
 
 /// The wall that would have to pull its point most, of impulses by row; beside one of 2^`most` smaller ones
 /// are rounding.
-pub fn pulled<const W: usize>(motion: &Motion<W>, impulses: &[Digits<W>], most: f64) -> Option<usize> {
+pub fn pulled<const W: usize>(motion: &DigitsMotion<W>, impulses: &[Digits<W>], most: f64) -> Option<usize> {
     let held = motion.state().acting.held.iter().zip(&impulses[standing(motion)..]);
     let pulled = held.filter(|(_, pull)| **pull > Digits::ZERO && pull.log2() - most > sure(motion));
     pulled.max_by(|a, b| a.1.log2().total_cmp(&b.1.log2())).map(|(&wall, _)| wall)
@@ -195,10 +195,10 @@ struct Touching<const W: usize> {
 
 impl<const W: usize> Touching<W> {
     /// Those of a motion, `wall` among them.
-    fn at(motion: &Motion<W>, wall: usize) -> Result<Self, StepError> {
+    fn at(motion: &DigitsMotion<W>, wall: usize) -> Result<Self, StepError> {
         let Unheld { mechanism, mut keeper } = Unheld::of(motion)?;
         let LongState { t, acting, .. } = motion.state();
-        let Posture { phi, omega, .. } = motion.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = motion.state_posture();
         let mut series = Series::of_terms(&mechanism.terms(), Coordinates::All, POWERS);
         series.expand_terms(&mechanism.terms(), *t, &phi, &vec![Digits::ZERO; phi.len()], &omega);
         let (mut walls, mut rates, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
@@ -264,7 +264,7 @@ impl<const W: usize> Touching<W> {
     }
 }
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// Finds which of the points that touch stay, where one of them, at `wall`, is pressed or pulled
     /// otherwise than before.
     pub(super) fn rest(&mut self, wall: usize) -> Result<(), StepError> {
@@ -310,7 +310,8 @@ impl<const W: usize> Motion<W> {
     ) -> Result<(), StepError> {
         let before = self.state.acting.clone();
         self.settle_modes_at(set, touching, Transition::default())?;
-        let is_same = |(now, before): (&Mode<Digits<W>>, &Mode<Digits<W>>)| now.word() == before.word();
+        let is_same =
+            |(now, before): (&FrictionMode<Digits<W>>, &FrictionMode<Digits<W>>)| now.word() == before.word();
         let Acting { held, sliding, .. } = &self.state.acting;
         if *held != before.held || !sliding.iter().zip(&before.sliding).all(is_same) {
             return Ok(());
@@ -330,7 +331,7 @@ impl<const W: usize> Motion<W> {
     pub(super) fn hold(
         &mut self,
         set: Vec<usize>,
-        sliding: Vec<Mode<Digits<W>>>,
+        sliding: Vec<FrictionMode<Digits<W>>>,
         since: &[Digits<W>],
         flown: Option<Flown<W>>,
     ) -> Result<(), StepError> {
@@ -346,7 +347,8 @@ impl<const W: usize> Motion<W> {
         self.state.holds.retain(|hold| !(goes(hold) && t <= hold.since));
         self.state.holds.iter_mut().filter(|hold| goes(hold)).for_each(|hold| hold.until = Some(t));
         let had = self.state.acting.sliding.clone();
-        let sticks = |modes: &[Mode<Digits<W>>], place: usize| matches!(modes[place], Mode::Stick(_));
+        let sticks =
+            |modes: &[FrictionMode<Digits<W>>], place: usize| matches!(modes[place], FrictionMode::Stick(_));
         let is_new_row = |place: usize| sticks(&sliding, place) && !sticks(&had, place);
         let begin: Vec<(usize, Digits<W>)> = new.iter().map(|hold| (hold.wall, hold.since)).collect();
         let has_new = !new.is_empty() || (0..sliding.len()).any(is_new_row);
@@ -378,9 +380,10 @@ impl<const W: usize> Motion<W> {
     }
 
     /// True where a point slides along a wall with friction in these modes.
-    fn slides_at(&self, wall: usize, modes: &[Mode<Digits<W>>]) -> bool {
-        let slides = |(friction, mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| {
-            friction.normal == Normal::Contact(wall) && matches!(mode, Mode::Slip(_) | Mode::Strained(_))
+    fn slides_at(&self, wall: usize, modes: &[FrictionMode<Digits<W>>]) -> bool {
+        let slides = |(friction, mode): (&CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| {
+            friction.normal == Normal::Contact(wall)
+                && matches!(mode, FrictionMode::Slip(_) | FrictionMode::Strained(_))
         };
         self.mechanism.frictions.iter().zip(modes).any(slides)
     }
@@ -412,8 +415,10 @@ impl<const W: usize> Motion<W> {
         if set == acting.held {
             return Ok(());
         }
-        let mode = |(friction, mode): (&Friction<Digits<W>>, &Mode<Digits<W>>)| match friction.normal {
-            Normal::Contact(wall) if walls.contains(&wall) => Mode::Open,
+        let mode = |(friction, mode): (&CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| match friction
+            .normal
+        {
+            Normal::Contact(wall) if walls.contains(&wall) => FrictionMode::Open,
             _ => *mode,
         };
         let sliding = self.mechanism.frictions.iter().zip(&acting.sliding).map(mode).collect();

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 /// Where a run in many digits is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Saved {
+pub struct SavedDigits {
     precision: Precision,
     words: Vec<Vec<u64>>,
     steps: u64,
@@ -35,7 +35,7 @@ pub struct Saved {
     turns: Vec<(usize, usize, Vec<u64>)>,
 }
 
-impl Saved {
+impl SavedDigits {
     /// Digits and order of the run it is of.
     pub fn precision(&self) -> Precision {
         self.precision
@@ -48,7 +48,7 @@ fn numbers_of<const W: usize>(words: &[Vec<u64>]) -> Option<Vec<Digits<W>>> {
 }
 
 /// Where a run is.
-pub(super) fn save<const W: usize>(run: &Runner<W>) -> Saved {
+pub(super) fn save<const W: usize>(run: &Runner<W>) -> SavedDigits {
     let LongState { t, u, rate, work, jump_energy, lost, acting, .. } = run.motion.state();
     let LongState { steps, impacts, radius, holds, turns, is_decided, .. } = run.motion.state();
     let numbers = [t, work, jump_energy, lost].into_iter().chain(u).chain(rate);
@@ -56,7 +56,7 @@ pub(super) fn save<const W: usize>(run: &Runner<W>) -> Saved {
     let happened = run.motion.watch.happened.iter().map(|Happened { event, t, phi, omega }| {
         (*event, std::iter::once(t).chain(phi).chain(omega).map(Digits::to_words).collect())
     });
-    Saved {
+    SavedDigits {
         precision: run.precision(),
         words,
         steps: *steps,
@@ -78,7 +78,7 @@ pub(super) fn save<const W: usize>(run: &Runner<W>) -> Saved {
 }
 
 /// Goes on from where another run of the same scene was; false where it cannot have been one.
-pub(super) fn resume<const W: usize>(run: &mut Runner<W>, saved: &Saved) -> bool {
+pub(super) fn resume<const W: usize>(run: &mut Runner<W>, saved: &SavedDigits) -> bool {
     let Some((state, happened)) = state_of(run, saved) else { return false };
     let is_known = run.motion.resume(state);
     let watch = &mut run.motion.watch;
@@ -86,7 +86,10 @@ pub(super) fn resume<const W: usize>(run: &mut Runner<W>, saved: &Saved) -> bool
     is_known
 }
 
-fn state_of<const W: usize>(run: &Runner<W>, saved: &Saved) -> Option<(LongState<W>, Vec<Happened<W>>)> {
+fn state_of<const W: usize>(
+    run: &Runner<W>,
+    saved: &SavedDigits,
+) -> Option<(LongState<W>, Vec<Happened<W>>)> {
     let n = run.motion.mechanism.structure.coordinates();
     let happened = |(event, words): &(usize, Vec<Vec<u64>>)| {
         let numbers = numbers_of(words).filter(|numbers| numbers.len() == 1 + 2 * n)?;

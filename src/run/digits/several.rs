@@ -11,14 +11,14 @@
 
 use super::evidence::gradient;
 use super::keep::largest;
-use super::motion::Motion;
+use super::motion::DigitsMotion;
 use super::resting::Unheld;
-use super::wall::{GapRate, Jump, distance, gap_rate, work_of_rows};
+use super::wall::{GapRate, ImpulseJump, distance, gap_rate, work_of_rows};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::friction::modes::HINT;
 use crate::dynamics::friction::simultaneous::Shocks;
-use crate::dynamics::friction::{Friction, Normal};
+use crate::dynamics::friction::{CompiledFriction, Normal};
 use crate::dynamics::kernel::dot;
 use crate::stepping::{Cause, StepError};
 
@@ -40,7 +40,7 @@ pub(super) struct Meeting<const W: usize> {
 
 impl<const W: usize> Meeting<W> {
     /// The walls that touch at the impact of one of them, or hold a point then.
-    pub fn touching(motion: &Motion<W>, wall: usize) -> Self {
+    pub fn touching(motion: &DigitsMotion<W>, wall: usize) -> Self {
         let rounding = motion.precision.rounding(SURE);
         let touches = |&other: &usize| {
             let row = &motion.mechanism.walls[other].0;
@@ -56,7 +56,7 @@ impl<const W: usize> Meeting<W> {
     }
 
     /// The same where several walls are approached.
-    pub fn at(motion: &Motion<W>, wall: usize) -> Option<Self> {
+    pub fn at(motion: &DigitsMotion<W>, wall: usize) -> Option<Self> {
         if motion.mechanism.walls.len() < 2 {
             return None;
         }
@@ -75,7 +75,7 @@ impl<const W: usize> Meeting<W> {
     ///
     /// # Errors
     /// No impulses fit.
-    pub fn jump(&self, motion: &Motion<W>) -> Result<Jump<W>, StepError> {
+    pub fn jump(&self, motion: &DigitsMotion<W>) -> Result<ImpulseJump<W>, StepError> {
         let contacts = &motion.mechanism.structure.contacts;
         let names: Vec<&str> = self.walls.iter().map(|&wall| contacts[wall].row.name()).collect();
         let names = names.join(", ");
@@ -86,7 +86,7 @@ impl<const W: usize> Meeting<W> {
         let (t, posture) = (motion.state().t, motion.state_posture());
         // Points that stay on walls take part as all others that touch; friction elsewhere does not.
         let Unheld { mechanism, mut keeper } = Unheld::of(motion)?;
-        let frictions: Vec<Option<&Friction<Digits<W>>>> = (self.walls.iter())
+        let frictions: Vec<Option<&CompiledFriction<Digits<W>>>> = (self.walls.iter())
             .map(|&wall| mechanism.frictions.iter().find(|friction| friction.normal == Normal::Contact(wall)))
             .collect();
         let z = mechanism.elements(&posture.phi);
@@ -143,7 +143,7 @@ impl<const W: usize> Meeting<W> {
         let least = largest(normal) + self.rounding;
         let pressing = normal.iter().filter(|impulse| impulse.log2() > least).count();
         let work = work + work_of_rows(&mechanism, t, &posture, &sum(&pulls));
-        Ok(Jump { change: sum(&responses), work, walls: pressing as u64 })
+        Ok(ImpulseJump { change: sum(&responses), work, walls: pressing as u64 })
     }
 }
 

@@ -5,7 +5,7 @@ use crate::arithmetic::Real;
 
 /// What there is to know at an output time.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct ShownRow {
     /// Its number, from 0.
     pub number: u64,
     /// Time \[s\].
@@ -25,7 +25,7 @@ pub struct Row {
     pub residuals: Vec<[f64; 2]>,
 }
 
-impl Row {
+impl ShownRow {
     /// Time \[s\], as a double.
     pub fn time(&self) -> f64 {
         self.t.value()

@@ -11,7 +11,7 @@
 
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::stepping::search::{Powers, root};
+use crate::stepping::search::{PowerSeries, root};
 
 /// log2 of how much longer a window is than the next one.
 const WINDOW: i32 = 6;
@@ -22,7 +22,7 @@ const OVERLAP: f64 = 1e-9;
 
 /// What a function does in a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Passage<const W: usize> {
+pub(super) enum TouchPassage<const W: usize> {
     /// It stays positive, or near zero.
     Nothing,
     /// It passes from positive to negative, about here \[s\].
@@ -33,7 +33,12 @@ pub(super) enum Passage<const W: usize> {
 
 /// The first passage of a function within a step of so many seconds, from its powers; values are divided by
 /// `unit`, and of these 2^`least` is near zero.
-pub(super) fn passage<const W: usize>(powers: &[Digits<W>], unit: f64, step: f64, least: f64) -> Passage<W> {
+pub(super) fn passage<const W: usize>(
+    powers: &[Digits<W>],
+    unit: f64,
+    step: f64,
+    least: f64,
+) -> TouchPassage<W> {
     let (mut scale, length) = (Digits::of(1.0 / unit), Digits::of(step));
     let in_shares = |power: &Digits<W>| {
         let share = *power * scale;
@@ -41,7 +46,7 @@ pub(super) fn passage<const W: usize>(powers: &[Digits<W>], unit: f64, step: f64
         share
     };
     let mut shares: Vec<Digits<W>> = powers.iter().map(in_shares).collect();
-    let Some(first) = shares.first_mut() else { return Passage::Nothing };
+    let Some(first) = shares.first_mut() else { return TouchPassage::Nothing };
     let mut has_opened = *first > Digits::ZERO && first.log2() > least;
     let size = if has_opened { first.log2() } else { least };
     if !has_opened {
@@ -51,28 +56,28 @@ pub(super) fn passage<const W: usize>(powers: &[Digits<W>], unit: f64, step: f64
     let reach = |(m, share): (usize, &Digits<W>)| (size - share.log2()) / m as f64 - 1.0;
     let begin = shares.iter().enumerate().skip(1).map(reach).fold(f64::INFINITY, f64::min);
     if begin >= 0.0 || begin.is_nan() {
-        return Passage::Nothing;
+        return TouchPassage::Nothing;
     }
     let windows = (-begin / f64::from(WINDOW)).floor() as i32;
     let mut from = libm::exp2(begin + f64::from(WINDOW * windows));
     for window in (0..=windows).rev() {
         let (curve, scale) = seen_in(&shares, -WINDOW * window);
-        let curve = Powers { powers: &curve, end: 1.0 };
+        let curve = PowerSeries { powers: &curve, end: 1.0 };
         if !has_opened {
             let level = libm::exp2(least + scale);
             let (opens, sinks) = (root(&curve, level, from, 1.0), root(&curve, -level, from, 1.0));
             match (opens, sinks) {
-                (opens, Some(sink)) if opens.is_none_or(|open| sink < open) => return Passage::Sinks,
+                (opens, Some(sink)) if opens.is_none_or(|open| sink < open) => return TouchPassage::Sinks,
                 (Some(open), _) => (has_opened, from) = (true, open),
                 _ => {}
             }
         }
         if has_opened && let Some(zero) = root(&curve, 0.0, from, 1.0) {
-            return Passage::At(Digits::of(zero).ldexp(-WINDOW * window) * length);
+            return TouchPassage::At(Digits::of(zero).ldexp(-WINDOW * window) * length);
         }
         from = libm::exp2(f64::from(-WINDOW)) * (1.0 - OVERLAP);
     }
-    Passage::Nothing
+    TouchPassage::Nothing
 }
 
 /// Powers in shares of a window that is 2^`log_window` of the step, as doubles of ordinary size, and log2 of
@@ -101,7 +106,7 @@ mod tests {
     #[test]
     fn a_rebound_of_any_height_above_the_least_comes_down_where_it_should() {
         for v in [0.5, 1e-8, 1e-16, 1e-30] {
-            let Passage::At(t) = passage(&powers(&[0.0, v, -5.0, 1e-3]), 1.0, 0.125, -400.0) else {
+            let TouchPassage::At(t) = passage(&powers(&[0.0, v, -5.0, 1e-3]), 1.0, 0.125, -400.0) else {
                 panic!("no passage");
             };
             let t = t.value();
@@ -111,7 +116,7 @@ mod tests {
 
     #[test]
     fn what_is_lower_than_the_least_sinks() {
-        let sinks = |of: &[f64]| matches!(passage(&powers(of), 2.0, 0.5, -100.0), Passage::Sinks);
+        let sinks = |of: &[f64]| matches!(passage(&powers(of), 2.0, 0.5, -100.0), TouchPassage::Sinks);
         assert!(sinks(&[0.0, 1e-16, -5.0]));
         assert!(sinks(&[-1e-40, 0.0, 0.0, -1.0]));
         assert!(sinks(&[1e-40, -1.0, 3.0]));
@@ -122,12 +127,12 @@ mod tests {
 
     #[test]
     fn a_small_gap_that_is_approached_closes() {
-        let Passage::At(t) = passage(&powers(&[1e-25, -1e-5, 1.0]), 1.0, 1.0, -110.0) else {
+        let TouchPassage::At(t) = passage(&powers(&[1e-25, -1e-5, 1.0]), 1.0, 1.0, -110.0) else {
             panic!("no passage");
         };
         assert!((t.value() - 1e-20).abs() < 1e-30);
         // One that turns back before it does not.
         let turns = passage(&powers(&[1e-25, -1e-13, 1.0]), 1.0, 1.0, -110.0);
-        assert!(matches!(turns, Passage::Nothing));
+        assert!(matches!(turns, TouchPassage::Nothing));
     }
 }

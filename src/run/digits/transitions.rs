@@ -11,13 +11,13 @@
 
 use super::friction::SURE;
 use super::functions::LEAVES;
-use super::motion::Motion;
-use super::touch::{self, Passage};
+use super::motion::DigitsMotion;
+use super::touch::{self, TouchPassage};
 use super::wall::{Ends, in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
-use crate::dynamics::friction::{Mode, Normal, Transition};
-use crate::stepping::search::{Curve, Powers};
+use crate::dynamics::friction::{FrictionMode, Normal, Transition};
+use crate::stepping::search::{Curve, PowerSeries};
 use crate::stepping::{Cause, StepError};
 
 /// What a place does at the end of a step.
@@ -34,7 +34,10 @@ pub enum ModeChange {
 }
 
 /// The first of what places with friction do within a step of so many seconds, and the exact time up to it.
-pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(Ends, Digits<W>)>, StepError> {
+pub fn first<const W: usize>(
+    motion: &DigitsMotion<W>,
+    step: f64,
+) -> Result<Option<(Ends, Digits<W>)>, StepError> {
     let mut found: Option<(ModeChange, Digits<W>)> = None;
     let mut comes = |change: ModeChange, time: Digits<W>| {
         if found.as_ref().is_none_or(|(_, first)| time < *first) {
@@ -46,8 +49,8 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
     for (place, mode) in motion.state().acting.sliding.iter().enumerate() {
         let friction = &motion.mechanism.frictions[place];
         match *mode {
-            Mode::Open => {}
-            Mode::Slip(sign) => {
+            FrictionMode::Open => {}
+            FrictionMode::Slip(sign) => {
                 let Some(slides) = slides.next() else { continue };
                 let powers: Vec<_> = slides.speed.iter().map(|speed| speed.scale(sign)).collect();
                 if let Some(time) = passes(motion, &powers, motion.speed_unit(place), step) {
@@ -57,7 +60,7 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                     comes(ModeChange::Reverses, time);
                 }
             }
-            Mode::Strained(strain) => {
+            FrictionMode::Strained(strain) => {
                 let Some(slides) = slides.next() else { continue };
                 if let Some(sign) = moves(motion, slides.speed, motion.speed_unit(place), step)
                     && strain == 0.0
@@ -71,7 +74,7 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
                     comes(ModeChange::Reverses, time);
                 }
             }
-            Mode::Stick(_) => {
+            FrictionMode::Stick(_) => {
                 let Some(normals) = sticks.next() else { continue };
                 let order = motion.precision.order;
                 let tau: Vec<_> = (0..order).map(|m| motion.series.multipliers(m)[row]).collect();
@@ -91,7 +94,7 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
 
 /// When a function that is positive, or begins at zero, goes below zero; values are divided by `unit`.
 fn passes<const W: usize>(
-    motion: &Motion<W>,
+    motion: &DigitsMotion<W>,
     powers: &[Digits<W>],
     unit: f64,
     step: f64,
@@ -103,16 +106,16 @@ fn passes<const W: usize>(
     }
     let is_open = powers[0] > Digits::ZERO && first > least;
     match touch::passage(powers, unit, step, least) {
-        Passage::Nothing => None,
+        TouchPassage::Nothing => None,
         // Where it begins at zero, what is left of that is rounding.
-        Passage::At(near) => Some(refined(motion, if is_open { powers } else { &powers[1..] }, near)),
-        Passage::Sinks => Some(Digits::ZERO),
+        TouchPassage::At(near) => Some(refined(motion, if is_open { powers } else { &powers[1..] }, near)),
+        TouchPassage::Sinks => Some(Digits::ZERO),
     }
 }
 
 /// When the normal force of a hinge or rail passes zero.
 fn reverses<const W: usize>(
-    motion: &Motion<W>,
+    motion: &DigitsMotion<W>,
     place: usize,
     normal: Normal,
     size: &[Digits<W>],
@@ -137,23 +140,25 @@ fn reverses<const W: usize>(
 
 /// The sign of the force by which a place breaks loose; where there is none, as without a load, that of a
 /// moment later.
-fn side<const W: usize>(motion: &Motion<W>, tau: &[Digits<W>], time: Digits<W>, step: f64) -> f64 {
+fn side<const W: usize>(motion: &DigitsMotion<W>, tau: &[Digits<W>], time: Digits<W>, step: f64) -> f64 {
     let limbs = motion.precision.limbs;
     let at = |sum: Digits<W>, power: &Digits<W>| (sum * time).shortened(limbs) + *power;
     let force = tau.iter().rev().fold(Digits::ZERO, at);
     let unit = weight(tau, step).max(f64::MIN_POSITIVE);
     let is_there = force.log2() - libm::log2(unit) > motion.precision.rounding(SURE);
-    let later =
-        || Powers { powers: &in_shares(tau, 1.0 / unit, step), end: 1.0 }.at(time.value() / step + LEAVES)[0];
+    let later = || {
+        PowerSeries { powers: &in_shares(tau, 1.0 / unit, step), end: 1.0 }.at(time.value() / step + LEAVES)
+            [0]
+    };
     let is_negative = if is_there { force < Digits::ZERO } else { later() < 0.0 };
     if is_negative { -1.0 } else { 1.0 }
 }
 
 /// The sign of a velocity that begins at zero, where it leaves it within a step.
-fn moves<const W: usize>(motion: &Motion<W>, speed: &[Digits<W>], unit: f64, step: f64) -> Option<f64> {
+fn moves<const W: usize>(motion: &DigitsMotion<W>, speed: &[Digits<W>], unit: f64, step: f64) -> Option<f64> {
     let shares = in_shares(speed, 1.0 / unit, step);
     let most = shares.iter().fold(0.0_f64, |most, share| most.max(share.abs()));
-    let value = Powers { powers: &shares, end: 1.0 }.at(LEAVES)[0];
+    let value = PowerSeries { powers: &shares, end: 1.0 }.at(LEAVES)[0];
     (libm::log2(most) > motion.precision.rounding(SURE)).then(|| if value < 0.0 { -1.0 } else { 1.0 })
 }
 
@@ -185,11 +190,11 @@ fn grip<const W: usize>(
     (most.into_iter().zip(held).map(|(most, held)| most - held).collect(), unit)
 }
 
-impl<const W: usize> Motion<W> {
+impl<const W: usize> DigitsMotion<W> {
     /// Lets it take effect what a place with friction does.
     pub(super) fn change_mode(&mut self, change: ModeChange) -> Result<(), StepError> {
         let held = self.state().acting.held.clone();
-        let alone = |motion: &Self, place: usize, mode: Mode<Digits<W>>| {
+        let alone = |motion: &Self, place: usize, mode: FrictionMode<Digits<W>>| {
             let mut modes = motion.state().acting.sliding.clone();
             modes[place] = mode;
             modes
@@ -197,7 +202,7 @@ impl<const W: usize> Motion<W> {
         match change {
             // How it goes on is told by the series of its velocity.
             ModeChange::Arrives(place) if self.is_driven(place) => {
-                let modes = alone(self, place, Mode::Strained(0.0));
+                let modes = alone(self, place, FrictionMode::Strained(0.0));
                 self.hold(held, modes, &[], None)
             }
             ModeChange::Arrives(place) => {
@@ -207,7 +212,7 @@ impl<const W: usize> Motion<W> {
                 self.settle_modes(Transition { arrived: None, breaks: Some((place, sign)) })
             }
             ModeChange::Moves(place, sign) => {
-                let modes = alone(self, place, Mode::Slip(sign));
+                let modes = alone(self, place, FrictionMode::Slip(sign));
                 self.hold(held, modes, &[], None)
             }
             ModeChange::Reverses => Ok(()),

@@ -10,19 +10,19 @@
 //! of the length of a contact are not told from touching, but for those that begin so: see module `touch`.
 
 use super::friction_impact;
-use super::motion::Motion;
-use super::posture::Posture as AllCoordinates;
+use super::motion::DigitsMotion;
+use super::posture::DigitsCoordinates;
 use super::resting::{self, Released, Unheld};
 use super::several::Meeting;
-use super::touch::Passage;
+use super::touch::TouchPassage;
 use super::transitions::ModeChange;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
-use crate::dynamics::constraint::{Aim, ConstraintEquation, Measure, Posture};
+use crate::dynamics::constraint::{Aim, ConstraintArguments, ConstraintEquation, RowMeasure};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::{Constants, Series};
-use crate::stepping::search::{Crossing, Powers, TOUCH, crossing};
+use crate::stepping::search::{Crossing, PowerSeries, TOUCH, crossing};
 use crate::stepping::{Cause, StepError};
 use std::sync::Arc;
 
@@ -47,7 +47,10 @@ pub enum Ends {
 }
 
 /// What ends a step of so many seconds, and the exact time up to it.
-pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(Ends, Digits<W>)>, StepError> {
+pub fn first<const W: usize>(
+    motion: &DigitsMotion<W>,
+    step: f64,
+) -> Result<Option<(Ends, Digits<W>)>, StepError> {
     let (mut found, mut rests): (Option<(Ends, Digits<W>)>, _) = (None, None);
     let mut comes = |ends: Ends, time: Digits<W>| {
         if found.as_ref().is_none_or(|(_, first)| time < *first) {
@@ -63,16 +66,16 @@ pub fn first<const W: usize>(motion: &Motion<W>, step: f64) -> Result<Option<(En
         let shares = in_shares(&powers, 1.0 / length, step);
         if is_near(&shares) {
             match resting::passage(motion, wall, &powers, step) {
-                Passage::Nothing => {}
-                Passage::At(time) => comes(Ends::Met(wall), time),
-                Passage::Sinks if resting::is_struck(motion, wall, &powers) => {
+                TouchPassage::Nothing => {}
+                TouchPassage::At(time) => comes(Ends::Met(wall), time),
+                TouchPassage::Sinks if resting::is_struck(motion, wall, &powers) => {
                     comes(Ends::Met(wall), Digits::ZERO);
                 }
-                Passage::Sinks => rests = rests.or(Some(wall)),
+                TouchPassage::Sinks => rests = rests.or(Some(wall)),
             }
             continue;
         }
-        let from = match crossing(&Powers { powers: &shares, end: 1.0 }, 1.0) {
+        let from = match crossing(&PowerSeries { powers: &shares, end: 1.0 }, 1.0) {
             Crossing::Nothing => continue,
             Crossing::At(share) => share * step,
             Crossing::Inside(_) if shares.get(1).is_some_and(|&slope| slope < 0.0) => 0.0,
@@ -125,7 +128,7 @@ pub(super) fn gap<const W: usize>(
     t: Digits<W>,
     row: &ConstraintEquation<Digits<W>>,
 ) -> Vec<Digits<W>> {
-    let Measure::Place(place) = &row.measure else { return Vec::new() };
+    let RowMeasure::Place(place) = &row.measure else { return Vec::new() };
     let elements: Vec<&[Complex<Digits<W>>]> = series.z.chunks_exact(series.elements()).collect();
     let linear =
         |z: &&[Complex<Digits<W>>]| place.linear.iter().fold(Digits::ZERO, |sum, &(k, g)| sum + g.dot(z[k]));
@@ -157,11 +160,14 @@ pub(super) fn gap<const W: usize>(
 }
 
 /// The gap of a wall at the state \[m\].
-pub(super) fn distance<const W: usize>(motion: &Motion<W>, row: &ConstraintEquation<Digits<W>>) -> Digits<W> {
+pub(super) fn distance<const W: usize>(
+    motion: &DigitsMotion<W>,
+    row: &ConstraintEquation<Digits<W>>,
+) -> Digits<W> {
     let (t, posture) = (motion.state.t, motion.state_posture());
     let z = motion.mechanism.elements(&posture.phi);
     let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, t));
-    let at = Posture { phi: &posture.phi, z: &z, omega: &[] };
+    let at = ConstraintArguments { phi: &posture.phi, z: &z, omega: &[] };
     let aim = |aim: &Arc<Aim<Digits<W>>>| aim.at(t, at, |slots| slots[aim.value as usize]);
     row.gap(&z) - travel - row.aim.as_ref().map_or(Digits::ZERO, aim)
 }
@@ -171,7 +177,7 @@ pub(super) fn distance<const W: usize>(motion: &Motion<W>, row: &ConstraintEquat
 pub(super) fn travel_rate<const W: usize>(
     row: &ConstraintEquation<Digits<W>>,
     t: Digits<W>,
-    at: Posture<Digits<W>>,
+    at: ConstraintArguments<Digits<W>>,
 ) -> Digits<W> {
     let rate = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::phase(law, t).rate);
     let aim = |aim: &Arc<Aim<Digits<W>>>| aim.at(t, at, |slots| slots[aim.drive as usize]);
@@ -180,7 +186,7 @@ pub(super) fn travel_rate<const W: usize>(
 
 /// The zero of a polynomial near a time, as far as its digits tell.
 pub(super) fn refined<const W: usize>(
-    motion: &Motion<W>,
+    motion: &DigitsMotion<W>,
     powers: &[Digits<W>],
     mut t: Digits<W>,
 ) -> Digits<W> {
@@ -204,7 +210,7 @@ pub(super) fn refined<const W: usize>(
 }
 
 /// The jump of the rates at a wall, and at all others that are met at the same moment.
-pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(), StepError> {
+pub fn impact<const W: usize>(motion: &mut DigitsMotion<W>, wall: usize) -> Result<(), StepError> {
     let gap = gap_rate(motion, wall);
     let approach = gap.rate;
     let several = Meeting::at(motion, wall);
@@ -241,7 +247,7 @@ pub fn impact<const W: usize>(motion: &mut Motion<W>, wall: usize) -> Result<(),
 /// True where an impulse turns a point back that meets its wall, points let go that others would have to
 /// pull; among several walls only points that are not at rest along their normals are looked at.
 fn has_way_back<const W: usize>(
-    motion: &mut Motion<W>,
+    motion: &mut DigitsMotion<W>,
     wall: usize,
     gap: &GapRate<W>,
     is_among_several: bool,
@@ -269,7 +275,7 @@ fn has_way_back<const W: usize>(
 }
 
 /// An error where no impulse turns a point back.
-fn no_way_back<const W: usize>(motion: &Motion<W>, wall: usize) -> StepError {
+fn no_way_back<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> StepError {
     let name = &motion.mechanism.walls[wall].0.name;
     let what = format!("the constraints leave a point that meets wall {name} no way back");
     let hint = "look for motors that drive it there and change their laws, or end the run before";
@@ -278,15 +284,15 @@ fn no_way_back<const W: usize>(motion: &Motion<W>, wall: usize) -> StepError {
 
 /// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap
 /// \[m/s\].
-pub(super) fn gap_rate<const W: usize>(motion: &Motion<W>, wall: usize) -> GapRate<W> {
+pub(super) fn gap_rate<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> GapRate<W> {
     let (t, posture) = (motion.state.t, motion.state_posture());
     let z = motion.mechanism.elements(&posture.phi);
     let row = &motion.mechanism.walls[wall].0;
     let mut gradient = vec![Digits::ZERO; posture.phi.len()];
-    if let Measure::Place(place) = &row.measure {
+    if let RowMeasure::Place(place) = &row.measure {
         place.slopes(&z, |k, slope| gradient[k] += slope);
     }
-    let at = Posture { phi: &posture.phi, z: &z, omega: &posture.omega };
+    let at = ConstraintArguments { phi: &posture.phi, z: &z, omega: &posture.omega };
     if let Some(aim) = &row.aim {
         let slopes = aim.slopes.iter();
         aim.at(t, at, |slots| slopes.for_each(|&(k, slope)| gradient[k] -= slots[slope as usize]));
@@ -308,10 +314,10 @@ pub(super) struct GapRate<const W: usize> {
 
 /// What the impulse of one wall does, and the impulses of the constraints for one of it.
 fn alone<const W: usize>(
-    motion: &mut Motion<W>,
+    motion: &mut DigitsMotion<W>,
     wall: usize,
     GapRate { gradient, travel, rate }: &GapRate<W>,
-) -> (Jump<W>, Vec<Digits<W>>) {
+) -> (ImpulseJump<W>, Vec<Digits<W>>) {
     let (t, posture) = (motion.state.t, motion.state_posture());
     let at = [&posture.phi[..], &posture.omega[..]];
     let (response, pulls) = motion.keeper.response(&motion.mechanism, t, at, gradient);
@@ -319,7 +325,7 @@ fn alone<const W: usize>(
     let impulse = -(Digits::ONE + restitution) * *rate / dot(gradient, &response);
     let change = response.iter().map(|&a| a * impulse).collect();
     let work = impulse * (*travel + work_of_rows(&motion.mechanism, t, &posture, &pulls));
-    (Jump { change, work, walls: 1 }, pulls)
+    (ImpulseJump { change, work, walls: 1 }, pulls)
 }
 
 /// Work \[J\] of motors, and of walls that hold a point, which hold their rates, by these impulses of the
@@ -327,17 +333,17 @@ fn alone<const W: usize>(
 pub(super) fn work_of_rows<const W: usize>(
     mechanism: &ExactMechanism<Digits<W>>,
     t: Digits<W>,
-    posture: &AllCoordinates<W>,
+    posture: &DigitsCoordinates<W>,
     impulses: &[Digits<W>],
 ) -> Digits<W> {
     let z = mechanism.elements(&posture.phi);
-    let at = Posture { phi: &posture.phi, z: &z, omega: &posture.omega };
+    let at = ConstraintArguments { phi: &posture.phi, z: &z, omega: &posture.omega };
     let rows = mechanism.constraints.iter().zip(impulses);
     rows.fold(Digits::ZERO, |work, (row, &impulse)| work - impulse * travel_rate(row, t, at))
 }
 
 /// What impulses do at one moment.
-pub(super) struct Jump<const W: usize> {
+pub(super) struct ImpulseJump<const W: usize> {
     /// Change of the rates of all coordinates.
     pub change: Vec<Digits<W>>,
     /// Work of motors and of walls that move \[J\].
@@ -347,7 +353,10 @@ pub(super) struct Jump<const W: usize> {
 }
 
 /// Changes the rates of all coordinates by impulses.
-fn jumped<const W: usize>(motion: &mut Motion<W>, Jump { change, work, walls }: &Jump<W>) {
+fn jumped<const W: usize>(
+    motion: &mut DigitsMotion<W>,
+    ImpulseJump { change, work, walls }: &ImpulseJump<W>,
+) {
     let (posture, limbs) = (motion.state_posture(), motion.precision.limbs);
     let (phi, omega) = (&posture.phi, &posture.omega);
     let z = motion.mechanism.elements(phi);

@@ -49,7 +49,7 @@ pub(super) struct Passage {
 }
 
 /// A function in a part of a step.
-struct Part<'a> {
+struct StepPart<'a> {
     begin: Time,
     /// How long it lasts \[s\].
     span: f64,
@@ -64,7 +64,7 @@ struct Part<'a> {
     is_last: bool,
 }
 
-impl Part<'_> {
+impl StepPart<'_> {
     /// The values at the first two nodes.
     fn first(&self) -> [f64; 2] {
         [self.values[self.values.len() - 1], self.values[self.values.len() - 2]]
@@ -120,7 +120,7 @@ impl EventDetector {
                 continue;
             }
             let is_resolved = are_resolved[event];
-            let part = Part { begin, span, curve, values: &values[event], places, is_resolved, is_last };
+            let part = StepPart { begin, span, curve, values: &values[event], places, is_resolved, is_last };
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),
                 Owner::Friction(..) => Some(true),
@@ -136,7 +136,7 @@ impl EventDetector {
     }
 
     /// Passages of a condition that is in this mode.
-    fn of_condition(&mut self, part: &Part, event: usize, mode: bool, all: &mut Vec<Passage>) {
+    fn of_condition(&mut self, part: &StepPart, event: usize, mode: bool, all: &mut Vec<Passage>) {
         let (curve, [first, next], most) = (part.curve, part.first(), part.curve.most());
         let is_of_laws = matches!(self.owner(event), Owner::Condition(..));
         if is_of_laws && most <= NO_VALUE * self.memory.largest[event].max(most) {
@@ -161,7 +161,7 @@ impl EventDetector {
     }
 
     /// Passages of the function of an event.
-    fn of_event(&mut self, inside: &mut dyn Inside, part: &Part, event: usize, all: &mut Vec<Passage>) {
+    fn of_event(&mut self, inside: &mut dyn Inside, part: &StepPart, event: usize, all: &mut Vec<Passage>) {
         let (begin, [first, next], most) = (part.begin, part.first(), part.curve.most());
         let is_woken = self.memory.woken.contains(&event);
         let is_now = |before: &Time| (begin - *before).hi <= SAME * part.span;
@@ -219,7 +219,7 @@ impl EventDetector {
 
     /// The passage of a function that comes to zero where the step ends, as the height of a point does on its
     /// wall: on which side rounding has it there does not matter.
-    fn end_at_zero(&mut self, part: &Part, event: usize, end: Time, all: &mut Vec<Passage>) {
+    fn end_at_zero(&mut self, part: &StepPart, event: usize, end: Time, all: &mut Vec<Passage>) {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
         let off = self.resolved.max(NO_VALUE) * part.curve.most();
         if *side != 0 && value.abs() <= off && sign(slope) == -*side {
@@ -232,7 +232,7 @@ impl EventDetector {
     /// behind one is told where it has left that.
     fn zeros(
         &mut self,
-        part: &Part,
+        part: &StepPart,
         event: usize,
         (mut share, off): (f64, Option<f64>),
         all: &mut Vec<Passage>,
@@ -260,7 +260,7 @@ impl EventDetector {
     fn between(
         &mut self,
         inside: &mut dyn Inside,
-        part: &Part,
+        part: &StepPart,
         (event, is_behind): (usize, bool),
         all: &mut Vec<Passage>,
     ) {

@@ -36,7 +36,7 @@ const BEFORE: usize = 8;
 const SHORT: f64 = 1e-9;
 
 /// A step, and what of it is still to be searched: shares from and to, and halvings, the next one last.
-struct Ahead {
+struct PendingStep {
     begin: Time,
     span: f64,
     parts: Vec<(f64, f64, u32)>,
@@ -44,14 +44,14 @@ struct Ahead {
     unresolved: usize,
 }
 
-impl Ahead {
+impl PendingStep {
     fn time(&self, share: f64) -> Time {
         self.begin + share * self.span
     }
 }
 
 /// What a part of a step has.
-enum Seen {
+enum PartZeros {
     /// Conditions that ask for halves.
     TooMuch,
     /// Conditions that were taken for positive, and are zero.
@@ -75,7 +75,7 @@ impl ExtremesDetector {
 
     /// Looks at a step, part by part.
     pub(super) fn look_at_parts(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) {
-        let mut ahead = Ahead { begin, span, parts: vec![(0.0, 1.0, 0)], unresolved: UNRESOLVED };
+        let mut ahead = PendingStep { begin, span, parts: vec![(0.0, 1.0, 0)], unresolved: UNRESOLVED };
         let mut from = if span > 0.0 { 0.0 } else { 1.0 };
         for _ in 0..PARTS {
             if from >= 1.0 || ahead.unresolved == 0 {
@@ -97,7 +97,7 @@ impl ExtremesDetector {
     }
 
     /// Looks at a part, up to as near its ends as all outputs are finite.
-    fn look_at_part(&mut self, inside: &mut dyn Inside, ahead: &Ahead, [from, to]: [f64; 2]) {
+    fn look_at_part(&mut self, inside: &mut dyn Inside, ahead: &PendingStep, [from, to]: [f64; 2]) {
         let mut finite = |share: f64| {
             let values = self.values_at(inside.at(ahead.time(share)));
             values.iter().filter(|value| value.is_finite()).count()
@@ -144,27 +144,27 @@ impl ExtremesDetector {
     }
 
     /// The share of a step, from `first` on, at which a condition changes sign first; 1 where none does.
-    fn change(&mut self, inside: &mut dyn Inside, ahead: &mut Ahead, first: f64) -> f64 {
+    fn change(&mut self, inside: &mut dyn Inside, ahead: &mut PendingStep, first: f64) -> f64 {
         while let Some((low, high, depth)) = ahead.parts.pop() {
             let low = low.max(first);
             if low >= high {
                 continue;
             }
             match self.search(inside, ahead, [low, high], depth) {
-                Seen::TooMuch => {
+                PartZeros::TooMuch => {
                     let middle = 0.5 * (low + high);
                     ahead.parts.extend([(middle, high, depth + 1), (low, middle, depth + 1)]);
                 }
-                Seen::Still => ahead.parts.push((low, high, depth)),
-                Seen::Change(None, _) => {}
-                Seen::Change(Some(mut share), mut is_blind) => {
+                PartZeros::Still => ahead.parts.push((low, high, depth)),
+                PartZeros::Change(None, _) => {}
+                PartZeros::Change(Some(mut share), mut is_blind) => {
                     for _ in 0..BEFORE {
                         let end = low + (share - low) * (1.0 - SHORT);
                         if !is_blind || end <= low {
                             break;
                         }
                         match self.search(inside, ahead, [low, end], HALVINGS) {
-                            Seen::Change(Some(earlier), blind) => (share, is_blind) = (earlier, blind),
+                            PartZeros::Change(Some(earlier), blind) => (share, is_blind) = (earlier, blind),
                             _ => break,
                         }
                     }
@@ -180,10 +180,10 @@ impl ExtremesDetector {
     fn search(
         &mut self,
         inside: &mut dyn Inside,
-        ahead: &mut Ahead,
+        ahead: &mut PendingStep,
         [low, high]: [f64; 2],
         depth: u32,
-    ) -> Seen {
+    ) -> PartZeros {
         let place = |share: f64| low + share * (high - low);
         let still = self.memory.still.clone();
         let is_known = |k: usize, curve: &Chebyshev| {
@@ -197,12 +197,12 @@ impl ExtremesDetector {
             return self.search(inside, ahead, [low, high], depth);
         }
         if !is_resolved && depth < HALVINGS {
-            return Seen::TooMuch;
+            return PartZeros::TooMuch;
         }
         let is_zero = |k: usize| curves[k].most() <= still[k];
         if (0..curves.len()).any(|k| is_zero(k) && self.branches[k]) {
             (0..curves.len()).filter(|&k| is_zero(k)).for_each(|k| self.branches[k] = false);
-            return Seen::Still;
+            return PartZeros::Still;
         }
         let (mut earliest, mut is_blind) = (None::<(f64, bool)>, false);
         for (k, curve) in curves.iter().enumerate().filter(|(k, _)| !is_zero(*k)) {
@@ -224,7 +224,7 @@ impl ExtremesDetector {
         if earliest.is_some_and(|(_, known)| !known) {
             ahead.unresolved = ahead.unresolved.saturating_sub(1);
         }
-        Seen::Change(earliest.map(|(share, _)| place(share)), is_blind)
+        PartZeros::Change(earliest.map(|(share, _)| place(share)), is_blind)
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Stream {
 
 /// How far a table was written: so much of it counts.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Cursor {
+pub struct StreamPosition {
     pub(super) bytes: u64,
     /// The state of its SHA-256 there.
     hash: Vec<u8>,
@@ -31,9 +31,9 @@ impl Stream {
     ///
     /// # Errors
     /// The disk does not take it.
-    pub fn cursor(&self) -> io::Result<Cursor> {
+    pub fn cursor(&self) -> io::Result<StreamPosition> {
         self.file.sync_data()?;
-        Ok(Cursor { bytes: self.bytes, hash: self.hash.serialize().to_vec() })
+        Ok(StreamPosition { bytes: self.bytes, hash: self.hash.serialize().to_vec() })
     }
 
     /// Outlives its writer from now on: a checkpoint refers to it.
@@ -42,7 +42,7 @@ impl Stream {
     }
 }
 
-impl Cursor {
+impl StreamPosition {
     pub(super) fn hash(&self) -> Option<Sha256> {
         let state = SerializedState::<Sha256>::try_from(self.hash.as_slice()).ok()?;
         Sha256::deserialize(&state).ok()

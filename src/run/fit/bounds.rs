@@ -6,7 +6,7 @@
 //! S. J. Wright, *Numerical Optimization* (2006), section 16.5).
 
 use super::FittedColumn;
-use super::problem::Problem;
+use super::problem::FitProblem;
 use super::search::rounding;
 use super::segment::Lost;
 
@@ -22,7 +22,7 @@ const BEYOND: f64 = 1e-9;
 /// Halvings of the distance to another bound.
 const HALVINGS: usize = 60;
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// Looks for the minimum with this weight of continuity among the numbers that the scene takes, and tells
     /// how it ended.
     pub fn minimize(self, columns: &[FittedColumn], weight: f64) -> Result<(Self, String), Lost> {

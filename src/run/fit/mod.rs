@@ -30,7 +30,7 @@ use super::sensitivity::{Measure, SensitivityError, SensitivityRequest, Study};
 use crate::scene::formula::unit::UnitScale;
 use crate::scene::{Output, OutputNames, Scene, SceneError, Template, Variable};
 use nalgebra::DMatrix;
-use problem::Problem;
+use problem::FitProblem;
 use segment::Lost;
 
 /// Share of a column's spread taken for its noise where nobody says, to begin with and at least.
@@ -241,7 +241,7 @@ pub fn fit(
     for (column, size) in columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given) {
         column.sigma = SPREAD[0] * size;
     }
-    let mut problem = Problem::new(
+    let mut problem = FitProblem::new(
         template,
         (variables, guess.clone()),
         (data, indices, request.segments),

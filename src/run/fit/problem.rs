@@ -9,7 +9,7 @@ use super::super::modes::Local;
 use super::super::sensitivity::{SensitivityRequest, Study};
 use super::FittedColumn;
 use super::data::Data;
-use super::segment::{Frame, Lost, Passed, Place, pass};
+use super::segment::{Frame, Lost, Place, SegmentOutcome, pass};
 use crate::dynamics::Time;
 use crate::run::driver::Pause;
 use crate::scene::{Template, Variable};
@@ -24,7 +24,7 @@ const GUESSED: f64 = 1e-3;
 
 /// A part of the data: its rows, when it begins and ends, and the state it begins with (none for the first,
 /// which begins as the scene does).
-struct Part {
+struct DataSegment {
     rows: Range<usize>,
     span: [f64; 2],
     state: Option<Place>,
@@ -43,7 +43,7 @@ pub(super) struct Evaluated {
     pub gap: f64,
 }
 
-pub(super) struct Problem<'a> {
+pub(super) struct FitProblem<'a> {
     template: &'a Template,
     pub(super) variables: Vec<Variable>,
     pub(super) scale: Vec<f64>,
@@ -51,7 +51,7 @@ pub(super) struct Problem<'a> {
     request: SensitivityRequest,
     /// Which outputs the columns are.
     outputs: Vec<usize>,
-    parts: Vec<Part>,
+    parts: Vec<DataSegment>,
     unit: Vec<f64>,
     pause: RefCell<&'a mut dyn FnMut() -> bool>,
     runs: u64,
@@ -66,7 +66,7 @@ pub(super) struct Problem<'a> {
     pub(super) found: Result<Evaluated, Lost>,
 }
 
-impl<'a> Problem<'a> {
+impl<'a> FitProblem<'a> {
     pub fn new(
         template: &'a Template,
         (variables, guess): (Vec<Variable>, Vec<f64>),
@@ -79,7 +79,7 @@ impl<'a> Problem<'a> {
         let rows = data.times.len();
         let first = |segment: usize| segment * rows / segments;
         let begin = |segment: usize| if segment == 0 { 0.0 } else { data.times[first(segment)] };
-        let parts = (0..segments).map(|k| Part {
+        let parts = (0..segments).map(|k| DataSegment {
             rows: first(k)..first(k + 1),
             span: [begin(k), if k + 1 < segments { begin(k + 1) } else { data.times[rows - 1] }],
             state: None,
@@ -204,7 +204,7 @@ impl<'a> Problem<'a> {
     /// The state of a part with these local coordinates about its base; `None` where none of them is on the
     /// constraints.
     fn state(&self, local: &mut Local, k: usize, x: &[f64]) -> Option<Place> {
-        let Part { state: Some(base), tangent, span, .. } = &self.parts[k] else { return None };
+        let DataSegment { state: Some(base), tangent, span, .. } = &self.parts[k] else { return None };
         local.time = Time::from(span[0]);
         let [y, v] = [0, 1].map(|half| {
             let f = tangent.ncols();
@@ -214,7 +214,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A part of the motion, from a state or as the scene starts.
-    fn pass(&mut self, study: &Study, k: usize, state: Option<&Place>) -> Result<Passed, Lost> {
+    fn pass(&mut self, study: &Study, k: usize, state: Option<&Place>) -> Result<SegmentOutcome, Lost> {
         self.runs += 1;
         let part = &self.parts[k];
         let frame = Frame { tangent: &part.tangent, unit: &self.unit };
@@ -226,7 +226,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Residuals of the rows of a part, with their slopes by the numbers and by its state.
-    fn rows(&self, k: usize, passed: &Passed) -> (DVector<f64>, DMatrix<f64>) {
+    fn rows(&self, k: usize, passed: &SegmentOutcome) -> (DVector<f64>, DMatrix<f64>) {
         let (mut residuals, mut slopes) = (Vec::new(), Vec::new());
         let width = passed.columns.len();
         for (row, derived) in self.parts[k].rows.clone().zip(&passed.rows) {
@@ -254,7 +254,7 @@ impl<'a> Problem<'a> {
         let mut local = Local::new(&study.mechanism);
         let (mut residuals, mut lines): (Vec<f64>, Vec<DVector<f64>>) = (Vec::new(), Vec::new());
         let (mut model, mut gap, mut owners) = (Vec::new(), 0.0_f64, Vec::new());
-        let mut before: Option<(Passed, usize)> = None;
+        let mut before: Option<(SegmentOutcome, usize)> = None;
         let mut first = count;
         for k in 0..self.parts.len() {
             let f = if k == 0 { 0 } else { self.parts[k].tangent.ncols() };
@@ -307,7 +307,7 @@ impl<'a> Problem<'a> {
     fn tie(
         &self,
         k: usize,
-        (passed, at): (&Passed, usize),
+        (passed, at): (&SegmentOutcome, usize),
         (state, first): (&Place, usize),
         (residuals, lines): (&mut Vec<f64>, &mut Vec<DVector<f64>>),
     ) -> f64 {

@@ -1,7 +1,7 @@
 //! The search for the minimum, and what it says of the numbers.
 
 use super::FittedColumn;
-use super::problem::{Evaluated, Problem};
+use super::problem::{Evaluated, FitProblem};
 use super::segment::Lost;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
@@ -20,7 +20,7 @@ pub(super) fn rounding(values: &DVector<f64>) -> f64 {
     f64::EPSILON * values.amax() * values.len() as f64
 }
 
-impl Problem<'_> {
+impl FitProblem<'_> {
     /// The unknowns that no bound holds.
     pub(super) fn free(&self) -> Vec<usize> {
         (0..self.x.len()).filter(|&k| self.held.get(k).copied().flatten().is_none()).collect()
@@ -114,7 +114,7 @@ impl Problem<'_> {
     }
 }
 
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_> {
+impl LeastSquaresProblem<f64, Dyn, Dyn> for FitProblem<'_> {
     type ResidualStorage = Owned<f64, Dyn>;
     type JacobianStorage = Owned<f64, Dyn, Dyn>;
     type ParameterStorage = Owned<f64, Dyn>;

@@ -32,7 +32,7 @@ impl<T: Into<String>> From<T> for Lost {
 }
 
 /// What came of a part.
-pub(super) struct Passed {
+pub(super) struct SegmentOutcome {
     /// Outputs at its times, with their slopes by the parameters, then by the directions of its start.
     pub rows: Vec<Derived>,
     /// Where it ends.
@@ -93,7 +93,7 @@ pub(super) fn pass(
     (times, until): (&[f64], f64),
     is_one_of_several: bool,
     pause: &mut Pause,
-) -> Result<Passed, Lost> {
+) -> Result<SegmentOutcome, Lost> {
     let mut plan = study.plan.clone();
     (plan.until, plan.every) = (until, until);
     let start = match from {
@@ -126,7 +126,7 @@ pub(super) fn pass(
     if let Some((_, _, frame)) = from {
         frame.turn(&mut variation.columns).ok_or("a part begins at a singular position")?;
     }
-    let mut sampler = Sampler { times, next: 0, until, rows: Vec::new(), end: None };
+    let mut sampler = SegmentSampler { times, next: 0, until, rows: Vec::new(), end: None };
     if from.map_or(0.0, |(t, ..)| t) == until {
         sampler.end = Some(begin.clone());
     }
@@ -156,10 +156,10 @@ pub(super) fn pass(
         (0..end.phi.len()).map(|k| end.unwrapped(k)).collect(),
         end.omega.iter().map(|omega| omega.hi).collect(),
     ];
-    Ok(Passed { rows: sampler.rows, end: place, columns: variation.columns })
+    Ok(SegmentOutcome { rows: sampler.rows, end: place, columns: variation.columns })
 }
 
-struct Sampler<'a> {
+struct SegmentSampler<'a> {
     times: &'a [f64],
     next: usize,
     until: f64,
@@ -167,7 +167,7 @@ struct Sampler<'a> {
     end: Option<Motion>,
 }
 
-impl Look for Sampler<'_> {
+impl Look for SegmentSampler<'_> {
     fn next(&self) -> Option<f64> {
         self.times.get(self.next).copied()
     }

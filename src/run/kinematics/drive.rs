@@ -13,7 +13,7 @@ const FARTHEST: f64 = 1e6;
 
 /// What is driven, and how far.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Drive {
+pub struct KinematicDrive {
     /// A motor, a body or a slider; the first motor where it is left out.
     pub name: Option<String>,
     /// From where to where \[rad or m\]; one turn from the start where it is left out.
@@ -22,7 +22,7 @@ pub struct Drive {
     pub rate: Option<f64>,
 }
 
-impl FromStr for Drive {
+impl FromStr for KinematicDrive {
     type Err = String;
 
     /// Reads `NAME` or `NAME=FROM..TO`.
@@ -102,7 +102,7 @@ pub enum KinematicsError {
 }
 
 /// A scene with its drive.
-pub(super) struct Driven {
+pub(super) struct DrivenScene {
     pub scene: Scene,
     pub mechanism: Arc<Mechanism>,
     /// The drive's value at the start.
@@ -140,9 +140,9 @@ enum Slot {
     Sliding(usize),
 }
 
-impl Driven {
+impl DrivenScene {
     /// The scene with the law of its drive at a constant rate.
-    pub fn new(scene: &Scene, drive: &Drive) -> Result<Self, KinematicsError> {
+    pub fn new(scene: &Scene, drive: &KinematicDrive) -> Result<Self, KinematicsError> {
         let mut scene = scene.clone();
         let (slot, start, own_rate) = find(&mut scene, drive)?;
         // A motor that stands at the start has no rate of its own.
@@ -206,7 +206,7 @@ fn settled(scene: &mut Scene, name: &str) -> Result<(Motion, Mechanism), Kinemat
 }
 
 /// The place of the drive's law, its value at the start and its rate there; a coordinate gets a motor.
-fn find(scene: &mut Scene, drive: &Drive) -> Result<(Slot, f64, f64), KinematicsError> {
+fn find(scene: &mut Scene, drive: &KinematicDrive) -> Result<(Slot, f64, f64), KinematicsError> {
     let name = match (&drive.name, scene.motors.first(), scene.drives.first()) {
         (Some(name), ..) => name.clone(),
         (None, Some(motor), _) => motor.name.clone(),

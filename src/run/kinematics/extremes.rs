@@ -1,7 +1,7 @@
 //! Extremes over a range, at positions and between them.
 
 use super::Limit;
-use super::walk::{Solved, Walk};
+use super::walk::{DriveWalk, SolvedPosition};
 use crate::stepping::search::golden_sections;
 
 /// Least values of the positions beside which a column's least value is looked for, and golden sections
@@ -12,13 +12,13 @@ const SECTIONS: usize = 40;
 /// corner.
 const SAME: f64 = 1e-9;
 
-impl Walk {
+impl DriveWalk {
     /// The least value of a column, times a sign, over positions and between them, and the drive's value at
     /// the first of them; nothing where it has none.
     ///
     /// Between positions it is looked for on both sides of every one that is not above its neighbours, of
     /// many those that may hide most.
-    pub fn least(&mut self, all: &[Solved], column: usize, sign: f64) -> Option<[f64; 2]> {
+    pub fn least(&mut self, all: &[SolvedPosition], column: usize, sign: f64) -> Option<[f64; 2]> {
         let values: Vec<f64> = all.iter().map(|one| sign * one.position.column(column)).collect();
         let size =
             values.iter().filter(|value| value.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));

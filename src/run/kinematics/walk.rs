@@ -29,11 +29,11 @@ const WATCHED: usize = 40;
 
 /// A position that was solved, from which others can be: nothing of the scratch space that solved it.
 #[derive(Clone)]
-pub(super) struct Solved {
+pub(super) struct SolvedPosition {
     pub state: State,
     /// The largest rate there was up to it.
     usual: f64,
-    /// See [`Walk::orientation`].
+    /// See [`DriveWalk::orientation`].
     pub orientation: Option<f64>,
     /// All there is to know of it.
     pub position: Position,
@@ -41,7 +41,7 @@ pub(super) struct Solved {
 
 /// A mechanism at a value of its drive.
 #[derive(Clone)]
-pub(super) struct Walk {
+pub(super) struct DriveWalk {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
     state: State,
@@ -59,7 +59,7 @@ pub(super) struct Walk {
     usual: f64,
 }
 
-impl Solved {
+impl SolvedPosition {
     /// True where all of it is as at another position, whole turns apart.
     pub fn is_as(&self, other: &Self, mechanism: &Mechanism) -> bool {
         let (bodies, turn) = (mechanism.bodies.len(), std::f64::consts::TAU);
@@ -74,7 +74,7 @@ impl Solved {
     }
 }
 
-impl Walk {
+impl DriveWalk {
     /// The start of a scene.
     pub fn at_start(
         mechanism: &Arc<Mechanism>,
@@ -180,13 +180,13 @@ impl Walk {
     }
 
     /// What another walk can go on from.
-    pub fn solved(&self) -> Solved {
+    pub fn solved(&self) -> SolvedPosition {
         let (orientation, position) = (self.orientation(), self.position());
-        Solved { state: self.state.clone(), usual: self.usual, orientation, position }
+        SolvedPosition { state: self.state.clone(), usual: self.usual, orientation, position }
     }
 
     /// Back to a position.
-    pub(super) fn restore(&mut self, there: &Solved) {
+    pub(super) fn restore(&mut self, there: &SolvedPosition) {
         self.state.clone_from(&there.state);
         self.usual = there.usual;
         self.stand();
@@ -280,9 +280,9 @@ impl Walk {
     }
 
     /// Where a function passes zero between two positions; this then stands there.
-    pub fn root(&mut self, [from, to]: [&Solved; 2], of: impl Fn(&Self) -> f64) -> Option<Position> {
+    pub fn root(&mut self, [from, to]: [&SolvedPosition; 2], of: impl Fn(&Self) -> f64) -> Option<Position> {
         let (mut below, mut above) = (from.clone(), to.clone());
-        let value = |walk: &mut Self, at: &Solved| {
+        let value = |walk: &mut Self, at: &SolvedPosition| {
             walk.restore(at);
             of(walk)
         };

@@ -13,14 +13,14 @@ use nalgebra::{Complex, DMatrix, DVector};
 use std::sync::Arc;
 
 /// A search for equilibria.
-pub(super) struct Search<'a> {
+pub(super) struct EquilibriumSearch<'a> {
     pub(super) local: Local<'a>,
     jacobian: Jacobian,
     /// The largest acceleration at rest where the search starts.
     usual: f64,
 }
 
-impl<'a> Search<'a> {
+impl<'a> EquilibriumSearch<'a> {
     pub(super) fn new<'b>(mechanism: &'a Mechanism, starts: impl Iterator<Item = &'b Vec<f64>>) -> Self {
         let mut local = Local::new(mechanism);
         local.turns = WholeTurns::beside_rows(mechanism);
@@ -29,9 +29,9 @@ impl<'a> Search<'a> {
     }
 
     /// The same search with the laws on other branches.
-    pub(super) fn on<'b>(&self, mechanism: &'b Mechanism) -> Search<'b> {
+    pub(super) fn on<'b>(&self, mechanism: &'b Mechanism) -> EquilibriumSearch<'b> {
         let local = Local { turns: self.local.turns.clone(), ..Local::new(mechanism) };
-        Search { local, jacobian: Jacobian::new(mechanism), usual: self.usual }
+        EquilibriumSearch { local, jacobian: Jacobian::new(mechanism), usual: self.usual }
     }
 
     /// The equilibrium that is reached from a position with the laws on their branches there, and the

@@ -1,6 +1,6 @@
 //! Which methods go with which scenes and stabilizations, and why the others do not.
 
-use super::{MANY_COORDINATES, Refusal, Request, mismatch};
+use super::{MANY_COORDINATES, Request, RequestRefusal, mismatch};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::DENSE_LIMIT;
 use crate::dynamics::force::Vibration;
@@ -17,7 +17,7 @@ pub(super) fn pair(
     method: MethodId,
     request: &Request,
     notes: &mut Vec<String>,
-) -> Result<Stabilization, Refusal> {
+) -> Result<Stabilization, RequestRefusal> {
     check_size(mechanism, method, request)?;
     if !mechanism.contacts.is_empty()
         && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_))
@@ -146,7 +146,7 @@ pub(super) fn pair(
 }
 
 /// Very many coordinates are taken body by body or not at all.
-fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
+fn check_size(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), RequestRefusal> {
     if mechanism.tree.is_dense() {
         return Ok(());
     }
@@ -177,7 +177,7 @@ pub(super) fn check_vibration(
     method: MethodId,
     rate: f64,
     notes: &mut Vec<String>,
-) -> Result<(), Refusal> {
+) -> Result<(), RequestRefusal> {
     let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
     if !matches!(
         method,
@@ -211,7 +211,7 @@ pub(super) fn check_vibration(
 }
 
 /// Dry friction asks for the forces of joints.
-pub(in crate::run) fn check_forces_of_joints(mechanism: &Mechanism) -> Result<(), Refusal> {
+pub(in crate::run) fn check_forces_of_joints(mechanism: &Mechanism) -> Result<(), RequestRefusal> {
     let Some(friction) = mechanism.frictions.first().filter(|_| !mechanism.redundant().is_empty()) else {
         return Ok(());
     };
@@ -222,7 +222,7 @@ pub(in crate::run) fn check_forces_of_joints(mechanism: &Mechanism) -> Result<()
 }
 
 /// Dry friction takes methods that end their steps at its transitions and keep by projection what sticks.
-fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), Refusal> {
+fn check_friction(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), RequestRefusal> {
     let Some(friction) = mechanism.frictions.first() else { return Ok(()) };
     let place = || format!("dry friction ({} {})", friction.kind(), friction.name);
     if !matches!(

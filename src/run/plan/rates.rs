@@ -1,6 +1,6 @@
 //! Steps of fixed-step methods, and how fast a scene moves at most.
 
-use super::{Refusal, Request, is_whole, usage};
+use super::{Request, RequestRefusal, is_whole, usage};
 use crate::dynamics::Mechanism;
 use crate::dynamics::kernel::Kernel;
 use crate::run::methods::MethodId;
@@ -14,7 +14,7 @@ pub(super) fn fixed_step(
     until: f64,
     every: &mut f64,
     notes: &mut Vec<String>,
-) -> Result<f64, Refusal> {
+) -> Result<f64, RequestRefusal> {
     let Some(asked) = request.step else {
         let share = match method {
             MethodId::Gauss(stages) => 0.015 * stages as f64,

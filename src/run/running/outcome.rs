@@ -6,7 +6,7 @@ use super::super::event::EventRecord;
 use super::super::extremes::Extremes;
 use super::super::flip::Flip;
 use super::super::friction::FrictionRecord;
-use super::super::plan::{Plan, Refusal};
+use super::super::plan::{Plan, RequestRefusal};
 use super::super::sample::Sample;
 use super::super::trace::Trace;
 use super::super::trust::Trust;
@@ -105,7 +105,7 @@ pub enum RunError {
     Compile(#[from] CompileError),
     /// The request makes no sense for the scene.
     #[error("{0}")]
-    Refused(#[from] Refusal),
+    Refused(#[from] RequestRefusal),
     /// The method could not begin.
     #[error("{0}")]
     Step(#[from] StepError),

@@ -5,7 +5,7 @@ use super::super::custom::Custom;
 use super::super::drift::Limits;
 use super::super::plan::{MORE_IS_ALLOWED, Plan};
 use super::super::sample::Sample;
-use super::super::trust::{ErrorEstimator, Kept};
+use super::super::trust::{ErrorEstimator, SavedEstimator};
 use super::{Outcome, Running};
 use crate::dynamics::Mechanism;
 use crate::stepping::StepError;
@@ -20,7 +20,7 @@ pub struct Snapshot {
     pub(super) resting: Option<StepError>,
     /// The horizon on the way to which the station was reached \[s\].
     pub(super) horizon: f64,
-    pub(super) error_estimator: Option<Kept>,
+    pub(super) error_estimator: Option<SavedEstimator>,
 }
 
 /// Why a run cannot go on from a snapshot.
@@ -105,7 +105,7 @@ impl Snapshot {
             && (self.row == 0 || whole(last))
             && trace.samples().all(sizes)
             && drift.fits(mechanism)
-            && self.error_estimator.as_ref().is_none_or(Kept::is_sound)
+            && self.error_estimator.as_ref().is_none_or(SavedEstimator::is_sound)
             && ContactDriver::names_holds(&self.contact_state) <= holds.len()
     }
 }

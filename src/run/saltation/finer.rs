@@ -10,7 +10,7 @@ const PLACES: f64 = 4.0;
 
 /// Mechanisms at one distance of a number.
 #[derive(Clone, Debug)]
-pub(in crate::run) struct Level<T> {
+pub(in crate::run) struct DistanceLevel<T> {
     /// The number over that distance.
     pub far: f64,
     pub list: Vec<T>,

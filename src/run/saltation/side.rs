@@ -1,9 +1,9 @@
 //! One side of what happens at a moment: a state, its accelerations, and derivatives along columns there.
 
-use super::Column;
+use super::Delta;
 use super::finer::{Difference, agreeing};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
 
@@ -96,7 +96,7 @@ impl Side {
     /// The rate of the gap of a wall \[m/s\], and its derivatives by the coordinates, zero on entry.
     pub(super) fn gap_rate(&self, mechanism: &Mechanism, contact: usize, gradient: &mut [f64]) -> f64 {
         let z = mechanism.elements(&self.phi);
-        let at = Posture { phi: &self.phi, z: &z, omega: &self.omega };
+        let at = ConstraintArguments { phi: &self.phi, z: &z, omega: &self.omega };
         let here = mechanism.contacts[contact].row.linearise(self.motion.time, at, gradient);
         dot(gradient, &self.omega) + here.drive
     }
@@ -108,7 +108,7 @@ impl Side {
         mechanism: &Mechanism,
         contact: usize,
         (gradient, rate): (&[f64], f64),
-        column: &Column,
+        column: &Delta,
     ) -> f64 {
         let gap = |mechanism: &Mechanism| {
             let z = mechanism.elements(&self.phi);

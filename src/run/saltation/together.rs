@@ -5,7 +5,7 @@
 //! order.  Where both orders lead to the motion itself, and to the same differences, these are those of the
 //! flow.  Else what comes of the impacts depends on which of them is first, and there is no flow.
 
-use super::{Column, Passage, Passed, Side, shift, strike};
+use super::{Crossed, Delta, Discontinuity, Side, shift, strike};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::contact::Jump;
@@ -28,9 +28,9 @@ pub(super) fn is_at_several(jumps: &[Jump]) -> bool {
 ///
 /// # Errors
 /// Why neighbours do not go the same way.
-pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed, String> {
-    let Passage { mechanism, jumps, .. } = *passage;
-    let ([first, ..], [.., last]) = (jumps, jumps) else { return Ok(Passed::default()) };
+pub(super) fn cross(passage: &Discontinuity, columns: &mut [Delta]) -> Result<Crossed, String> {
+    let Discontinuity { mechanism, jumps, .. } = *passage;
+    let ([first, ..], [.., last]) = (jumps, jumps) else { return Ok(Crossed::default()) };
     let is_only_struck = jumps.iter().all(|jump| jump.contact.is_some());
     let is_free = |mechanism: &Mechanism| mechanism.held.is_empty() && mechanism.frictions.is_empty();
     if !(is_only_struck && is_free(mechanism) && is_free(&last.mechanism)) {
@@ -42,18 +42,18 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
         jumps.iter().flat_map(|jump| jump.contact.iter().chain(&jump.together)).copied().collect();
     walls.sort_unstable();
     walls.dedup();
-    let moment = Moment { mechanism, before: &first.before, walls: &walls };
+    let moment = SimultaneousWalls { mechanism, before: &first.before, walls: &walls };
     let [_, after] = last.after.rounded();
-    let mut passed = Passed::default();
+    let mut passed = Crossed::default();
     let side = Side::new(moment.mechanism, moment.before);
     for (wall, gradient, approach) in moment.met(&side) {
-        let late = |column: &Column| side.late(moment.mechanism, wall, (&gradient, approach), column);
+        let late = |column: &Delta| side.late(moment.mechanism, wall, (&gradient, approach), column);
         passed.walls.push((wall, columns.iter().map(late).collect()));
     }
     for column in columns {
         let [ahead, behind] = [1.0, -1.0].map(|sign| {
             let mut found = column.entries.to_vec();
-            let mut own = Column { entries: &mut found, neighbours: column.neighbours.clone() };
+            let mut own = Delta { entries: &mut found, neighbours: column.neighbours.clone() };
             let rates = moment.one_after_the_other(sign, &mut own)?;
             Ok::<_, String>((found, rates))
         });
@@ -71,13 +71,13 @@ pub(super) fn cross(passage: &Passage, columns: &mut [Column]) -> Result<Passed,
 }
 
 /// Walls that touch at one moment.
-struct Moment<'a> {
+struct SimultaneousWalls<'a> {
     mechanism: &'a Arc<Mechanism>,
     before: &'a Motion,
     walls: &'a [usize],
 }
 
-impl Moment<'_> {
+impl SimultaneousWalls<'_> {
     /// Those of the walls that points move into, with the derivatives of their gaps by coordinates and time.
     fn met(&self, side: &Side) -> Vec<(usize, Vec<f64>, f64)> {
         let met = |&wall: &usize| {
@@ -91,7 +91,7 @@ impl Moment<'_> {
 
     /// Takes a column through the impacts in the order in which the neighbour on the side of this sign meets
     /// them; returns the motion's own rates after these.
-    fn one_after_the_other(&self, sign: f64, column: &mut Column) -> Result<Vec<f64>, String> {
+    fn one_after_the_other(&self, sign: f64, column: &mut Delta) -> Result<Vec<f64>, String> {
         let mut motion = self.before.clone();
         for _ in 0..ROUNDS {
             let side = Side::new(self.mechanism, &motion);

@@ -2,11 +2,11 @@
 //! [`saltation`](crate::run::saltation).
 
 use super::neighbours::Neighbours;
-use super::variation::{Crossing, Variation};
+use super::variation::{CrossingTime, Variation};
 use crate::dynamics::Mechanism;
 use crate::run::contact::Jump;
 use crate::run::event::SwitchFunction;
-use crate::run::saltation::{Column, Levels, Passage, Passed, cross, engage};
+use crate::run::saltation::{Crossed, Delta, Discontinuity, Levels, cross, engage};
 use std::sync::Arc;
 
 /// Parameters that events set, in which the columns may differ.
@@ -72,7 +72,7 @@ impl Variation {
         }
         let crossing = |(wall, slopes): (usize, Vec<f64>)| {
             let wall = before.contacts[wall].row.name.clone();
-            Crossing { wall, t, slopes }
+            CrossingTime { wall, t, slopes }
         };
         self.impacts.extend(passed.walls.into_iter().map(crossing));
         if let (Some(event), Some(slopes)) = (set_by(jumps), passed.set) {
@@ -92,7 +92,7 @@ impl Variation {
     }
 
     /// What comes of it, with the columns taken through.
-    fn passed(&mut self, jumps: &[Jump]) -> Result<Passed, String> {
+    fn passed(&mut self, jumps: &[Jump]) -> Result<Crossed, String> {
         let mut columns = std::mem::take(&mut self.columns);
         let follow = |k: usize, jump: &Jump| -> Result<Levels, String> {
             let mut beside = self.neighbours[k].clone().unwrap_or_default();
@@ -102,14 +102,14 @@ impl Variation {
         };
         let column = |(entries, neighbours): (_, &Option<Neighbours>)| {
             let neighbours = neighbours.as_ref().map_or_else(Vec::new, Neighbours::weighted);
-            Column { entries, neighbours }
+            Delta { entries, neighbours }
         };
         let entries = columns.iter_mut().map(Vec::as_mut_slice);
-        let mut list: Vec<Column> = entries.zip(&self.neighbours).map(column).collect();
+        let mut list: Vec<Delta> = entries.zip(&self.neighbours).map(column).collect();
         let (mechanism, set) = (&self.mechanism, &self.set.numbers[..]);
         let moment = jumps.first().map(|jump| jump.before.time);
         let earlier = self.moment.as_ref().filter(|(at, _)| Some(*at) == moment).map(|(_, late)| &late[..]);
-        let passed = cross(&Passage { mechanism, jumps, set, follow: &follow, earlier }, &mut list);
+        let passed = cross(&Discontinuity { mechanism, jumps, set, follow: &follow, earlier }, &mut list);
         self.columns = columns;
         if let (Ok(passed), Some(moment)) = (&passed, moment)
             && !passed.late.is_empty()

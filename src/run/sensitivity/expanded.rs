@@ -29,7 +29,7 @@ use crate::dynamics::series::Constants;
 use crate::dynamics::series::columns::{Columns, LEADING, MotionPowers, columns};
 use crate::dynamics::series::varied::Number;
 use crate::dynamics::{Coordinates, Mechanism, Motion, State, Time};
-use crate::scene::exact::Watched;
+use crate::scene::exact::Watcher;
 use crate::scene::{Scene, Template};
 use std::sync::Arc;
 
@@ -55,13 +55,13 @@ const ROUNDING: f64 = 1e-9;
 const REST: f64 = 1e-6;
 
 /// Columns of numbers of a scene, in blocks of lanes.
-pub(super) struct Expanded {
+pub(super) struct Expansions {
     blocks: Vec<(usize, Block)>,
     /// The powers of the motion's own step.
     powers: MotionPowers,
 }
 
-impl Expanded {
+impl Expansions {
     /// Of numbers at some paths of a scene, whose mechanism and derivatives of the start are these, and of so
     /// many directions in which the state alone differs.
     ///
@@ -207,7 +207,7 @@ impl Block {
         let seed = |(lane, &(path, value)): (usize, &(_, f64))| (path, Number::unknown(value, lane));
         let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
         let (mut scene, _) =
-            template.exact_with(&[], &known, Watched::Beside).map_err(|error| error.to_string())?;
+            template.exact_with(&[], &known, Watcher::Beside).map_err(|error| error.to_string())?;
         // Angles that are kept from the start are those of the start that was found.
         let found = structure.start(plain);
         for (k, start) in scene.start.iter_mut().enumerate() {

@@ -6,7 +6,7 @@ use super::variation::{Variation, plain};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::run::saltation::{Column, Side, event_value, late_at_zero};
+use crate::run::saltation::{Delta, Side, event_value, late_at_zero};
 use crate::scene::Output;
 use std::fmt;
 use std::str::FromStr;
@@ -147,10 +147,10 @@ pub(super) fn event_slopes(variation: &Variation, motion: &Motion, event: usize)
     let mut entries = variation.columns.clone();
     let column = |(entries, neighbours): (_, &Option<super::Neighbours>)| {
         let neighbours = neighbours.as_ref().map_or_else(Vec::new, super::Neighbours::weighted);
-        Column { entries, neighbours }
+        Delta { entries, neighbours }
     };
     let entries = entries.iter_mut().map(Vec::as_mut_slice);
-    let columns: Vec<Column> = entries.zip(&variation.neighbours).map(column).collect();
+    let columns: Vec<Delta> = entries.zip(&variation.neighbours).map(column).collect();
     let value = |mechanism: &Arc<Mechanism>, motion: &Motion| {
         Some(vec![event_value(mechanism, SwitchFunction::Event(event), motion)?])
     };

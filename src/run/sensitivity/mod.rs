@@ -26,14 +26,14 @@ mod recorder;
 mod result;
 mod variation;
 
-use expanded::Expanded;
+use expanded::Expansions;
 pub use lyapunov::{Regime, Spectrum, lyapunov};
 pub(super) use measure::Derived;
 pub use measure::Measure;
 #[cfg(feature = "fit")]
 pub(super) use measure::outputs;
 use neighbours::Neighbours;
-use recorder::{Recorder, Seen};
+use recorder::{RecordedTime, SensitivityRecorder};
 pub use result::{InputNumber, Measured, Sensitivity, SensitivityError, SensitivityRequest, SensitivityRow};
 pub(super) use variation::{Look, Variation};
 
@@ -57,7 +57,7 @@ const CORNER: f64 = 1e-4;
 const MOST_ROWS: f64 = 1e6;
 
 /// A measure on its way.
-struct Asked {
+struct Query {
     measure: Measure,
     /// Its output among all, where it has one.
     output: Option<usize>,
@@ -185,7 +185,7 @@ impl Study {
     }
 
     /// The measures, with the outputs they are of.
-    fn asked(&self, request: &SensitivityRequest) -> Result<Vec<Asked>, SensitivityError> {
+    fn asked(&self, request: &SensitivityRequest) -> Result<Vec<Query>, SensitivityError> {
         let heads: Vec<String> = (self.mechanism.outputs.iter())
             .flat_map(|outputs| outputs.heads().map(|(name, _)| name.to_owned()))
             .collect();
@@ -204,7 +204,7 @@ impl Study {
             }
             let t = Ok(self.plan.until);
             let value = f64::NAN;
-            Ok(Asked { measure: measure.clone(), output, t, value, number, is_end: false, ended_by: None })
+            Ok(Query { measure: measure.clone(), output, t, value, number, is_end: false, ended_by: None })
         };
         request.of.iter().map(asked).collect()
     }
@@ -224,8 +224,8 @@ impl Study {
     }
 
     /// A run beforehand, where measures are taken at times that only it tells.
-    fn find_times(&self, asked: &mut [Asked], pause: &mut Pause) -> Result<(), SensitivityError> {
-        let is_known = |asked: &Asked| matches!(asked.measure, Measure::Output(_) | Measure::Impact(_));
+    fn find_times(&self, asked: &mut [Query], pause: &mut Pause) -> Result<(), SensitivityError> {
+        let is_known = |asked: &Query| matches!(asked.measure, Measure::Output(_) | Measure::Impact(_));
         if asked.iter().all(is_known) {
             return Ok(());
         }
@@ -282,19 +282,19 @@ impl Study {
 
     /// The series of columns of all numbers, beside these neighbours, and of so many directions of the state,
     /// where there are such.
-    fn expanded(&self, directions: usize, neighbours: &mut [Option<Neighbours>]) -> Option<Expanded> {
+    fn expanded(&self, directions: usize, neighbours: &mut [Option<Neighbours>]) -> Option<Expansions> {
         if !self.mechanism.frictions.is_empty() {
             return None;
         }
         let numbers: Vec<_> = self.inputs.iter().map(|input| (input.path.as_str(), input.value)).collect();
         let starts: Vec<_> = self.neighbours.iter().map(|neighbours| neighbours.start.clone()).collect();
         let Self { template, scene, mechanism, .. } = self;
-        let mut expanded = Expanded::new(template, scene, mechanism, &numbers, &starts, directions).ok()?;
+        let mut expanded = Expansions::new(template, scene, mechanism, &numbers, &starts, directions).ok()?;
         expanded.agrees(&self.start, neighbours).then_some(expanded)
     }
 
     /// The run with the columns beside it.
-    fn derive(self, asked: Vec<Asked>, pause: &mut Pause) -> Result<Sensitivity, SensitivityError> {
+    fn derive(self, asked: Vec<Query>, pause: &mut Pause) -> Result<Sensitivity, SensitivityError> {
         let mut times: Vec<f64> = self.times.clone();
         times.extend(asked.iter().filter_map(|asked| asked.t.as_ref().ok()));
         times.sort_by(f64::total_cmp);
@@ -304,7 +304,7 @@ impl Study {
         let mut driver = self.driver(&mut outcome, Some(variation.jumps.clone()))?;
         let begin = driver.motion();
         variation.begin(&begin);
-        let mut recorder = Recorder { times, next: 0, asked: &asked, seen: Vec::new() };
+        let mut recorder = SensitivityRecorder { times, next: 0, asked: &asked, seen: Vec::new() };
         if recorder.next() == Some(0.0) {
             recorder.at(&mut variation, &begin, 0.0);
         }
@@ -325,8 +325,8 @@ impl Study {
 
     fn gathered(
         self,
-        asked: Vec<Asked>,
-        seen: &[Seen],
+        asked: Vec<Query>,
+        seen: &[RecordedTime],
         (lost, steps): (Option<String>, [u64; 2]),
         variation: &Variation,
     ) -> Sensitivity {
@@ -349,7 +349,7 @@ impl Study {
             measured
         });
         let measures = measures.collect();
-        let wanted = |seen: &&Seen| self.times.contains(&seen.t);
+        let wanted = |seen: &&RecordedTime| self.times.contains(&seen.t);
         let rows = seen.iter().filter(wanted).map(|seen| SensitivityRow {
             t: seen.t,
             values: seen.shown().values.clone(),
@@ -369,8 +369,8 @@ impl Study {
 /// When a measure was taken, its value and derivatives; or why not, empty where the run ended before.
 fn taken(
     number: usize,
-    asked: &Asked,
-    seen: &[Seen],
+    asked: &Query,
+    seen: &[RecordedTime],
     variation: &Variation,
 ) -> Result<(f64, f64, Vec<f64>), String> {
     if let Measure::Impact(wall) = &asked.measure {

@@ -14,12 +14,12 @@
 
 mod search;
 
-use self::search::{Attempt, BOTH, Candidate, ENOUGH, ROUNDING, Search};
+use self::search::{Attempt, BOTH, Candidate, DistanceSearch, ENOUGH, ROUNDING};
 use super::super::contact::in_modes;
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::run::saltation::{Difference, Level, Levels, agreeing};
+use crate::run::saltation::{Difference, DistanceLevel, Levels, agreeing};
 use crate::scene::{Template, Variable};
 use std::sync::Arc;
 
@@ -65,7 +65,7 @@ impl Neighbour {
 pub(in crate::run) struct Neighbours {
     /// At distances that become finer; empty where the number does nothing but move the start.  Those of
     /// parameters that events set are the last.
-    pub levels: Vec<Level<Neighbour>>,
+    pub levels: Vec<DistanceLevel<Neighbour>>,
     /// Derivative of the start: all coordinates, then all rates.
     pub start: Vec<f64>,
     /// Estimated relative error of derivatives.
@@ -86,7 +86,7 @@ impl Neighbours {
         base: (&Arc<Mechanism>, &Motion),
         until: f64,
     ) -> Result<Self, String> {
-        let search = |in_units: bool| Search { template, number, base, until, in_units }.best();
+        let search = |in_units: bool| DistanceSearch { template, number, base, until, in_units }.best();
         let own = search(number.1 == 0.0);
         // A number near zero: what it does shows in changes of its unit, not in changes over itself.
         let most = match &own {
@@ -107,22 +107,27 @@ impl Neighbours {
             _ => own?,
         };
         let in_units = attempt.scale != number.1.abs();
-        let search = Search { template, number, base, until, in_units };
+        let search = DistanceSearch { template, number, base, until, in_units };
         let levels = search.levels(attempt.change / attempt.scale);
         Ok(Self::of(attempt, levels, error, base.0))
     }
 
-    fn of(attempt: Attempt, finer: Vec<Level<(f64, Candidate)>>, error: f64, base: &Mechanism) -> Self {
+    fn of(
+        attempt: Attempt,
+        finer: Vec<DistanceLevel<(f64, Candidate)>>,
+        error: f64,
+        base: &Mechanism,
+    ) -> Self {
         let (n, scale) = (base.coordinates(), attempt.scale);
         let does_nothing = attempt.does_nothing();
-        let coarsest = Level { far: scale / attempt.change, list: attempt.list };
+        let coarsest = DistanceLevel { far: scale / attempt.change, list: attempt.list };
         let all: Vec<_> = std::iter::once(coarsest).chain(finer).collect();
         let of = |(weight, Candidate { start, .. }): &(f64, Candidate)| {
             let coordinates = (0..n).map(|k| start.unwrapped(k));
             (*weight, coordinates.chain(start.omega.iter().map(|omega| omega.hi)).collect())
         };
         let start = agreeing(all.len(), |level| {
-            let Level { far, list } = &all[level];
+            let DistanceLevel { far, list } = &all[level];
             Some(Difference::of(list.iter().map(of), &[], *far))
         });
         let mut start = start.map_or_else(|| vec![0.0; 2 * n], |(start, _)| start);
@@ -139,7 +144,10 @@ impl Neighbours {
             mechanism: candidate.mechanism,
         };
         let levels = all.into_iter().filter(|_| !is_alike);
-        let level = |Level { far, list }| Level { far, list: list.into_iter().map(neighbour).collect() };
+        let level = |DistanceLevel { far, list }| DistanceLevel {
+            far,
+            list: list.into_iter().map(neighbour).collect(),
+        };
         let levels = levels.map(level).collect();
         let unit = base.units.length.min(1.0) / base.units.time;
         Self { levels, start, error, floor: SMALL * unit / scale }
@@ -150,9 +158,9 @@ impl Neighbours {
     pub fn set(&mut self, compiled: &Arc<Mechanism>, mechanism: &Mechanism, given: &[(usize, f64)]) {
         let parameters = mechanism.laws.as_ref().map_or(&[][..], |laws| &laws.parameters);
         if self.levels.is_empty() && !given.is_empty() {
-            self.levels.resize(LEVELS as usize, Level { far: 0.0, list: Vec::new() });
+            self.levels.resize(LEVELS as usize, DistanceLevel { far: 0.0, list: Vec::new() });
         }
-        for (finer, Level { far, list }) in (0..).zip(&mut self.levels) {
+        for (finer, DistanceLevel { far, list }) in (0..).zip(&mut self.levels) {
             list.retain(|neighbour| neighbour.set.is_none());
             let share = SET * FINER.powi(finer);
             for &(number, slope) in given {
@@ -174,8 +182,10 @@ impl Neighbours {
     /// The mechanisms with their weights.
     pub fn weighted(&self) -> Levels {
         let of = |neighbour: &Neighbour| (neighbour.weight, Arc::clone(&neighbour.mechanism));
-        let level =
-            |Level { far, list }: &Level<Neighbour>| Level { far: *far, list: list.iter().map(of).collect() };
+        let level = |DistanceLevel { far, list }: &DistanceLevel<Neighbour>| DistanceLevel {
+            far: *far,
+            list: list.iter().map(of).collect(),
+        };
         self.levels.iter().map(level).collect()
     }
 
@@ -184,7 +194,7 @@ impl Neighbours {
         let Self { levels, error, .. } = self;
         let mut of = |neighbour: &mut Neighbour| (neighbour.weight, value(neighbour));
         let (slopes, finest) = agreeing(levels.len(), |level| {
-            let Level { far, list } = levels.get_mut(level)?;
+            let DistanceLevel { far, list } = levels.get_mut(level)?;
             Some(Difference::of(list.iter_mut().map(&mut of), &[], *far))
         })?;
         if finest > 0 {
@@ -237,7 +247,7 @@ pub(super) fn residuals(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f6
     let mut gradient = vec![0.0; phi.len()];
     let residual = |row: &crate::dynamics::constraint::ConstraintEquation| {
         gradient.fill(0.0);
-        let here = row.linearise(t, Posture { phi, z: &z, omega }, &mut gradient);
+        let here = row.linearise(t, ConstraintArguments { phi, z: &z, omega }, &mut gradient);
         (here.position, dot(&gradient, omega) + here.drive)
     };
     mechanism.constraints.iter().map(residual).unzip()

@@ -1,11 +1,11 @@
 //! Values and derivatives of outputs, and derivatives of times, at the times that are asked for.
 
 use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
-use super::{Asked, Look, Variation};
+use super::{Look, Query, Variation};
 use crate::dynamics::Motion;
 
 /// What was seen at one time.
-pub(super) struct Seen {
+pub(super) struct RecordedTime {
     pub t: f64,
     /// Before what happens at that time.
     pub derived: Derived,
@@ -18,16 +18,16 @@ pub(super) struct Seen {
 }
 
 /// Sees a run at the times asked for.
-pub(super) struct Recorder<'a> {
+pub(super) struct SensitivityRecorder<'a> {
     /// The times \[s\], rising.
     pub times: Vec<f64>,
     /// How many are over.
     pub next: usize,
-    pub asked: &'a [Asked],
-    pub seen: Vec<Seen>,
+    pub asked: &'a [Query],
+    pub seen: Vec<RecordedTime>,
 }
 
-impl Look for Recorder<'_> {
+impl Look for SensitivityRecorder<'_> {
     fn next(&self) -> Option<f64> {
         self.times.get(self.next).copied()
     }
@@ -48,7 +48,7 @@ impl Look for Recorder<'_> {
                 _ => {}
             }
         }
-        self.seen.push(Seen {
+        self.seen.push(RecordedTime {
             t: time,
             derived: outputs(variation, motion),
             after: None,
@@ -65,7 +65,7 @@ impl Look for Recorder<'_> {
     }
 }
 
-impl Seen {
+impl RecordedTime {
     /// What a row at that time shows: what comes after an event, as rows of a run do.
     pub fn shown(&self) -> &Derived {
         self.after.as_ref().unwrap_or(&self.derived)

@@ -21,7 +21,7 @@ use super::super::inside::{Observer, ObserverAdapter, Step};
 use super::super::trust::Ground;
 use super::collocation::{Collocation, STAGES};
 use super::crossing::SetNumbers;
-use super::expanded::{self, Expanded};
+use super::expanded::{self, Expansions};
 use super::lyapunov::Dissipation;
 use super::neighbours::{Neighbour, Neighbours, residuals};
 use crate::dynamics::jacobian::Jacobian;
@@ -58,9 +58,9 @@ pub(in crate::run) struct Variation {
     /// Whether several walls were met at once.
     pub met_several: bool,
     /// The series of the columns, where they have such.
-    pub(super) expanded: Option<Expanded>,
+    pub(super) expanded: Option<Expansions>,
     /// Impacts so far.
-    pub impacts: Vec<Crossing>,
+    pub impacts: Vec<CrossingTime>,
     /// Times \[s\] at which rates have jumped, with their derivatives, column by column.
     pub jumped: Vec<(f64, Vec<f64>)>,
     jacobian: Jacobian,
@@ -86,7 +86,7 @@ pub(in crate::run) struct Variation {
 
 /// How the time of an impact moves with every column.
 #[derive(Clone, Debug)]
-pub(in crate::run) struct Crossing {
+pub(in crate::run) struct CrossingTime {
     pub wall: String,
     pub t: f64,
     pub slopes: Vec<f64>,
@@ -226,7 +226,7 @@ impl Variation {
         pause: &mut Pause,
     ) -> Result<bool, StepError> {
         driver.jumps = Some(self.jumps.clone());
-        let mut beside = Beside { variation: self, look, until };
+        let mut beside = VariationObserver { variation: self, look, until };
         let mut adapter = ObserverAdapter { observer: &mut beside, has_enough: false };
         let is_through = driver.go_watched(Time::from(until), outcome, None, Some(&mut adapter), pause)?;
         // What happens at the end itself has no step behind it.
@@ -357,13 +357,13 @@ pub(super) fn plain(motion: &Motion) -> (Time, Vec<f64>, Vec<f64>) {
 }
 
 /// A variation as an observer of its motion.
-struct Beside<'a, 'b> {
+struct VariationObserver<'a, 'b> {
     variation: &'a mut Variation,
     look: &'b mut dyn Look,
     until: f64,
 }
 
-impl Observer for Beside<'_, '_> {
+impl Observer for VariationObserver<'_, '_> {
     fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
         let Self { variation, look, until } = self;
         let has_crossed = variation.catch_up();

@@ -19,7 +19,7 @@ mod trial;
 use trial::{EXPANSIONS, Trial};
 
 pub use set::shipped;
-pub use steps::{Stability, StabilityMap, stability};
+pub use steps::{StabilityMap, StepStability, stability};
 
 use super::methods::{METHODS, MethodId};
 use super::plan::{Plan, Request};
@@ -97,7 +97,7 @@ pub enum Verdict {
 
 /// One scene by one method.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Cell {
+pub struct StressCell {
     /// The method.
     pub method: &'static str,
     /// What became of it.
@@ -122,13 +122,13 @@ pub struct Cell {
 
 /// A case and its cells.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct Line {
+pub struct StressLine {
     /// The scene.
     pub scene: String,
     /// What it may be off.
     pub tolerance: f64,
     /// By method, in the order asked for.
-    pub cells: Vec<Cell>,
+    pub cells: Vec<StressCell>,
 }
 
 /// What is asked for.
@@ -167,12 +167,12 @@ impl Stress {
 /// whatever the number of threads.
 ///
 /// Where it was ended, lines that are not whole are left out.
-pub fn stress(plan: &Stress, finished: &mut dyn FnMut(usize) -> bool) -> Vec<Line> {
+pub fn stress(plan: &Stress, finished: &mut dyn FnMut(usize) -> bool) -> Vec<StressLine> {
     let (count, cases) = (plan.count(), plan.cases.iter().map(known).collect::<Vec<Case>>());
     let (next, is_over) = (AtomicUsize::new(0), AtomicBool::new(false));
     let available = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = if plan.threads == 0 { available } else { plan.threads }.min(count.max(1));
-    let mut cells: Vec<Option<Cell>> = vec![None; count];
+    let mut cells: Vec<Option<StressCell>> = vec![None; count];
     std::thread::scope(|scope| {
         let (send, receive) = std::sync::mpsc::channel();
         for _ in 0..threads {
@@ -202,8 +202,8 @@ pub fn stress(plan: &Stress, finished: &mut dyn FnMut(usize) -> bool) -> Vec<Lin
     let lines = plan.cases.iter().zip(cells.chunks(plan.methods.len().max(1)));
     lines
         .filter_map(|(case, cells)| {
-            let cells: Option<Vec<Cell>> = cells.iter().cloned().collect();
-            Some(Line { scene: case.name.clone(), tolerance: case.tolerance, cells: cells? })
+            let cells: Option<Vec<StressCell>> = cells.iter().cloned().collect();
+            Some(StressLine { scene: case.name.clone(), tolerance: case.tolerance, cells: cells? })
         })
         .collect()
 }
@@ -245,8 +245,8 @@ fn known(case: &Case) -> Case {
 }
 
 /// One scene by one method.
-pub fn cell(case: &Case, method: MethodId, max_evaluations: u64) -> Cell {
-    let mut cell = Cell {
+pub fn cell(case: &Case, method: MethodId, max_evaluations: u64) -> StressCell {
+    let mut cell = StressCell {
         method: method.info().name,
         verdict: Verdict::Refused,
         setting: None,
@@ -277,7 +277,7 @@ fn prepared(case: &Case) -> Result<(Scene, Arc<Mechanism>), String> {
 }
 
 /// What a finished cell amounts to.
-fn verdict(case: &Case, cell: &Cell) -> Verdict {
+fn verdict(case: &Case, cell: &StressCell) -> Verdict {
     let is_named = |culprit: &str| cell.stop.as_ref().is_some_and(|stop| stop.what.contains(culprit));
     match &case.expected {
         Expected::Refusal if cell.refusal.is_some() => Verdict::Right,

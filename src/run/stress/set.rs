@@ -8,10 +8,10 @@
 use super::{Case, Expected};
 
 /// One scene: its name, its text, the tolerance of its end, and what is expected of it.
-struct Entry(&'static str, &'static str, f64, End);
+struct StressScene(&'static str, &'static str, f64, ExpectedEnd);
 
 /// What is expected, as constants.
-enum End {
+enum ExpectedEnd {
     /// Angles \[rad\] and, unless they say too little where vibrations are fast, rates \[rad/s\] of the last
     /// bodies.
     At(&'static [f64], &'static [f64]),
@@ -20,23 +20,28 @@ enum End {
     Stop(&'static str),
 }
 
-use End::{At, Energy, Refusal, Stop};
+use ExpectedEnd::{At, Energy, Refusal, Stop};
 
 macro_rules! entry {
     ($name:literal, $tolerance:literal, $end:expr) => {
-        Entry($name, include_str!(concat!("../../../examples/stress/", $name, ".json")), $tolerance, $end)
+        StressScene(
+            $name,
+            include_str!(concat!("../../../examples/stress/", $name, ".json")),
+            $tolerance,
+            $end,
+        )
     };
 }
 
 /// The cases, in the order of the chart.
 pub fn shipped() -> Vec<Case> {
-    let expected = |end: &End| match end {
+    let expected = |end: &ExpectedEnd| match end {
         At(angles, rates) => Expected::End { angles: angles.to_vec(), rates: rates.to_vec() },
         Energy => Expected::Energy,
         Refusal => Expected::Refusal,
         Stop(culprit) => Expected::Stop((*culprit).to_owned()),
     };
-    let case = |Entry(name, text, tolerance, end): &Entry| Case {
+    let case = |StressScene(name, text, tolerance, end): &StressScene| Case {
         name: (*name).to_owned(),
         origin: format!("examples/stress/{name}.json"),
         text: (*text).to_owned(),
@@ -49,7 +54,7 @@ pub fn shipped() -> Vec<Case> {
 // Ends are numbers as they came out, whatever else they may be near.
 #[allow(clippy::approx_constant)]
 #[rustfmt::skip]
-static SET: &[Entry] = &[
+static SET: &[StressScene] = &[
     // Springs from soft to stiff beyond use, released from exactly their free length.
     entry!("spring_1", 0.0001,
         At(&[-0.392611931592605, 1.0762883660857], &[3.78668013182681, 7.97699819661741])),

@@ -1,7 +1,7 @@
 //! Stability: one fixed-step method on a spring of any stiffness with any step.
 
 use super::Verdict;
-use super::trial::End;
+use super::trial::TrialEnd;
 use crate::dynamics::Mechanism;
 use crate::run::methods::MethodId;
 use crate::run::plan::{Plan, Request};
@@ -26,7 +26,7 @@ const MAX_EVALUATIONS: u64 = 3_000_000;
 
 /// One step at one stiffness.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stability {
+pub struct StepStability {
     /// Stiffness \[N/m\].
     pub stiffness: f64,
     /// Step \[s\].
@@ -43,7 +43,7 @@ pub struct StabilityMap {
     /// The method.
     pub method: MethodId,
     /// Stiffness by stiffness, from the softest, each from the shortest step.
-    pub cells: Vec<Stability>,
+    pub cells: Vec<StepStability>,
     /// Number of stiffnesses.
     pub stiffnesses: usize,
     /// Number of steps.
@@ -69,7 +69,7 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
         let mechanism = Arc::new(Mechanism::new(&scene).ok()?);
         let exact = Request { method: Some(MethodId::Taylor), rtol: Some(EXACT), ..Request::default() };
         let metric = DistanceMetric::new(&mechanism);
-        let exact = End::of(&run(&scene, &mechanism, &exact)?.last, &metric);
+        let exact = TrialEnd::of(&run(&scene, &mechanism, &exact)?.last, &metric);
         for halvings in HALVINGS.rev() {
             let step = UNTIL / libm::exp2(f64::from(halvings));
             let request = Request {
@@ -79,14 +79,14 @@ pub fn stability(method: MethodId, finished: &mut dyn FnMut(usize, usize) -> boo
                 ..Request::default()
             };
             let outcome = run(&scene, &mechanism, &request)?;
-            let end = End { rates: Vec::new(), ..End::of(&outcome.last, &metric) };
+            let end = TrialEnd { rates: Vec::new(), ..TrialEnd::of(&outcome.last, &metric) };
             let error = outcome.stop.is_none().then(|| end.apart(&exact));
             let verdict = match error {
                 None => Verdict::Stopped,
                 Some(error) if error <= RIGHT => Verdict::Right,
                 Some(_) => Verdict::Wrong,
             };
-            cells.push(Stability { stiffness: scene.springs[0].stiffness, step, error, verdict });
+            cells.push(StepStability { stiffness: scene.springs[0].stiffness, step, error, verdict });
             if !finished(cells.len(), stiffnesses * steps) {
                 return None;
             }

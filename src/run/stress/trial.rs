@@ -1,6 +1,6 @@
 //! One cell of the matrix: a scene by a method at settings that are refined until its end is confirmed.
 
-use super::{Case, Cell, Expected};
+use super::{Case, Expected, StressCell};
 use crate::arithmetic::sum::larger;
 use crate::dynamics::Mechanism;
 use crate::run::methods::MethodId;
@@ -37,12 +37,12 @@ pub(super) struct Trial<'a> {
 
 /// Coordinates and rates at the end of a run, as [`DistanceMetric`] measures them.
 #[derive(Clone, Debug)]
-pub(super) struct End {
+pub(super) struct TrialEnd {
     pub(super) coordinates: Vec<f64>,
     pub(super) rates: Vec<f64>,
 }
 
-impl End {
+impl TrialEnd {
     pub(super) fn of(sample: &Sample, metric: &DistanceMetric) -> Self {
         let measured = |values: &[f64]| metric.measured(values.iter().copied()).collect();
         Self { coordinates: measured(&sample.phi), rates: measured(&sample.omega) }
@@ -65,8 +65,8 @@ impl End {
 
 impl Trial<'_> {
     /// Runs it until its end is confirmed, or is not to be had.
-    pub(super) fn run(&self, cell: &mut Cell) -> Result<(), String> {
-        let mut before: Option<End> = None;
+    pub(super) fn run(&self, cell: &mut StressCell) -> Result<(), String> {
+        let mut before: Option<TrialEnd> = None;
         for refinement in 0..=REFINEMENTS {
             let request = self.request(refinement, cell)?;
             let plan =
@@ -132,12 +132,12 @@ impl Trial<'_> {
     }
 
     /// True while there is effort for another run.
-    fn is_left(&self, cell: &Cell) -> bool {
+    fn is_left(&self, cell: &StressCell) -> bool {
         cell.evaluations < self.max_evaluations
     }
 
     /// The request of a refinement.
-    fn request(&self, refinement: u32, cell: &Cell) -> Result<Request, String> {
+    fn request(&self, refinement: u32, cell: &StressCell) -> Result<Request, String> {
         let horizon = self.scene.until;
         let max_evaluations = Some(self.max_evaluations.saturating_sub(cell.evaluations).max(1));
         let request = Request {
@@ -155,16 +155,16 @@ impl Trial<'_> {
         Ok(Request { step, ..request })
     }
 
-    fn end(&self, outcome: &Outcome) -> End {
-        let end = End::of(&outcome.last, &DistanceMetric::new(self.mechanism));
+    fn end(&self, outcome: &Outcome) -> TrialEnd {
+        let end = TrialEnd::of(&outcome.last, &DistanceMetric::new(self.mechanism));
         end.known(outcome.last.centre.len(), &self.case.expected)
     }
 
     /// What the end is off, where that is known.
-    fn score(&self, outcome: &Outcome, end: &End, cell: &mut Cell) {
+    fn score(&self, outcome: &Outcome, end: &TrialEnd, cell: &mut StressCell) {
         cell.error = match &self.case.expected {
             Expected::End { angles: coordinates, rates } | Expected::Motion { coordinates, rates } => {
-                Some(end.apart(&End { coordinates: coordinates.clone(), rates: rates.clone() }))
+                Some(end.apart(&TrialEnd { coordinates: coordinates.clone(), rates: rates.clone() }))
             }
             Expected::Energy | Expected::Stop(_) => Some(outcome.drift.energy.max),
             Expected::Refusal | Expected::Unknown => None,
@@ -172,7 +172,7 @@ impl Trial<'_> {
     }
 
     /// The stop of a run whose end nothing confirms.
-    fn unconfirmed(&self, cell: &Cell) -> StepError {
+    fn unconfirmed(&self, cell: &StressCell) -> StepError {
         let off = cell.estimate.map_or("unknown".to_owned(), |estimate| format!("about {estimate:.1e}"));
         StepError {
             cause: Cause::DriftLimit,

@@ -18,7 +18,7 @@ use crate::run::build::Problem;
 use crate::run::extremes::Extremes;
 use crate::run::plan::Plan;
 use crate::stepping::StepError;
-use crate::stepping::taylor::batch::{Batch, BatchMember, BatchObserver, Going, Passage, Watch};
+use crate::stepping::taylor::batch::{Batch, BatchMember, BatchObserver, Going, TakenStep, Watch};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -54,7 +54,11 @@ impl Ensemble {
     ) {
         let Self { batch, plan, alone, watching } = self;
         let (alone, watching) = (&mut alone[first..], &mut watching[first..]);
-        batch.integrate_with(members, until, &mut Watched { batch, plan, until, alone, watching, watch });
+        batch.integrate_with(
+            members,
+            until,
+            &mut WatchedLanes { batch, plan, until, alone, watching, watch },
+        );
     }
 
     /// True where an event has ended a trajectory.
@@ -83,7 +87,7 @@ impl Ensemble {
 }
 
 /// What is asked of trajectories under way.
-struct Watched<'a, 'b> {
+struct WatchedLanes<'a, 'b> {
     batch: &'a Batch,
     plan: &'a Plan,
     until: Time,
@@ -92,12 +96,12 @@ struct Watched<'a, 'b> {
     watch: &'a mut Watch<'b>,
 }
 
-impl BatchObserver for Watched<'_, '_> {
-    fn ahead(&mut self, number: usize, step: &Passage) -> bool {
+impl BatchObserver for WatchedLanes<'_, '_> {
+    fn ahead(&mut self, number: usize, step: &TakenStep) -> bool {
         self.watching[number].ahead(step)
     }
 
-    fn step(&mut self, number: usize, step: &Passage) -> Going {
+    fn step(&mut self, number: usize, step: &TakenStep) -> Going {
         self.watching[number].step(step);
         (self.watch)(number, step)
     }
@@ -106,7 +110,7 @@ impl BatchObserver for Watched<'_, '_> {
         let Self { batch, plan, until, alone, watching, watch } = self;
         let watching = &mut watching[number];
         watching.go_back();
-        let watch = &mut |passage: &Passage| watch(number, passage);
+        let watch = &mut |passage: &TakenStep| watch(number, passage);
         let way = (*batch, *plan, *until);
         take_on(&mut alone[number], way, member, (watching, watch)).unwrap_or_else(|stop| {
             member.stopped = Some(stop);
@@ -119,7 +123,7 @@ fn take_on(
     alone: &mut Option<Alone>,
     (batch, plan, until): (&Batch, &Plan, Time),
     member: &mut BatchMember,
-    (watching, watch): (&mut Watching, &mut dyn FnMut(&Passage) -> Going),
+    (watching, watch): (&mut Watching, &mut dyn FnMut(&TakenStep) -> Going),
 ) -> Result<Going, StepError> {
     let alone = match alone {
         Some(alone) => alone,

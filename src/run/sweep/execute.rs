@@ -2,7 +2,7 @@
 
 #[cfg(feature = "threads")]
 use super::threads;
-use super::{Point, Sweep, SweepError, Totals};
+use super::{Sweep, SweepError, SweepPoint, Totals};
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -13,7 +13,7 @@ pub trait PointObserver {
     ///
     /// # Errors
     /// Whatever shall end the sweep.
-    fn see(&mut self, point: &Point) -> std::io::Result<()>;
+    fn see(&mut self, point: &SweepPoint) -> std::io::Result<()>;
 
     /// Told now and then how many points are finished, seen or not yet, and what those seen amount to.
     ///
@@ -24,14 +24,14 @@ pub trait PointObserver {
     }
 }
 
-impl<F: FnMut(&Point) -> std::io::Result<()>> PointObserver for F {
-    fn see(&mut self, point: &Point) -> std::io::Result<()> {
+impl<F: FnMut(&SweepPoint) -> std::io::Result<()>> PointObserver for F {
+    fn see(&mut self, point: &SweepPoint) -> std::io::Result<()> {
         self(point)
     }
 }
 
 /// What the threads of a sweep share.
-pub(super) struct Shared<'a> {
+pub(super) struct SharedSweep<'a> {
     pub(super) sweep: &'a Sweep,
     chunk: u64,
     /// The points that were not seen before.
@@ -41,13 +41,13 @@ pub(super) struct Shared<'a> {
     pub(super) is_over: AtomicBool,
 }
 
-impl Shared<'_> {
+impl SharedSweep<'_> {
     pub(super) fn chunks(&self) -> u64 {
         (self.rest.end - self.rest.start).div_ceil(self.chunk)
     }
 
     /// The points of a chunk; fewer where nobody wants them any more.
-    pub(super) fn integrate(&self, chunk: u64) -> Vec<Point> {
+    pub(super) fn integrate(&self, chunk: u64) -> Vec<SweepPoint> {
         let first = self.rest.start + chunk * self.chunk;
         let last = (first + self.chunk).min(self.rest.end);
         let finished = || {
@@ -89,7 +89,7 @@ pub fn sweep_on(
         threads
     };
     let (range, before) = (sweep.range(), seen.points().min(sweep.count()));
-    let shared = Shared {
+    let shared = SharedSweep {
         sweep,
         chunk: sweep.chunk(threads),
         rest: range.start + before..range.end,
@@ -121,7 +121,7 @@ pub(super) struct SweepObserver<'a> {
 }
 
 impl SweepObserver<'_> {
-    pub(super) fn see(&mut self, point: &Point) -> std::io::Result<()> {
+    pub(super) fn see(&mut self, point: &SweepPoint) -> std::io::Result<()> {
         self.totals.take(point);
         self.observer.see(point)
     }

@@ -44,7 +44,7 @@ impl From<&Trust> for PointTrust {
 }
 
 /// What is known of a lane.
-struct Known {
+struct LaneRecord {
     metric: DistanceMetric,
     /// The time looked at last \[s\], and the largest difference so far \[rad, or positions over the size\].
     last: [f64; 2],
@@ -56,7 +56,7 @@ struct Known {
 pub(super) struct Judge<'a> {
     ensemble: Ensemble,
     members: Vec<BatchMember<'a>>,
-    known: Vec<Known>,
+    known: Vec<LaneRecord>,
     /// Room for a motion of both.
     motions: [Motion; 2],
 }
@@ -75,7 +75,7 @@ impl<'a> Judge<'a> {
                 ready.iter().map(|_| Watching::default()).collect(),
             ),
             members: ready.iter().map(|ready| ready.member(2)).collect(),
-            known: ready.iter().map(|ready| Known::new(&ready.mechanism)).collect(),
+            known: ready.iter().map(|ready| LaneRecord::new(&ready.mechanism)).collect(),
             motions: Default::default(),
         }
     }
@@ -102,7 +102,7 @@ impl<'a> Judge<'a> {
     pub(super) fn remove(&mut self, number: usize) -> PointTrust {
         self.members.swap_remove(number);
         self.ensemble.swap_remove(number);
-        let Known { last: [_, error], horizon, is_lost, .. } = self.known.swap_remove(number);
+        let LaneRecord { last: [_, error], horizon, is_lost, .. } = self.known.swap_remove(number);
         let printed = |error: f64| (CAUTION * error).max(LEAST);
         match horizon {
             Some(horizon) => PointTrust { error: Some(printed(HORIZON)), horizon: Some(horizon) },
@@ -111,7 +111,7 @@ impl<'a> Judge<'a> {
     }
 }
 
-impl Known {
+impl LaneRecord {
     fn new(mechanism: &Mechanism) -> Self {
         Self { metric: DistanceMetric::new(mechanism), last: [0.0; 2], horizon: None, is_lost: false }
     }

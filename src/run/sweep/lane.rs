@@ -1,22 +1,22 @@
 //! A point of a sweep that is integrated in a lane.
 
-use super::point::{Point, Ready, Status};
+use super::point::{Ready, Status, SweepPoint};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{BodyAngles, Mechanism, Motion};
-use crate::run::allowance::{Allowance, EnergyLimit, Moment};
+use crate::run::allowance::{Allowance, AllowanceMoment, EnergyLimit};
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip;
 use crate::run::plan::Plan;
-use crate::stepping::taylor::batch::{BatchMember, Passage, read};
+use crate::stepping::taylor::batch::{BatchMember, TakenStep, read};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
 
 /// A point integrated in a lane.
 pub(super) struct Lane {
-    pub point: Point,
+    pub point: SweepPoint,
     /// Energy at the start \[J\].
     reference: DoubleDouble,
     scale: f64,
@@ -41,7 +41,7 @@ impl Lane {
     }
 
     /// Looks for a bar that turns over in a step.
-    pub(super) fn look(&mut self, bodies: usize, passage: &Passage) {
+    pub(super) fn look(&mut self, bodies: usize, passage: &TakenStep) {
         if !(0..bodies).any(|bar| flip::may_pass(passage.ends(bar), passage.step)) {
             return;
         }
@@ -95,7 +95,7 @@ impl Lane {
         point.steps = member.statistics.steps;
         point.constraint = violation(member.mechanism, motion, &kernel.z, point.constraint);
         if let Some(allowance) = &self.allowance {
-            let moment = Moment {
+            let moment = AllowanceMoment {
                 omega: &point.omega,
                 translations: &point.phi[bodies..],
                 work: work.hi,
@@ -150,7 +150,7 @@ fn violation(
     let mut jacobian = vec![DoubleDouble::ZERO; motion.phi.len()];
     mechanism.constraints.iter().fold(before, |most, row| {
         jacobian.fill(DoubleDouble::ZERO);
-        let at = Posture { phi: &motion.phi, z, omega: &motion.omega };
+        let at = ConstraintArguments { phi: &motion.phi, z, omega: &motion.omega };
         let here = row.linearise(motion.time, at, &mut jacobian);
         let rate = jacobian.iter().zip(&motion.omega).fold(here.drive, |rate, (&g, &w)| rate + g * w);
         let [position, velocity] = most.unwrap_or_default();

@@ -41,13 +41,13 @@ mod watching;
 pub use execute::{PointObserver, sweep, sweep_on};
 pub use grid::{Grid, Vary, VaryError};
 pub use judge::PointTrust;
-pub use point::{Point, Status};
+pub use point::{Status, SweepPoint};
 pub use shard::Shard;
 pub use totals::Totals;
 
 use super::drift::Limits;
 use super::methods::{MethodId, Stabilization};
-use super::plan::{MAX_ROWS, Plan, Refusal, Request};
+use super::plan::{MAX_ROWS, Plan, Request, RequestRefusal};
 use super::trust::Level;
 use crate::arithmetic::eight::LANES;
 use crate::dynamics::{CompileError, Mechanism};
@@ -103,7 +103,7 @@ pub enum SweepError {
     Compile(#[from] CompileError),
     /// The request makes no sense, whatever the point.
     #[error("{0}")]
-    Refused(#[from] Refusal),
+    Refused(#[from] RequestRefusal),
     /// The threads could not be started.
     #[error("{0}")]
     Threads(String),
@@ -139,7 +139,7 @@ impl Sweep {
         request: &Request,
     ) -> Result<Self, SweepError> {
         Self::over(template, names, request, |variables| {
-            let refused = |reason: &str| Refusal {
+            let refused = |reason: &str| RequestRefusal {
                 is_usage: true,
                 what: "a list of points".into(),
                 reason: reason.into(),
@@ -159,7 +159,7 @@ impl Sweep {
         template: &Template,
         names: &[String],
         request: &Request,
-        grid: impl FnOnce(&[Variable]) -> Result<Grid, Refusal>,
+        grid: impl FnOnce(&[Variable]) -> Result<Grid, RequestRefusal>,
     ) -> Result<Self, SweepError> {
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
@@ -346,8 +346,8 @@ impl Sweep {
     }
 }
 
-fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, Refusal> {
-    let refused = |what: String, reason: String, alternative: &str| Refusal {
+fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, RequestRefusal> {
+    let refused = |what: String, reason: String, alternative: &str| RequestRefusal {
         is_usage: true,
         what,
         reason,
@@ -368,13 +368,13 @@ fn grid(vary: Vec<Vary>, variables: &[Variable]) -> Result<Grid, Refusal> {
 }
 
 /// Whether nothing is varied twice.
-fn distinct(variables: &[Variable]) -> Result<(), Refusal> {
+fn distinct(variables: &[Variable]) -> Result<(), RequestRefusal> {
     let twice = variables
         .iter()
         .enumerate()
         .find(|(k, variable)| variables[..*k].iter().any(|before| before.path == variable.path));
     twice.map_or(Ok(()), |(_, variable)| {
-        Err(Refusal {
+        Err(RequestRefusal {
             is_usage: true,
             what: format!("--vary {}", variable.path),
             reason: "it is varied twice".into(),

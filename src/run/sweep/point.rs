@@ -36,7 +36,7 @@ pub enum Status {
 
 /// One point of a sweep.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Point {
+pub struct SweepPoint {
     /// Its number in the grid.
     pub index: u64,
     /// What was varied, in the units of the scene, slowest first.
@@ -68,7 +68,7 @@ pub struct Point {
 
 /// A point ready to run.
 pub(super) struct Ready {
-    pub point: Point,
+    pub point: SweepPoint,
     pub mechanism: Arc<Mechanism>,
     pub plan: Plan,
     pub start: Motion,
@@ -86,7 +86,7 @@ impl Ready {
     }
 }
 
-impl Point {
+impl SweepPoint {
     /// Takes from where the bodies of its mechanism end what their angles do not tell.
     fn place(&mut self, mechanism: &Mechanism) {
         if mechanism.has_translations() {
@@ -97,7 +97,7 @@ impl Point {
 
 impl Sweep {
     /// Runs one point; the same as in a whole sweep.
-    pub fn point(&self, index: u64) -> Option<Point> {
+    pub fn point(&self, index: u64) -> Option<SweepPoint> {
         if index < self.grid.count() {
             self.integrate(index..index + 1, &|| (), &|| false).pop()
         } else {
@@ -127,7 +127,7 @@ impl Sweep {
         points: Range<u64>,
         finished: &dyn Fn(),
         is_over: &dyn Fn() -> bool,
-    ) -> Vec<Point> {
+    ) -> Vec<SweepPoint> {
         let mut found = Vec::with_capacity((points.end - points.start) as usize);
         let mut in_lanes = Vec::new();
         for index in points {
@@ -167,9 +167,9 @@ impl Sweep {
     }
 
     /// Puts the values in; a point that cannot run is finished.
-    fn prepare(&self, index: u64) -> Result<Ready, Box<Point>> {
+    fn prepare(&self, index: u64) -> Result<Ready, Box<SweepPoint>> {
         let values = self.grid.values(index);
-        let mut point = Point {
+        let mut point = SweepPoint {
             index,
             values,
             status: Status::Done,
@@ -246,7 +246,7 @@ impl Sweep {
     }
 
     /// Runs a point as a single run would; one that is given up is not worth a look.
-    fn single(&self, ready: Ready, is_over: &dyn Fn() -> bool) -> Point {
+    fn single(&self, ready: Ready, is_over: &dyn Fn() -> bool) -> SweepPoint {
         let Ready { mut point, mechanism, plan, start, scale } = ready;
         let mechanism = if scale == mechanism.energy_scale {
             mechanism
@@ -286,7 +286,7 @@ impl Sweep {
     }
 
     /// Runs points beside each other, a lane each.
-    fn batch(&self, ready: Vec<Ready>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<Point> {
+    fn batch(&self, ready: Vec<Ready>, finished: &dyn Fn(), is_over: &dyn Fn() -> bool) -> Vec<SweepPoint> {
         let Some(first) = ready.first() else { return Vec::new() };
         let (plan, bodies) = (first.plan.clone(), first.mechanism.own_bodies().len());
         let batch = Batch::new(plan.tolerance.unwrap_or_default());

@@ -1,7 +1,7 @@
 //! The points of a sweep as a table: one row a point, units in the header, digits that read back to the same
 //! doubles.
 
-use super::{Point, Status, Sweep};
+use super::{Status, Sweep, SweepPoint};
 use crate::run::trust::Level;
 use std::io::Write;
 
@@ -9,13 +9,13 @@ use std::io::Write;
 pub struct SweepTable<W: Write> {
     writer: csv::Writer<W>,
     bars: Vec<String>,
-    layout: Layout,
+    layout: SweepLayout,
     fields: Vec<String>,
 }
 
 /// How many numbers of what a row has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Layout {
+pub struct SweepLayout {
     bars: usize,
     integrals: usize,
     outputs: usize,
@@ -24,7 +24,7 @@ pub struct Layout {
     has_places: bool,
 }
 
-impl Layout {
+impl SweepLayout {
     /// Of the rows of a sweep.
     pub fn of(sweep: &Sweep) -> Self {
         let mechanism = sweep.mechanism();
@@ -79,8 +79,8 @@ pub fn outputs(sweep: &Sweep) -> impl Iterator<Item = (&str, &str)> {
 
 /// The numbers of a point's row, in the order of [`columns`] up to the flip time; not a number where there is
 /// none.
-pub fn numbers(point: &Point, layout: Layout) -> Vec<f64> {
-    let Layout { bars, integrals, outputs, is_judged, has_places } = layout;
+pub fn numbers(point: &SweepPoint, layout: SweepLayout) -> Vec<f64> {
+    let SweepLayout { bars, integrals, outputs, is_judged, has_places } = layout;
     let mut numbers = point.values.clone();
     if point.phi.is_empty() {
         // Time, three drifts, steps and flip time; of a judged point two more.
@@ -128,7 +128,7 @@ impl<W: Write> SweepTable<W> {
         Self {
             writer: csv::Writer::from_writer(writer),
             bars,
-            layout: Layout::of(sweep),
+            layout: SweepLayout::of(sweep),
             fields: vec![String::new(); columns(sweep).len()],
         }
     }
@@ -146,7 +146,7 @@ impl<W: Write> SweepTable<W> {
     ///
     /// # Errors
     /// What the writer says.
-    pub fn write(&mut self, point: &Point) -> csv::Result<()> {
+    pub fn write(&mut self, point: &SweepPoint) -> csv::Result<()> {
         let numbers = numbers(point, self.layout);
         let steps = numbers.len() - 2;
         self.fields.iter_mut().for_each(String::clear);

@@ -1,7 +1,7 @@
 //! Chunks on several threads, seen in order.
 
-use super::execute::{Shared, SweepObserver};
-use super::{Point, SweepError};
+use super::execute::{SharedSweep, SweepObserver};
+use super::{SweepError, SweepPoint};
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -14,12 +14,12 @@ const AHEAD: u64 = 16;
 const TICK: Duration = Duration::from_millis(40);
 
 /// A finished chunk; none where its thread panicked.
-type Finished = (u64, Option<Vec<Point>>);
+type Finished = (u64, Option<Vec<SweepPoint>>);
 
 /// Sends word even where integrating panics.
 struct PanicNotifier {
     chunk: u64,
-    points: Option<Vec<Point>>,
+    points: Option<Vec<SweepPoint>>,
     send: Sender<Finished>,
 }
 
@@ -32,7 +32,7 @@ impl Drop for PanicNotifier {
 
 /// Integrates all chunks and shows them in order.
 pub(super) fn integrate(
-    shared: &Shared,
+    shared: &SharedSweep,
     threads: usize,
     sweep_observer: &mut SweepObserver,
 ) -> Result<(), SweepError> {

@@ -1,6 +1,6 @@
 //! What the points of a sweep add up to.
 
-use super::{Point, Status};
+use super::{Status, SweepPoint};
 use std::time::Duration;
 
 /// What a sweep amounted to, or the points of it seen so far.
@@ -60,7 +60,7 @@ impl Totals {
         self.wall += next.wall;
     }
 
-    pub(super) fn take(&mut self, point: &Point) {
+    pub(super) fn take(&mut self, point: &SweepPoint) {
         match point.status {
             Status::Done => self.done += 1,
             Status::Stopped(_) => self.stopped += 1,

@@ -10,7 +10,7 @@ use crate::run::event::{EventDetector, EventMemory};
 use crate::run::extremes::{Extremes, ExtremesDetector};
 use crate::run::inside::{Inside, StepWatcher};
 use crate::run::plan::Plan;
-use crate::stepping::taylor::batch::Passage;
+use crate::stepping::taylor::batch::TakenStep;
 use std::sync::Arc;
 
 /// Share of the largest value of an event function up to which it may be on the other side once the end of a
@@ -44,7 +44,7 @@ impl Watching {
     }
 
     /// Shown the step that comes next; true where an event is in it, or may be where it ends.
-    pub fn ahead(&mut self, passage: &Passage) -> bool {
+    pub fn ahead(&mut self, passage: &TakenStep) -> bool {
         let Self { events: Some(events), before, is_ahead, motion, .. } = self else { return false };
         before.clone_from(&events.memory);
         *is_ahead = true;
@@ -55,7 +55,7 @@ impl Watching {
     }
 
     /// Shows a step that a lane has made.
-    pub fn step(&mut self, passage: &Passage) {
+    pub fn step(&mut self, passage: &TakenStep) {
         let Self { extremes, motion, is_ahead, .. } = self;
         *is_ahead = false;
         if let Some(extremes) = extremes {
@@ -79,7 +79,7 @@ impl Watching {
 
 /// The inside of a step in a lane.
 struct Within<'a, 'b> {
-    passage: &'a Passage<'b>,
+    passage: &'a TakenStep<'b>,
     motion: &'a mut Motion,
 }
 

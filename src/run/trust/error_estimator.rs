@@ -7,9 +7,9 @@
 use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
 use super::finer;
 use super::growth::Nature;
-use super::measured::{Apart, LAST_DIGIT, Measured};
+use super::measured::{Apart, LAST_DIGIT, TrustMeasurement};
 use super::reference_run::{ReferenceRun, SavedReferenceRun, WorkBudget};
-use super::tangent::Tangent;
+use super::tangent::TangentFlow;
 use super::{CUT, DistanceMetric, HORIZON, LOST, Level, Trust};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
@@ -51,7 +51,7 @@ pub(in crate::run) struct ErrorEstimator {
     mechanism: Arc<Mechanism>,
     metric: DistanceMetric,
     prices: Prices,
-    measured: Measured,
+    measured: TrustMeasurement,
     reference_run: Option<ReferenceRun>,
     /// The run's plan.
     run: Plan,
@@ -66,12 +66,12 @@ pub(in crate::run) struct ErrorEstimator {
 
 /// All that the rest of it depends on.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(in crate::run) struct Kept {
-    measured: Measured,
+pub(in crate::run) struct SavedEstimator {
+    measured: TrustMeasurement,
     reference_run: Option<SavedReferenceRun>,
 }
 
-impl Kept {
+impl SavedEstimator {
     /// On the way to a later horizon \[s\].
     pub(in crate::run) fn extend(&mut self, until: f64) {
         if let Some(reference_run) = &mut self.reference_run {
@@ -143,7 +143,7 @@ impl ErrorEstimator {
     pub(in crate::run) fn new(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, level: Level) -> Self {
         let finer::Finer { plan: mut series, name } = finer::first(mechanism, plan, level);
         let prices = Prices::new(mechanism, &series, plan);
-        let mut measured = Measured::new(level, name, shared(mechanism, plan, &series));
+        let mut measured = TrustMeasurement::new(level, name, shared(mechanism, plan, &series));
         let mut reference_run =
             ReferenceRun::new(mechanism, &mut series, start).map_err(|why| measured.why = Some(why)).ok();
         if let Some(reference_run) = &mut reference_run {
@@ -161,7 +161,7 @@ impl ErrorEstimator {
         mechanism: &Arc<Mechanism>,
         run: &Plan,
         prices: Prices,
-        measured: Measured,
+        measured: TrustMeasurement,
         reference_run: Option<ReferenceRun>,
     ) -> Self {
         Self {
@@ -183,10 +183,10 @@ impl ErrorEstimator {
         mechanism: &Arc<Mechanism>,
         plan: &Plan,
         start: &Motion,
-        kept: Kept,
+        kept: SavedEstimator,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let Kept { measured, reference_run } = kept;
+        let SavedEstimator { measured, reference_run } = kept;
         let Some(reference_run) = reference_run else {
             return Ok(Some(Self::with(mechanism, plan, Prices::new(mechanism, plan, plan), measured, None)));
         };
@@ -198,8 +198,8 @@ impl ErrorEstimator {
     }
 
     /// All that the rest of it depends on.
-    pub(in crate::run) fn kept(&self) -> Kept {
-        Kept {
+    pub(in crate::run) fn kept(&self) -> SavedEstimator {
+        SavedEstimator {
             measured: self.measured.clone(),
             reference_run: self.reference_run.as_ref().map(ReferenceRun::kept),
         }
@@ -234,7 +234,7 @@ impl ErrorEstimator {
 
     /// Ends the tangent flow where it has cost its share; where the reference solution's own rounding counts
     /// it is needed to the end.
-    fn stint(&mut self) {
+    fn limit_flow(&mut self) {
         let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
         let Some(tangent) = &reference_run.tangent else { return };
         let [share, grace] = FLOW[usize::from(!tangent.is_plain())];
@@ -251,11 +251,11 @@ impl ErrorEstimator {
     /// # Errors
     /// Why it goes no further.
     fn accompany(&mut self, time: Time, statistics: Statistics) -> Result<(), String> {
-        let budget = self.budget(statistics);
+        let limit = self.budget(statistics);
         let Self { reference_run: Some(reference_run), prices, measured, .. } = self else { return Ok(()) };
-        let mut purse = WorkBudget { prices, spent: &mut measured.spent, budget, flow: &mut measured.flow };
-        let gone = reference_run.go(time, &mut purse);
-        if let Some(why) = reference_run.tangent.as_ref().and_then(Tangent::lost) {
+        let mut budget = WorkBudget { prices, spent: &mut measured.spent, limit, flow: &mut measured.flow };
+        let gone = reference_run.go(time, &mut budget);
+        if let Some(why) = reference_run.tangent.as_ref().and_then(TangentFlow::lost) {
             measured.no_growth = Some(why.into());
             measured.conclude(reference_run.end_flow().as_ref());
         }
@@ -302,11 +302,11 @@ impl ErrorEstimator {
             return self.end(&why);
         }
         self.measured.run = self.prices.run(self.run.method, statistics);
-        self.stint();
+        self.limit_flow();
         let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
         if measured.lost.is_none() {
             self.measure(motion);
-        } else if reference_run.tangent.as_ref().map_or(f64::INFINITY, Tangent::growth) > ENOUGH {
+        } else if reference_run.tangent.as_ref().map_or(f64::INFINITY, TangentFlow::growth) > ENOUGH {
             self.end("");
         }
         let Self { reference_run: Some(reference_run), measured, .. } = self else { return };
@@ -336,7 +336,7 @@ impl ErrorEstimator {
             .tangent
             .as_ref()
             .filter(|_| reference_run.is_rounded)
-            .map_or(0.0, Tangent::rounding);
+            .map_or(0.0, TangentFlow::rounding);
         let apart = metric.apart(motion, &reference_run.motion);
         let own = rounding.hypot(reference_run.own_error(motion.time.hi));
         // It is there for differences that are small by chance.

@@ -1,6 +1,6 @@
 //! The tangent flow of a scene at times of one's own.
 
-use super::Tangent;
+use super::TangentFlow;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
 use crate::run::contact::{ContactDriver, JumpLog};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 /// A motion with the small differences beside it.
 #[derive(Clone, Debug)]
-pub struct Moment {
+pub struct FlowState {
     /// The motion.
     pub motion: Motion,
     /// Differences in all coordinates and rates \[rad, m, rad/s, m/s\], those of the start carried along.
@@ -23,7 +23,7 @@ pub struct Moment {
 #[derive(Clone, Debug)]
 pub struct Flow {
     /// The start, after what impacts there are at it, and at the times asked for, as far as the flow goes.
-    pub moments: Vec<Moment>,
+    pub moments: Vec<FlowState>,
     /// What rates are divided by to be compared with positions \[rad/s\].
     pub rate: f64,
     /// Steps of the flow.
@@ -43,10 +43,10 @@ pub fn flow(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion, times: &[f6
     let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
     contact_driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     let begin = contact_driver.motion();
-    let mut tangent = Tangent::new(contact_driver.holding(), &begin, plan.until)?;
+    let mut tangent = TangentFlow::new(contact_driver.holding(), &begin, plan.until)?;
     let jumps = JumpLog::with_switches();
     contact_driver.jumps = Some(jumps.clone());
-    let moment = |motion: Motion, tangent: &Tangent| Moment {
+    let moment = |motion: Motion, tangent: &TangentFlow| FlowState {
         motion,
         columns: tangent.columns(),
         growth: tangent.growth(),

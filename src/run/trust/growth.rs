@@ -9,7 +9,7 @@
 //! Source: M. Sandri, *Numerical calculation of Lyapunov exponents*, The Mathematica Journal 6 (1996), for
 //! exponents from growth; the test is ours.
 
-use super::{Lyapunov, Tangent};
+use super::{Lyapunov, TangentFlow};
 use crate::dynamics::Mechanism;
 use serde::{Deserialize, Serialize};
 
@@ -45,7 +45,7 @@ pub(super) struct Growth {
 
 impl Nature {
     /// Of a mechanism whose flow has begun.
-    pub fn new(mechanism: &Mechanism, tangent: &Tangent) -> Self {
+    pub fn new(mechanism: &Mechanism, tangent: &TangentFlow) -> Self {
         let moves = mechanism.constraints.iter().any(|row| row.is_motor());
         let pushes = mechanism.actions.iter().any(|action| action.law.is_some());
         // Branches that laws stay on are states as well.
@@ -89,13 +89,13 @@ impl Nature {
 }
 
 /// A straight line through points, by least squares.
-struct Line {
+struct StraightLine {
     slope: f64,
     /// Mean square of what it leaves.
     rest: f64,
 }
 
-fn fit(points: impl Iterator<Item = [f64; 2]> + Clone) -> Line {
+fn fit(points: impl Iterator<Item = [f64; 2]> + Clone) -> StraightLine {
     let count = points.clone().count() as f64;
     let [x, y] = points.clone().fold([0.0; 2], |[x, y], point| [x + point[0] / count, y + point[1] / count]);
     let [xx, xy, yy] = points.fold([0.0; 3], |[xx, xy, yy], [a, b]| {
@@ -103,7 +103,7 @@ fn fit(points: impl Iterator<Item = [f64; 2]> + Clone) -> Line {
         [xx + a * a, xy + a * b, yy + b * b]
     });
     let slope = xy / xx;
-    Line { slope, rest: (yy - slope * xy) / count }
+    StraightLine { slope, rest: (yy - slope * xy) / count }
 }
 
 /// The growth at a time, on straight lines between those that are known.

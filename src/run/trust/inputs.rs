@@ -24,7 +24,7 @@ use crate::run::contact::ContactDriver;
 use crate::run::driver::Pause;
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
-use crate::scene::{Scene, SceneError, Template, Variable, Written};
+use crate::scene::{Scene, SceneError, Template, Variable, WrittenNumber};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -98,7 +98,7 @@ impl Inputs {
     /// known.
     pub fn of(
         template: &Template,
-        numbers: &[Written],
+        numbers: &[WrittenNumber],
         until: f64,
         max_evaluations: u64,
         reach: Option<f64>,
@@ -106,7 +106,7 @@ impl Inputs {
     ) -> Self {
         let mut inputs = Self { at: until, ..Self::default() };
         let mut found = Vec::new();
-        match Neighbours::new(template, until, max_evaluations, reach, &mut inputs, pause) {
+        match NeighbourRuns::new(template, until, max_evaluations, reach, &mut inputs, pause) {
             Err(why) => inputs.why = Some(why),
             Ok(mut neighbours) => found.extend(numbers.iter().map(|number| neighbours.input(number))),
         }
@@ -149,13 +149,13 @@ impl Trust {
 }
 
 /// A neighbour: by how much its number is changed, and its motions.
-struct Neighbour {
+struct NeighbourRun {
     change: f64,
     motions: Vec<Motion>,
 }
 
 /// Runs beside that of the scene.
-struct Neighbours<'a, 'b> {
+struct NeighbourRuns<'a, 'b> {
     template: &'a Template,
     times: Vec<Time>,
     max_evaluations: u64,
@@ -170,7 +170,7 @@ struct Neighbours<'a, 'b> {
     pause: &'a mut Pause<'b>,
 }
 
-impl<'a, 'b> Neighbours<'a, 'b> {
+impl<'a, 'b> NeighbourRuns<'a, 'b> {
     fn new(
         template: &'a Template,
         until: f64,
@@ -270,8 +270,8 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         (motions, if is_paused { Some("interrupted".into()) } else { why })
     }
 
-    fn input(&mut self, number: &Written) -> Input {
-        let Written { path, unit, value, uncertainty } = number;
+    fn input(&mut self, number: &WrittenNumber) -> Input {
+        let WrittenNumber { path, unit, value, uncertainty } = number;
         let mut input = Input {
             path: path.clone(),
             unit: (*unit).into(),
@@ -292,7 +292,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     ///
     /// # Errors
     /// Why it is not known.
-    fn slope(&mut self, number: &Written) -> Result<(f64, bool), String> {
+    fn slope(&mut self, number: &WrittenNumber) -> Result<(f64, bool), String> {
         let [least, most] = CHANGE.map(|change| change * number.value.abs());
         let mut wanted = (ABOVE_NOISE * self.noise).clamp(DIFFERENCE[0], DIFFERENCE[1]);
         let mut h = (wanted / self.reach * number.value.abs()).clamp(least, most);
@@ -365,11 +365,11 @@ impl<'a, 'b> Neighbours<'a, 'b> {
     }
 
     /// A neighbour at a change, or else at the opposite one.
-    fn either(&mut self, number: &Written, h: f64) -> Result<Neighbour, String> {
+    fn either(&mut self, number: &WrittenNumber, h: f64) -> Result<NeighbourRun, String> {
         self.beside(number, h).or_else(|why| self.beside(number, -h).map_err(|_| why))
     }
 
-    fn beside(&mut self, number: &Written, h: f64) -> Result<Neighbour, String> {
+    fn beside(&mut self, number: &WrittenNumber, h: f64) -> Result<NeighbourRun, String> {
         let value = number.value + h;
         let variable = Variable { path: number.path.clone(), unit: number.unit, start: None };
         let scene = self.template.filled(&[variable], &[value]).map_err(|error| {
@@ -384,7 +384,7 @@ impl<'a, 'b> Neighbours<'a, 'b> {
         if motions.len() < self.times.len() {
             return Err(format!("with it changed the run stops {}", stop.unwrap_or_default()));
         }
-        Ok(Neighbour { change: value - number.value, motions })
+        Ok(NeighbourRun { change: value - number.value, motions })
     }
 
     /// The largest difference at any of the times; infinite where one is not a number.

@@ -1,7 +1,7 @@
 //! What a reference solution has measured so far, and what it amounts to.
 
 use super::growth::{Growth, Nature};
-use super::tangent::Tangent;
+use super::tangent::TangentFlow;
 use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Trust};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -29,7 +29,7 @@ pub(super) struct Apart {
 
 /// What is measured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Measured {
+pub(super) struct TrustMeasurement {
     pub level: Level,
     /// The reference solution, in words.
     pub name: String,
@@ -76,7 +76,7 @@ pub(super) struct Measured {
     pub run: f64,
 }
 
-impl Measured {
+impl TrustMeasurement {
     /// Nothing so far.
     pub(super) fn new(level: Level, name: String, shared: Vec<String>) -> Self {
         Self {
@@ -137,7 +137,7 @@ impl Measured {
     }
 
     /// Takes what is known of growth when its flow ends.
-    pub(super) fn conclude(&mut self, tangent: Option<&Tangent>) {
+    pub(super) fn conclude(&mut self, tangent: Option<&TangentFlow>) {
         let Some(tangent) = tangent else { return };
         self.history = tangent.history();
         // Where the flow ended early, what inputs come to at the end is not known.
@@ -147,7 +147,7 @@ impl Measured {
     }
 
     /// Takes what is known of growth where following it further would cost too much.
-    pub(super) fn stop_growth(&mut self, tangent: Option<&Tangent>) {
+    pub(super) fn stop_growth(&mut self, tangent: Option<&TangentFlow>) {
         let Some(tangent) = tangent else { return };
         let [t, _] = tangent.now();
         (self.history, self.stopped) = (tangent.history(), Some([t, LAST_DIGIT * tangent.reach(t)]));
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn what_is_seen_after_the_last_row_is_left_out() {
-        let mut measured = Measured::new(Level::Auto, String::new(), Vec::new());
+        let mut measured = TrustMeasurement::new(Level::Auto, String::new(), Vec::new());
         for (t, angle) in [(0.0, 0.0), (1.0, 1e-9), (2.0, 1e-6), (3.0, 0.2)] {
             measured.take(t, Apart { angle, ..Apart::default() });
         }

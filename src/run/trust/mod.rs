@@ -37,11 +37,11 @@ mod reference_run;
 pub mod tangent;
 
 pub use distance::DistanceMetric;
-pub(super) use error_estimator::{ErrorEstimator, Kept};
-pub use flow::{Flow, Moment, flow};
+pub(super) use error_estimator::{ErrorEstimator, SavedEstimator};
+pub use flow::{Flow, FlowState, flow};
 pub use inputs::{Input, Inputs};
 pub(super) use measured::crossing;
-pub use tangent::Tangent;
+pub use tangent::TangentFlow;
 pub(super) use tangent::{Ground, eliminate};
 
 use serde::{Deserialize, Serialize};

@@ -2,7 +2,7 @@
 
 use super::budget::Prices;
 use super::finer::{is_rounded, own_error};
-use super::tangent::{Path, Tangent};
+use super::tangent::{Path, TangentFlow};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
 use crate::run::contact::{ContactDriver, ContactDriverState, JumpLog};
@@ -21,7 +21,7 @@ pub(super) struct ReferenceRun {
     contact_driver: ContactDriver,
     pub outcome: Outcome,
     pub motion: Motion,
-    pub tangent: Option<Tangent>,
+    pub tangent: Option<TangentFlow>,
     /// Why there is no tangent flow.
     pub no_growth: Option<String>,
     /// True where its own rounding counts: the run is as near it.
@@ -58,7 +58,7 @@ impl SavedReferenceRun {
 pub(super) struct WorkBudget<'a> {
     pub prices: &'a Prices,
     pub spent: &'a mut f64,
-    pub budget: f64,
+    pub limit: f64,
     /// Of what was spent, that of the tangent flow.
     pub flow: &'a mut f64,
 }
@@ -83,7 +83,7 @@ impl ReferenceRun {
     pub(super) fn new(mechanism: &Arc<Mechanism>, series: &mut Plan, start: &Motion) -> Result<Self, String> {
         let (mut contact_driver, outcome) = contact_driver(mechanism, series, start)?;
         let motion = contact_driver.motion();
-        let (tangent, no_growth) = match Tangent::new(contact_driver.holding(), &motion, series.until) {
+        let (tangent, no_growth) = match TangentFlow::new(contact_driver.holding(), &motion, series.until) {
             Ok(tangent) => (Some(tangent), None),
             Err(why) => (None, Some(why)),
         };
@@ -141,7 +141,7 @@ impl ReferenceRun {
         };
         let tangent = match path {
             None => None,
-            Some(path) => match Tangent::resume(contact_driver.holding(), path) {
+            Some(path) => match TangentFlow::resume(contact_driver.holding(), path) {
                 None => return Ok(None),
                 tangent => tangent,
             },
@@ -153,7 +153,7 @@ impl ReferenceRun {
     }
 
     /// Ends the tangent flow.
-    pub(super) fn end_flow(&mut self) -> Option<Tangent> {
+    pub(super) fn end_flow(&mut self) -> Option<TangentFlow> {
         self.contact_driver.jumps = None;
         self.tangent.take()
     }
@@ -192,13 +192,13 @@ impl ReferenceRun {
     ///
     /// # Errors
     /// Why the reference solution stopped, or `None` where the budget was used up.
-    pub(super) fn go(&mut self, until: Time, purse: &mut WorkBudget) -> Result<(), Option<String>> {
-        while let Some(next) = self.tangent.as_ref().map(Tangent::next).filter(|&next| next <= until.hi) {
+    pub(super) fn go(&mut self, until: Time, budget: &mut WorkBudget) -> Result<(), Option<String>> {
+        while let Some(next) = self.tangent.as_ref().map(TangentFlow::next).filter(|&next| next <= until.hi) {
             // After an event that came in a long step of the flow its steps may be so short that they end
             // before the step in which the motion is known.
             let is_behind = next < self.motion.time.hi && next < self.contact_driver.step_begin().hi;
             if !is_behind {
-                self.integrate(Time::from(next), purse)?;
+                self.integrate(Time::from(next), budget)?;
             }
             let steps = if self.is_rounded { self.last.steps } else { 0 };
             if let Some(tangent) = &mut self.tangent {
@@ -206,17 +206,17 @@ impl ReferenceRun {
                     true => tangent.go_alone(),
                     false => tangent.take(&self.motion, steps),
                 }
-                let cost = tangent.evaluations() as f64 * purse.prices.evaluation;
-                (*purse.spent, *purse.flow) = (*purse.spent + cost, *purse.flow + cost);
+                let cost = tangent.evaluations() as f64 * budget.prices.evaluation;
+                (*budget.spent, *budget.flow) = (*budget.spent + cost, *budget.flow + cost);
             }
         }
-        self.integrate(until, purse)
+        self.integrate(until, budget)
     }
 
     /// The same without the tangent flow.
-    fn integrate(&mut self, until: Time, purse: &mut WorkBudget) -> Result<(), Option<String>> {
-        let each = purse.prices.series[0];
-        let mut left = ((purse.budget - *purse.spent) / each) as u64;
+    fn integrate(&mut self, until: Time, budget: &mut WorkBudget) -> Result<(), Option<String>> {
+        let each = budget.prices.series[0];
+        let mut left = ((budget.limit - *budget.spent) / each) as u64;
         let mut is_spent = || {
             left = left.saturating_sub(1);
             left == 0
@@ -224,7 +224,7 @@ impl ReferenceRun {
         let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
         if !arrived.map_err(|stop| {
             Some(format!("the reference solution stopped at t = {} s: {}", stop.t, stop.what))
-        })? || *purse.spent > purse.budget
+        })? || *budget.spent > budget.limit
         {
             return Err(None);
         }
@@ -233,7 +233,7 @@ impl ReferenceRun {
             tangent.jump(&jumps.take());
         }
         let statistics = self.contact_driver.statistics();
-        *purse.spent += (statistics.evaluations - self.last.evaluations) as f64 * each + purse.prices.look;
+        *budget.spent += (statistics.evaluations - self.last.evaluations) as f64 * each + budget.prices.look;
         self.last = statistics;
         Ok(())
     }

@@ -29,11 +29,11 @@ mod record;
 mod rounding;
 mod start;
 
-use self::beside::Beside;
-use self::gauss::Gauss;
+use self::beside::ColumnsBeside;
+use self::gauss::TangentGauss;
 pub(in crate::run) use self::gauss::eliminate;
 pub(in crate::run) use self::ground::Ground;
-use self::numbers::{Parameter, Push};
+use self::numbers::{ParameterEffects, ParameterPowers};
 use self::start::{Dice, unit};
 use super::budget::FRICTION;
 use crate::dynamics::schur::NEAR;
@@ -56,18 +56,18 @@ const ROUNDED: f64 = 0.1 * 1.1e-16;
 const SHORTEST: f64 = 1e-7;
 
 /// The flow, on the way.
-pub struct Tangent {
+pub struct TangentFlow {
     /// The mechanism with the contacts held at the moment, and its unknowns.
     mechanism: Arc<Mechanism>,
     problem: Box<dyn Problem>,
     coordinates: Coordinates,
     weights: Vec<f64>,
-    series: Vec<(usize, Box<dyn Beside>)>,
-    gauss: Gauss,
+    series: Vec<(usize, Box<dyn ColumnsBeside>)>,
+    gauss: TangentGauss,
     ground: Option<Ground>,
     /// The parameters that events set, and what those do in which neighbours differ.
     set: Vec<usize>,
-    parameters: Vec<Parameter>,
+    parameters: Vec<ParameterPowers>,
     /// The columns the series are of.
     seeds: Vec<Vec<f64>>,
     rates: Vec<f64>,
@@ -121,7 +121,7 @@ pub(super) struct Path {
     lost: Option<String>,
 }
 
-impl Tangent {
+impl TangentFlow {
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -148,7 +148,7 @@ impl Tangent {
         self.path.lost.as_deref()
     }
 
-    /// Takes the motion at [`Tangent::next`], to which `steps` steps in doubles have led so far (none where
+    /// Takes the motion at [`TangentFlow::next`], to which `steps` steps in doubles have led so far (none where
     /// their rounding does not count).
     pub fn take(&mut self, motion: &Motion, steps: u64) {
         if self.path.is_plain && !self.take_node(motion) {
@@ -168,7 +168,7 @@ impl Tangent {
         }
     }
 
-    /// To [`Tangent::next`] along the motion of its own series.
+    /// To [`TangentFlow::next`] along the motion of its own series.
     pub(super) fn go_alone(&mut self) {
         self.advance(Time::from(self.next()), None, 0.0);
     }
@@ -265,7 +265,7 @@ impl Tangent {
                 }
             }
         }
-        let push = Push::at(parameters, path, 2 * f);
+        let push = ParameterEffects::at(parameters, path, 2 * f);
         let mut first = 0;
         let (mut reach, mut is_near, mut rest) = (LONGEST / path.rate, false, &seeds[..]);
         for (count, series) in &mut self.series {

@@ -1,6 +1,6 @@
 //! Formulas of time and state, which are kept as texts, and what they speak of.
 
-use super::{Cursor, Decimal, Reader, Watched, shortest};
+use super::{Decimal, Reader, TreeCursor, Watcher, shortest};
 use crate::scene::error::SceneError;
 use crate::scene::formula::{Formula, Interpolant, Numbers};
 use crate::scene::locate::Value;
@@ -19,8 +19,8 @@ fn list<C>(load: &Load<C>) -> &'static str {
 
 impl<'a, C: Decimal> Reader<'a, C> {
     /// The items of a list whose numbers are constant.
-    pub(super) fn plain_items(&self, of: &str) -> Vec<Cursor<'a>> {
-        let is_law = |at: &Cursor| {
+    pub(super) fn plain_items(&self, of: &str) -> Vec<TreeCursor<'a>> {
+        let is_law = |at: &TreeCursor| {
             let mut laws = self.plain.laws.iter().filter(|law| list(&law.load) == of);
             laws.any(|law| crate::scene::set::name(at.node) == Some(&law.name))
         };
@@ -48,7 +48,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     /// Named points.
     pub(super) fn points(&self, plain: &Scene) -> Result<Vec<NamedPoint<C>>, SceneError> {
         let items = self.root.items("points");
-        let point = |(at, plain): (&Cursor, &NamedPoint)| {
+        let point = |(at, plain): (&TreeCursor, &NamedPoint)| {
             Ok(NamedPoint { name: plain.name.clone(), place: self.place(at, &plain.place)? })
         };
         items.iter().zip(&plain.points).map(point).collect()
@@ -107,12 +107,12 @@ impl<'a, C: Decimal> Reader<'a, C> {
         plain.couplings.iter().map(coupling).collect()
     }
 
-    pub(super) fn formula(&self, at: &Cursor, key: &str, plain: &str) -> Result<String, SceneError> {
+    pub(super) fn formula(&self, at: &TreeCursor, key: &str, plain: &str) -> Result<String, SceneError> {
         at.child(key).map_or_else(|| Ok(plain.to_owned()), |at| self.formula_at(&at, plain))
     }
 
     /// The text of a formula; a number by all its digits.
-    fn formula_at(&self, at: &Cursor, plain: &str) -> Result<String, SceneError> {
+    fn formula_at(&self, at: &TreeCursor, plain: &str) -> Result<String, SceneError> {
         if self.known_at(at.node).is_some() {
             return Err(self.refuse_part(at, "it stands where a formula may"));
         }
@@ -125,10 +125,10 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     /// Events, where they are those of this run.
     pub(super) fn events(&self, plain: &Scene) -> Result<Vec<SceneEvent>, SceneError> {
-        if self.watched == Watched::Beside {
+        if self.watched == Watcher::Beside {
             return Ok(Vec::new());
         }
-        let event = |(at, event): (&Cursor, &SceneEvent)| {
+        let event = |(at, event): (&TreeCursor, &SceneEvent)| {
             let when = at.child("when").unwrap_or_else(|| at.clone());
             self.read(&when, &event.when)?;
             let values = at.child("set");
@@ -143,14 +143,14 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     /// A formula, without corners and tables where nobody watches for them.
-    fn read(&self, at: &Cursor, text: &str) -> Result<Formula, SceneError> {
+    fn read(&self, at: &TreeCursor, text: &str) -> Result<Formula, SceneError> {
         let tables = &self.plain.tables;
         let tables: Vec<_> =
             tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
         let formula = Formula::parse_with(text, &tables).map_err(|error| {
             self.refuse(at, &format!("is no formula: {}", error.problem), "give a formula")
         })?;
-        if formula.conditions() > 0 && self.watched == Watched::Beside {
+        if formula.conditions() > 0 && self.watched == Watcher::Beside {
             let why = "its formula has corners or tables, across whose pieces there is no series";
             return Err(self.refuse_part(at, why));
         }
@@ -172,7 +172,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
     }
 
     /// A law of time.
-    pub(super) fn profile(&self, at: &Cursor, text: &str) -> Result<Profile<C>, SceneError> {
+    pub(super) fn profile(&self, at: &TreeCursor, text: &str) -> Result<Profile<C>, SceneError> {
         let formula = self.read(at, text)?;
         let value = |name: &str| {
             let known = self.parameters.iter().find(|known| known.0 == name);

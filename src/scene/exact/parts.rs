@@ -1,6 +1,6 @@
 //! The parts of a scene, number by number.
 
-use super::{Cursor, Decimal, Reader};
+use super::{Decimal, Reader, TreeCursor};
 use crate::scene::error::SceneError;
 use crate::scene::locate::Value;
 use crate::scene::{
@@ -9,11 +9,11 @@ use crate::scene::{
 };
 
 impl<'a, C: Decimal> Reader<'a, C> {
-    pub(super) fn place(&self, at: &Cursor, plain: &Place) -> Result<Place<C>, SceneError> {
+    pub(super) fn place(&self, at: &TreeCursor, plain: &Place) -> Result<Place<C>, SceneError> {
         Ok(Place { bar: plain.bar, point: self.pair(at, "point", plain.point)? })
     }
 
-    pub(super) fn between(&self, at: &Cursor, plain: &[Place; 2]) -> Result<[Place<C>; 2], SceneError> {
+    pub(super) fn between(&self, at: &TreeCursor, plain: &[Place; 2]) -> Result<[Place<C>; 2], SceneError> {
         let items = at.items("between");
         match &items[..] {
             [a, b] => Ok([self.place(a, &plain[0])?, self.place(b, &plain[1])?]),
@@ -21,7 +21,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         }
     }
 
-    fn law(&self, at: &Cursor, plain: &Law) -> Result<Law<C>, SceneError> {
+    fn law(&self, at: &TreeCursor, plain: &Law) -> Result<Law<C>, SceneError> {
         let Some(law) = at.child("law") else { return Ok(Law::default()) };
         if let Value::Text(text) = &law.node.value {
             return Ok(Law { profile: Some(self.profile(&law, text)?), ..Law::default() });
@@ -48,13 +48,13 @@ impl<'a, C: Decimal> Reader<'a, C> {
         &self,
         list: &str,
         plain: &[P],
-        mut part: impl FnMut(&Cursor<'a>, &P) -> Result<E, SceneError>,
+        mut part: impl FnMut(&TreeCursor<'a>, &P) -> Result<E, SceneError>,
     ) -> Result<Vec<E>, SceneError> {
         self.plain_items(list).iter().zip(plain).map(|(at, plain)| part(at, plain)).collect()
     }
 
     /// The motor of a name: on an angle, on a slider or a gear, which stand in one list.
-    pub(super) fn motor(&self, name: &str) -> Result<Cursor<'a>, SceneError> {
+    pub(super) fn motor(&self, name: &str) -> Result<TreeCursor<'a>, SceneError> {
         let found =
             self.root.items("motors").into_iter().find(|at| crate::scene::set::name(at.node) == Some(name));
         found.ok_or_else(|| {
@@ -62,7 +62,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         })
     }
 
-    fn bar(&self, at: &Cursor, plain: &Bar) -> Result<Bar<C>, SceneError> {
+    fn bar(&self, at: &TreeCursor, plain: &Bar) -> Result<Bar<C>, SceneError> {
         let name = plain.name.clone();
         if at.child("mass").is_some() {
             return Ok(Bar {
@@ -120,7 +120,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     pub(super) fn scene(&self, plain: &Scene) -> Result<Scene<C>, SceneError> {
         let bars = 0..plain.own_bars();
-        let slider = |at: &Cursor, plain: &Slider| {
+        let slider = |at: &TreeCursor, plain: &Slider| {
             let missing = || self.refuse(at, "has no rail", "compare with the scene's text");
             let rail = at.child("rail").ok_or_else(missing)?;
             let point = at.child("point").ok_or_else(missing)?;
@@ -142,7 +142,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
             Ok(Drive { name: plain.name.clone(), slider: plain.slider, law })
         };
-        let wall = |at: &Cursor, plain: &Wall| {
+        let wall = |at: &TreeCursor, plain: &Wall| {
             let line = at.child("line").unwrap_or_else(|| at.clone());
             Ok(Wall {
                 name: plain.name.clone(),
@@ -216,7 +216,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         Ok(scene.with_rotors())
     }
 
-    fn spring(&self, at: &Cursor, spring: &Spring) -> Result<Spring<C>, SceneError> {
+    fn spring(&self, at: &TreeCursor, spring: &Spring) -> Result<Spring<C>, SceneError> {
         Ok(Spring {
             name: spring.name.clone(),
             between: self.between(at, &spring.between)?,
@@ -255,7 +255,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         Ok(Friction { at: place, kinetic, stiction })
     }
 
-    fn force(&self, at: &Cursor, force: &Force) -> Result<Force<C>, SceneError> {
+    fn force(&self, at: &TreeCursor, force: &Force) -> Result<Force<C>, SceneError> {
         Ok(Force {
             name: force.name.clone(),
             bar: force.bar,

@@ -72,7 +72,7 @@ impl Scene {
 /// How the bars hang on the ground.
 struct Hanging {
     /// The bars that hang there, each after the one it hangs on, by the fewest hinges and welds.
-    order: Vec<Hang>,
+    order: Vec<HungBar>,
     /// The bodies that hang there, the ground first.
     hung: Vec<bool>,
     /// True where a hinge or a weld closes a loop.
@@ -80,7 +80,7 @@ struct Hanging {
 }
 
 /// How one bar hangs.
-struct Hang {
+struct HungBar {
     bar: usize,
     /// The body it hangs on and the point there.
     from: Place,
@@ -107,7 +107,7 @@ impl Hanging {
             at_body[a].push(number);
             at_body[b].push(number);
         }
-        let mut order: Vec<Hang> = Vec::with_capacity(bars);
+        let mut order: Vec<HungBar> = Vec::with_capacity(bars);
         let mut hung = vec![false; bars + 1];
         hung[0] = true;
         let mut reached = vec![None];
@@ -121,7 +121,7 @@ impl Hanging {
                 if !hung[body(to.bar)] {
                     hung[body(to.bar)] = true;
                     reached.push(to.bar);
-                    order.push(Hang { bar, from, own: to.point });
+                    order.push(HungBar { bar, from, own: to.point });
                 }
             }
         }

@@ -1,24 +1,24 @@
 //! Where everything is at the start, where that can be told from angles alone, and what must not begin there.
 
-use super::{Hang, Hanging, SAME};
+use super::{Hanging, HungBar, SAME};
 use crate::scene::error::SceneError;
 use crate::scene::format::about;
 use crate::scene::read::At;
 use crate::scene::{Place, Scene, Spring, Start, Wall};
 
 /// Where everything is at t = 0.
-pub(super) struct Posture {
+pub(super) struct BarPositions {
     /// Origin \[m\], cos and sin of the angle, and the sum of the lengths that lead there \[m\], of each bar.
     bars: Vec<([f64; 2], [f64; 2], f64)>,
 }
 
 impl Hanging {
     /// Where everything is at `start`.
-    pub fn posture(&self, start: &[Start]) -> Posture {
+    pub fn posture(&self, start: &[Start]) -> BarPositions {
         let bars =
             start.iter().map(|start| ([0.0; 2], [libm::cos(start.phi), libm::sin(start.phi)], 0.0)).collect();
-        let mut posture = Posture { bars };
-        for Hang { bar, from, own } in &self.order {
+        let mut posture = BarPositions { bars };
+        for HungBar { bar, from, own } in &self.order {
             let (hinge, way) = posture.at(*from);
             let [c, s] = posture.bars[*bar].1;
             let origin = [hinge[0] - (c * own[0] - s * own[1]), hinge[1] - (s * own[0] + c * own[1])];
@@ -28,7 +28,7 @@ impl Hanging {
     }
 }
 
-impl Posture {
+impl BarPositions {
     /// Position \[m\] of a place, and the sum of the lengths that lead there \[m\], which scales its rounding
     /// error.
     fn at(&self, place: Place) -> ([f64; 2], f64) {
@@ -41,7 +41,7 @@ impl Posture {
 }
 
 /// Refuses a spring without a direction.
-pub(super) fn springs(posture: &Posture, springs: &[Spring], places: &[At]) -> Result<(), SceneError> {
+pub(super) fn springs(posture: &BarPositions, springs: &[Spring], places: &[At]) -> Result<(), SceneError> {
     for (Spring { name, between: [a, b], free_length, .. }, at) in springs.iter().zip(places) {
         let ((from, way_from), (to, way_to)) = (posture.at(*a), posture.at(*b));
         let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
@@ -57,7 +57,7 @@ pub(super) fn springs(posture: &Posture, springs: &[Spring], places: &[At]) -> R
 }
 
 /// Refuses a wall whose point starts behind it.
-pub(super) fn walls(posture: &Posture, scene: &Scene, places: &[At]) -> Result<(), SceneError> {
+pub(super) fn walls(posture: &BarPositions, scene: &Scene, places: &[At]) -> Result<(), SceneError> {
     for (wall, at) in scene.walls.iter().zip(places) {
         let Wall { name, bar, point, on, through, normal, law, aim, .. } = wall;
         // What a formula of places comes to is known when the scene is compiled.

@@ -6,7 +6,7 @@ mod tables;
 pub(super) use tables::*;
 
 /// An object with a fixed set of keys.
-pub(super) struct Table {
+pub(super) struct KeyTable {
     /// What it describes, with its article.
     pub title: &'static str,
     /// One sentence more, for the schema and the hint at an unknown key.
@@ -22,7 +22,7 @@ pub(super) struct Field {
     /// What it means.
     pub about: &'static str,
     /// What it may hold.
-    pub shape: Shape,
+    pub shape: FieldShape,
     /// True where it must be there; else `about` says what its absence means.
     pub required: bool,
     /// A value, as JSON.
@@ -30,17 +30,17 @@ pub(super) struct Field {
 }
 
 /// What a field may hold.
-pub(super) enum Shape {
+pub(super) enum FieldShape {
     /// A number.
-    Number(Quantity),
+    Number(QuantityRange),
     /// Two numbers, x and y.
-    Pair(Quantity),
+    Pair(QuantityRange),
     /// A number, or a formula of time and state.
-    LawNumber(Quantity),
+    LawNumber(QuantityRange),
     /// Two of them, x and y.
-    LawPair(Quantity),
+    LawPair(QuantityRange),
     /// A formula of time and state.
-    Formula(Quantity),
+    Formula(QuantityRange),
     /// Numbers by name, or formulas of one another.
     Parameters,
     /// Formulas of time and state by name.
@@ -64,22 +64,22 @@ pub(super) enum Shape {
     /// One of these words.
     Word(&'static [&'static str]),
     /// `full`, `slender` or a number.
-    Inertia(Quantity),
+    Inertia(QuantityRange),
     /// The places of a hinge, a weld or a spring.
     Between,
     /// An object.
-    Object(&'static Table),
+    Object(&'static KeyTable),
     /// An object, or a formula of time that comes to this unit.
-    Law(&'static Table, Quantity),
+    Law(&'static KeyTable, QuantityRange),
     /// So many objects, each of one of these kinds.
-    List { of: &'static [&'static Table], least: usize, most: usize },
+    List { of: &'static [&'static KeyTable], least: usize, most: usize },
     /// One object of this kind for each bar name.
-    ByBar(&'static Table),
+    ByBar(&'static KeyTable),
 }
 
 /// A range of numbers and its unit.
 #[derive(Clone, Copy)]
-pub(super) struct Quantity {
+pub(super) struct QuantityRange {
     pub least: f64,
     pub most: f64,
     /// Empty for a pure number.
@@ -104,40 +104,51 @@ pub(super) const LONGEST_FILE: u64 = 16 << 20;
 /// The reserved name of what does not move.
 pub(super) const GROUND: &str = "ground";
 
-const fn positive(unit: &'static str) -> Quantity {
-    Quantity { least: TINY, most: HUGE, unit }
+const fn positive(unit: &'static str) -> QuantityRange {
+    QuantityRange { least: TINY, most: HUGE, unit }
 }
 
-const fn not_negative(unit: &'static str) -> Quantity {
-    Quantity { least: 0.0, most: HUGE, unit }
+const fn not_negative(unit: &'static str) -> QuantityRange {
+    QuantityRange { least: 0.0, most: HUGE, unit }
 }
 
-const fn signed(unit: &'static str) -> Quantity {
-    Quantity { least: -HUGE, most: HUGE, unit }
+const fn signed(unit: &'static str) -> QuantityRange {
+    QuantityRange { least: -HUGE, most: HUGE, unit }
 }
 
 /// An absolute angle \[rad\].
-pub(super) const ANGLE: Quantity = Quantity { least: -WIDEST_ANGLE, most: WIDEST_ANGLE, unit: "rad" };
+pub(super) const ANGLE: QuantityRange =
+    QuantityRange { least: -WIDEST_ANGLE, most: WIDEST_ANGLE, unit: "rad" };
 /// A rate \[rad/s\].
-pub(super) const RATE: Quantity = signed("rad/s");
+pub(super) const RATE: QuantityRange = signed("rad/s");
 /// A mass \[kg\].
-pub(super) const MASS: Quantity = positive("kg");
+pub(super) const MASS: QuantityRange = positive("kg");
 /// A moment of inertia \[kg·m²\].
-pub(super) const INERTIA: Quantity = not_negative("kg·m²");
+pub(super) const INERTIA: QuantityRange = not_negative("kg·m²");
 
-const fn required(name: &'static str, shape: Shape, example: &'static str, about: &'static str) -> Field {
+const fn required(
+    name: &'static str,
+    shape: FieldShape,
+    example: &'static str,
+    about: &'static str,
+) -> Field {
     Field { name, about, shape, required: true, example }
 }
 
-const fn optional(name: &'static str, shape: Shape, example: &'static str, about: &'static str) -> Field {
+const fn optional(
+    name: &'static str,
+    shape: FieldShape,
+    example: &'static str,
+    about: &'static str,
+) -> Field {
     Field { name, about, shape, required: false, example }
 }
 
 /// Of the kinds of a list the one that an object with these keys is of: the last that has one of them as a
 /// key of its own that it must have, else the first.
-pub(super) fn kind(of: &[&'static Table], has: impl Fn(&str) -> bool) -> Option<&'static Table> {
+pub(super) fn kind(of: &[&'static KeyTable], has: impl Fn(&str) -> bool) -> Option<&'static KeyTable> {
     let [first, others @ ..] = of else { return None };
-    let own = |table: &Table| {
+    let own = |table: &KeyTable| {
         table
             .fields
             .iter()
@@ -146,7 +157,7 @@ pub(super) fn kind(of: &[&'static Table], has: impl Fn(&str) -> bool) -> Option<
     Some(others.iter().rfind(|table| own(table)).unwrap_or(first))
 }
 
-impl Table {
+impl KeyTable {
     /// The field of that name.
     pub fn field(&self, name: &str) -> Option<&'static Field> {
         self.fields.iter().find(|field| field.name == name)
@@ -165,7 +176,7 @@ impl Field {
     }
 }
 
-impl Shape {
+impl FieldShape {
     /// What is allowed, as it follows "must".
     pub fn allowed(&self) -> String {
         match self {
@@ -213,14 +224,14 @@ impl Shape {
     }
 }
 
-impl std::fmt::Display for Quantity {
+impl std::fmt::Display for QuantityRange {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "from {} to {}", plain(self.least), plain(self.most))?;
         if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
     }
 }
 
-impl Quantity {
+impl QuantityRange {
     /// True where `number` is inside the range; infinities and NaN are not.
     pub fn holds(&self, number: f64) -> bool {
         (self.least..=self.most).contains(&number)

@@ -9,27 +9,37 @@ pub(in crate::scene) use self::laws::*;
 pub(in crate::scene) use self::loads::*;
 
 use super::{
-    ANGLE, Field, INERTIA, MASS, MOST_BARS, Quantity, RATE, Shape, Table, not_negative, optional, positive,
-    required, signed,
+    ANGLE, Field, FieldShape, INERTIA, KeyTable, MASS, MOST_BARS, QuantityRange, RATE, not_negative,
+    optional, positive, required, signed,
 };
 
 /// The whole scene.
-pub(in crate::scene) static SCENE: Table = Table {
+pub(in crate::scene) static SCENE: KeyTable = KeyTable {
     title: "a scene",
     about: "A planar mechanism of bars, joints, springs, forces, motors and walls, in SI units; angles are \
         absolute, from +x, counter-clockwise.",
     fields: &[
         required(
             "name",
-            Shape::FolderName,
+            FieldShape::FolderName,
             "\"free\"",
             "Name of the scene, and of the folder its results go to.",
         ),
-        optional("description", Shape::Text, "\"Two bars fall.\"", "One sentence for reports and charts."),
-        required("gravity", Shape::Pair(signed("m/s²")), "[9.81, 0]", "Gravitational acceleration (x, y)."),
+        optional(
+            "description",
+            FieldShape::Text,
+            "\"Two bars fall.\"",
+            "One sentence for reports and charts.",
+        ),
+        required(
+            "gravity",
+            FieldShape::Pair(signed("m/s²")),
+            "[9.81, 0]",
+            "Gravitational acceleration (x, y).",
+        ),
         required(
             "bars",
-            Shape::List { of: &[&UNIFORM_BAR, &OUTRIGHT_BAR], least: 1, most: MOST_BARS },
+            FieldShape::List { of: &[&UNIFORM_BAR, &OUTRIGHT_BAR], least: 1, most: MOST_BARS },
             "[…]",
             "The bodies.",
         ),
@@ -49,7 +59,7 @@ pub(in crate::scene) static SCENE: Table = Table {
         optional("locks", any_number_of(&[&LOCK]), "[…]", "Angles that stay as they are; none if absent."),
         optional(
             "parameters",
-            Shape::Parameters,
+            FieldShape::Parameters,
             "{\"l\": 0.6, \"half\": \"l/2\"}",
             "Numbers by name, for formulas in the place of any number of the scene; none if absent.",
         ),
@@ -61,7 +71,7 @@ pub(in crate::scene) static SCENE: Table = Table {
         ),
         optional(
             "tables",
-            Shape::Tables,
+            FieldShape::Tables,
             "{\"gust\": [[0, 0], [1, 2.5], [3, 0]]}",
             "Functions by name, smooth through points (x, y), for formulas as gust(t): the points, a CSV \
                 file of two columns as \"gust.csv\", or two of its columns as \
@@ -69,13 +79,13 @@ pub(in crate::scene) static SCENE: Table = Table {
         ),
         optional(
             "signals",
-            Shape::Signals,
+            FieldShape::Signals,
             "{\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}",
             "Formulas of time and state by name, each may use those before it; none if absent.",
         ),
         optional(
             "integrals",
-            Shape::Signals,
+            FieldShape::Signals,
             "{\"sum\": \"aim - bar1.phi\"}",
             "Integrals of formulas over time by name, from 0 on, for other formulas, as those of \
                 controllers; none if absent.",
@@ -115,46 +125,46 @@ pub(in crate::scene) static SCENE: Table = Table {
         ),
         optional(
             "outputs",
-            Shape::Outputs,
+            FieldShape::Outputs,
             "{\"bearing\": \"A.force\", \"pen\": \"tip.x\"}",
             "Columns of the trajectory beside those of every run, as formulas of the state and of what parts \
                 carry, by name; or a list of formulas, which then are their own names; none if absent.",
         ),
         optional(
             "inactive",
-            Shape::Names,
+            FieldShape::Names,
             "[\"latch\"]",
             "Springs, torsion springs, forces, torques and potentials that do not act until an event \
                 switches them on; none if absent.",
         ),
         optional(
             "start",
-            Shape::ByBar(&START),
+            FieldShape::ByBar(&START),
             "{\"bar1\": {\"phi\": 0, \"omega\": 0}}",
             "What is known of each bar at t = 0, by bar name.  In a tree of hinges on the ground a bar that \
                 no motor drives must have its angle and rate; \
              where loops, sliders, welds or free bars are, the rest is found from what is given.",
         ),
-        required("until", Shape::Number(positive("s")), "10", "Horizon: the run ends at this time."),
-        required("every", Shape::Number(positive("s")), "0.01", "Output interval, at most the horizon."),
+        required("until", FieldShape::Number(positive("s")), "10", "Horizon: the run ends at this time."),
+        required("every", FieldShape::Number(positive("s")), "0.01", "Output interval, at most the horizon."),
     ],
 };
 
 /// A bar by its shape.
-pub(in crate::scene) static UNIFORM_BAR: Table = Table {
+pub(in crate::scene) static UNIFORM_BAR: KeyTable = KeyTable {
     title: "a uniform bar",
     about: "A bar is given either by length, width, thickness and density or by mass, centre and inertia; \
         its frame has the origin at one \
             end and x along the bar.",
     fields: &[
-        required("name", Shape::Name, "\"bar1\"", BAR_NAME),
-        required("length", Shape::Number(positive("m")), "0.6", "Length."),
-        required("width", Shape::Number(positive("m")), "0.05", "Width in the plane."),
-        required("thickness", Shape::Number(positive("m")), "0.003", "Thickness across the plane."),
-        required("density", Shape::Number(positive("kg/m³")), "670", "Density."),
+        required("name", FieldShape::Name, "\"bar1\"", BAR_NAME),
+        required("length", FieldShape::Number(positive("m")), "0.6", "Length."),
+        required("width", FieldShape::Number(positive("m")), "0.05", "Width in the plane."),
+        required("thickness", FieldShape::Number(positive("m")), "0.003", "Thickness across the plane."),
+        required("density", FieldShape::Number(positive("kg/m³")), "670", "Density."),
         optional(
             "inertia",
-            Shape::Inertia(INERTIA),
+            FieldShape::Inertia(INERTIA),
             "\"full\"",
             "Inertia about the centre: \"full\" m(l² + w²)/12, \"slender\" m l²/12, or a number; \"full\" if \
                 absent.",
@@ -163,22 +173,22 @@ pub(in crate::scene) static UNIFORM_BAR: Table = Table {
 };
 
 /// A body by its mass distribution.
-pub(in crate::scene) static OUTRIGHT_BAR: Table = Table {
+pub(in crate::scene) static OUTRIGHT_BAR: KeyTable = KeyTable {
     title: "a bar given by its mass",
     about: UNIFORM_BAR.about,
     fields: &[
-        required("name", Shape::Name, "\"bar1\"", BAR_NAME),
-        required("mass", Shape::Number(MASS), "0.0603", "Mass."),
-        required("centre", Shape::Pair(signed("m")), "[0.3, 0]", "Centre of mass in the body's frame."),
+        required("name", FieldShape::Name, "\"bar1\"", BAR_NAME),
+        required("mass", FieldShape::Number(MASS), "0.0603", "Mass."),
+        required("centre", FieldShape::Pair(signed("m")), "[0.3, 0]", "Centre of mass in the body's frame."),
         required(
             "inertia",
-            Shape::Number(INERTIA),
+            FieldShape::Number(INERTIA),
             "0.0018",
             "Moment of inertia about the centre of mass; 0 for a point mass.",
         ),
         optional(
             "length",
-            Shape::Number(not_negative("m")),
+            FieldShape::Number(not_negative("m")),
             "0.6",
             "Length in drawings; if absent, twice the distance of the centre, or twice the radius of \
                 gyration where that is zero.",
@@ -186,8 +196,8 @@ pub(in crate::scene) static OUTRIGHT_BAR: Table = Table {
     ],
 };
 
-const fn any_number_of(of: &'static [&'static Table]) -> Shape {
-    Shape::List { of, least: 0, most: usize::MAX }
+const fn any_number_of(of: &'static [&'static KeyTable]) -> FieldShape {
+    FieldShape::List { of, least: 0, most: usize::MAX }
 }
 
 const BAR_NAME: &str = "Name, unique among bars; not \"ground\".";
@@ -197,14 +207,14 @@ const PLACES: &str = "[{\"body\": \"ground\", \"point\": [0, 0]}, {\"body\": \"b
 const MEASURED_FROM: &str = "The bar its angle is measured from; the ground (+x) if absent.";
 
 /// A place.
-pub(in crate::scene) static PLACE: Table = Table {
+pub(in crate::scene) static PLACE: KeyTable = KeyTable {
     title: "a place",
     about: "A point of a bar or of the ground.",
     fields: &[
-        required("body", Shape::Body { ground: true }, "\"bar1\"", "Name of a bar, or \"ground\"."),
+        required("body", FieldShape::Body { ground: true }, "\"bar1\"", "Name of a bar, or \"ground\"."),
         required(
             "point",
-            Shape::Pair(signed("m")),
+            FieldShape::Pair(signed("m")),
             "[0.6, 0]",
             "Coordinates in the bar's frame, or in the world's for the ground.",
         ),
@@ -212,15 +222,15 @@ pub(in crate::scene) static PLACE: Table = Table {
 };
 
 /// A point with a name.
-pub(in crate::scene) static NAMED_POINT: Table = Table {
+pub(in crate::scene) static NAMED_POINT: KeyTable = KeyTable {
     title: "a point with a name",
     about: "A point of a bar or of the ground that formulas can speak of.",
     fields: &[
-        required("name", Shape::Name, "\"tip\"", "Name, unique among points."),
-        required("body", Shape::Body { ground: true }, "\"bar1\"", "Name of a bar, or \"ground\"."),
+        required("name", FieldShape::Name, "\"tip\"", "Name, unique among points."),
+        required("body", FieldShape::Body { ground: true }, "\"bar1\"", "Name of a bar, or \"ground\"."),
         required(
             "point",
-            Shape::Pair(signed("m")),
+            FieldShape::Pair(signed("m")),
             "[0.6, 0]",
             "Coordinates in the bar's frame, or in the world's for the ground.",
         ),
@@ -228,41 +238,41 @@ pub(in crate::scene) static NAMED_POINT: Table = Table {
 };
 
 /// An event.
-pub(in crate::scene) static EVENT: Table = Table {
+pub(in crate::scene) static EVENT: KeyTable = KeyTable {
     title: "an event",
     about: "Where a formula of time and state passes zero; it is recorded, and may end the run or switch \
         parts.",
     fields: &[
-        required("name", Shape::Name, "\"upright\"", "Name, unique among events."),
+        required("name", FieldShape::Name, "\"upright\"", "Name, unique among events."),
         required(
             "when",
-            Shape::Formula(signed("")),
+            FieldShape::Formula(signed("")),
             "\"bar1.sin\"",
             "The event function: its zeros are the event.",
         ),
         optional(
             "direction",
-            Shape::Word(&["either", "rising", "falling"]),
+            FieldShape::Word(&["either", "rising", "falling"]),
             "\"rising\"",
             "Which zeros count: \"rising\" from negative to positive, \"falling\" the others; \"either\" if \
                 absent.",
         ),
         optional(
             "action",
-            Shape::Word(&["record", "stop"]),
+            FieldShape::Word(&["record", "stop"]),
             "\"stop\"",
             "\"stop\" ends the run there, and the event switches and sets nothing; \"record\" if absent.",
         ),
-        optional("on", Shape::Names, "[\"latch\"]", "Parts that act from then on; none if absent."),
+        optional("on", FieldShape::Names, "[\"latch\"]", "Parts that act from then on; none if absent."),
         optional(
             "off",
-            Shape::Names,
+            FieldShape::Names,
             "[\"motor_torque\"]",
             "Parts that act no longer from then on; none if absent.",
         ),
         optional(
             "set",
-            Shape::Signals,
+            FieldShape::Signals,
             "{\"gain\": \"2*gain\"}",
             "Parameters that have another value in formulas of time and state from then on; none if absent.",
         ),
@@ -270,14 +280,14 @@ pub(in crate::scene) static EVENT: Table = Table {
 };
 
 /// The start of a bar.
-pub(in crate::scene) static START: Table = Table {
+pub(in crate::scene) static START: KeyTable = KeyTable {
     title: "a start",
     about: "What is known of a bar at t = 0; its origin and velocity only where no hinge or weld ties it, or \
         the bars it hangs together with, to the ground.",
     fields: &[
-        optional("phi", Shape::Number(ANGLE), "0", "Absolute angle; may be many turns."),
-        optional("omega", Shape::Number(RATE), "0", "Rate."),
-        optional("origin", Shape::Pair(signed("m")), "[0, 0]", "Position of the bar's origin."),
-        optional("velocity", Shape::Pair(signed("m/s")), "[0, 0]", "Velocity of the bar's origin."),
+        optional("phi", FieldShape::Number(ANGLE), "0", "Absolute angle; may be many turns."),
+        optional("omega", FieldShape::Number(RATE), "0", "Rate."),
+        optional("origin", FieldShape::Pair(signed("m")), "[0, 0]", "Position of the bar's origin."),
+        optional("velocity", FieldShape::Pair(signed("m/s")), "[0, 0]", "Velocity of the bar's origin."),
     ],
 };

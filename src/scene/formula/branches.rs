@@ -108,9 +108,9 @@ impl Branches<f64> for Noted {
 }
 
 /// Those whose bits are set.
-pub(super) struct Given<'a>(pub &'a [bool]);
+pub(super) struct GivenBranches<'a>(pub &'a [bool]);
 
-impl<S> Branches<S> for Given<'_> {
+impl<S> Branches<S> for GivenBranches<'_> {
     fn is_positive(&mut self, condition: usize, _: S) -> bool {
         self.0.get(condition).copied().unwrap_or(false)
     }
@@ -121,12 +121,12 @@ impl<S> Branches<S> for Given<'_> {
 }
 
 /// Those whose bits are set; the values of all conditions are noted.
-pub(super) struct Watched<'a, S> {
-    pub given: Given<'a>,
+pub(super) struct WatchedBranches<'a, S> {
+    pub given: GivenBranches<'a>,
     pub values: &'a mut [S],
 }
 
-impl<S: Scalar> Branches<S> for Watched<'_, S> {
+impl<S: Scalar> Branches<S> for WatchedBranches<'_, S> {
     fn is_positive(&mut self, condition: usize, value: S) -> bool {
         self.values[condition] = value;
         self.given.is_positive(condition, value)

@@ -16,7 +16,7 @@ mod table;
 pub mod unit;
 mod wave;
 
-use branches::{Branches, BySign, Given, Noted, Watched};
+use branches::{Branches, BySign, GivenBranches, Noted, WatchedBranches};
 pub use error::FormulaError;
 pub(crate) use error::meant;
 pub(crate) use exact::Numbers;
@@ -191,7 +191,7 @@ impl Formula {
 
     /// Its value over any scalar, on the branches where the conditions whose bits are set are positive.
     pub fn evaluate<S: Scalar>(&self, values: &[S], bits: &[bool]) -> S {
-        self.run(values, &mut Given(bits))
+        self.run(values, &mut GivenBranches(bits))
     }
 
     /// The same where `number` gives its numbers as such scalars.
@@ -201,7 +201,7 @@ impl Formula {
         bits: &[bool],
         number: impl Fn(Origin) -> S,
     ) -> S {
-        self.run_over(values, &|origin, _| number(origin), &mut Given(bits))
+        self.run_over(values, &|origin, _| number(origin), &mut GivenBranches(bits))
     }
 
     /// Its value over a scalar with an order, with the numbers of its text exactly as written.
@@ -235,7 +235,11 @@ impl Formula {
         }
         let begin = all.len();
         all.resize(begin + self.conditions.len(), S::ZERO);
-        self.run_over(values, number, &mut Watched { given: Given(bits), values: &mut all[begin..] });
+        self.run_over(
+            values,
+            number,
+            &mut WatchedBranches { given: GivenBranches(bits), values: &mut all[begin..] },
+        );
     }
 
     fn run<S: Scalar>(&self, values: &[S], branches: &mut impl Branches<S>) -> S {

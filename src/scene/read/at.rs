@@ -2,14 +2,14 @@
 //! where it is not.
 
 use crate::scene::error::SceneError;
-use crate::scene::format::{Field, LONGEST_NAME, LONGEST_TEXT, Quantity, Shape, Table, about};
-use crate::scene::locate::{Member, Node, Source, Span, Value, clipped, push_index, push_key};
+use crate::scene::format::{Field, FieldShape, KeyTable, LONGEST_NAME, LONGEST_TEXT, QuantityRange, about};
+use crate::scene::locate::{Located, Member, Span, Texts, Value, clipped, push_index, push_key};
 
 /// A value with its path.
 #[derive(Clone)]
 pub(in crate::scene) struct At<'a> {
-    pub source: &'a Source,
-    pub node: &'a Node,
+    pub source: &'a Texts,
+    pub node: &'a Located,
     pub path: String,
 }
 
@@ -75,14 +75,14 @@ impl<'a> At<'a> {
     }
 
     /// An element of this list.
-    pub fn item(&self, node: &'a Node, number: usize) -> At<'a> {
+    pub fn item(&self, node: &'a Located, number: usize) -> At<'a> {
         let mut path = self.path.clone();
         push_index(&mut path, number);
         At { source: self.source, node, path }
     }
 
     /// This value as an object that has all keys of `table` it must have, and no others.
-    pub fn object(&self, table: &'static Table) -> Result<Fields<'a>, SceneError> {
+    pub fn object(&self, table: &'static KeyTable) -> Result<Fields<'a>, SceneError> {
         let Value::Object(members) = &self.node.value else {
             let allowed = format!("must be an object, {}, with the keys {}", table.title, table.keys());
             if self.path.is_empty() {
@@ -112,11 +112,14 @@ impl<'a> At<'a> {
     }
 
     /// The elements of this list, which is the field `name` of `table`.
-    pub fn items(&self, name: &str, table: &'static Table) -> Result<Vec<At<'a>>, SceneError> {
+    pub fn items(&self, name: &str, table: &'static KeyTable) -> Result<Vec<At<'a>>, SceneError> {
         let shape = table.field(name).map(|field| &field.shape);
-        let (least, most) =
-            if let Some(Shape::List { least, most, .. }) = shape { (*least, *most) } else { (0, usize::MAX) };
-        let allowed = || shape.map_or(String::new(), Shape::allowed);
+        let (least, most) = if let Some(FieldShape::List { least, most, .. }) = shape {
+            (*least, *most)
+        } else {
+            (0, usize::MAX)
+        };
+        let allowed = || shape.map_or(String::new(), FieldShape::allowed);
         match &self.node.value {
             Value::List(nodes) if (least..=most).contains(&nodes.len()) => {
                 Ok(nodes.iter().enumerate().map(|(number, node)| self.item(node, number)).collect())
@@ -133,7 +136,7 @@ impl<'a> At<'a> {
         }
     }
 
-    fn number(&self, field: &Field, quantity: &Quantity) -> Result<f64, SceneError> {
+    fn number(&self, field: &Field, quantity: &QuantityRange) -> Result<f64, SceneError> {
         let allowed = || field.shape.allowed();
         match &self.node.value {
             Value::Number(number) if quantity.holds(*number) => Ok(*number),
@@ -150,12 +153,12 @@ impl<'a> At<'a> {
     }
 
     /// Refuses this object where what follows from it is out of range.
-    pub fn comes_to(&self, what: &str, number: f64, quantity: &Quantity) -> Result<(), SceneError> {
+    pub fn comes_to(&self, what: &str, number: f64, quantity: &QuantityRange) -> Result<(), SceneError> {
         if quantity.holds(number) {
             return Ok(());
         }
         let problem = format!("comes to {what} of {} {}", about(number), quantity.unit);
-        Err(self.refuse(&problem, &Shape::Number(*quantity).allowed(), "check the units: metres, kg/m³"))
+        Err(self.refuse(&problem, &FieldShape::Number(*quantity).allowed(), "check the units: metres, kg/m³"))
     }
 }
 
@@ -163,7 +166,7 @@ impl<'a> At<'a> {
 pub(in crate::scene) struct Fields<'a> {
     pub at: At<'a>,
     members: &'a [Member],
-    pub table: &'static Table,
+    pub table: &'static KeyTable,
 }
 
 impl<'a> Fields<'a> {
@@ -186,9 +189,11 @@ impl<'a> Fields<'a> {
     pub fn number(&self, name: &str) -> Result<f64, SceneError> {
         let at = self.required(name)?;
         match self.table.field(name) {
-            Some(field @ Field { shape: Shape::Number(quantity) | Shape::LawNumber(quantity), .. }) => {
-                at.number(field, quantity)
-            }
+            Some(
+                field @ Field {
+                    shape: FieldShape::Number(quantity) | FieldShape::LawNumber(quantity), ..
+                },
+            ) => at.number(field, quantity),
             _ => Err(at.refuse_value("must be a number the format knows", self.table.about)),
         }
     }
@@ -201,7 +206,11 @@ impl<'a> Fields<'a> {
         let at = self.required(name)?;
         match (self.table.field(name), &at.node.value) {
             (
-                Some(field @ Field { shape: Shape::Pair(quantity) | Shape::LawPair(quantity), .. }),
+                Some(
+                    field @ Field {
+                        shape: FieldShape::Pair(quantity) | FieldShape::LawPair(quantity), ..
+                    },
+                ),
                 Value::List(nodes),
             ) if nodes.len() == 2 => Ok([
                 at.item(&nodes[0], 0).coordinate(field, quantity)?,
@@ -236,7 +245,7 @@ impl<'a> Fields<'a> {
 
     /// One of a few words, by its number; the first where there is no such key.
     pub fn word_or_first(&self, name: &str) -> Result<usize, SceneError> {
-        let (Some(at), Some(Field { shape: shape @ Shape::Word(words), .. })) =
+        let (Some(at), Some(Field { shape: shape @ FieldShape::Word(words), .. })) =
             (self.optional(name), self.table.field(name))
         else {
             return Ok(0);
@@ -259,14 +268,14 @@ impl<'a> Fields<'a> {
             {
                 Ok(text.clone())
             }
-            _ => Err(at.refuse_value(&Shape::Text.allowed(), "one sentence is enough")),
+            _ => Err(at.refuse_value(&FieldShape::Text.allowed(), "one sentence is enough")),
         }
     }
 
     pub fn name(&self, name: &str) -> Result<String, SceneError> {
         let at = self.required(name)?;
-        let shape = self.table.field(name).map_or(&Shape::Name, |field| &field.shape);
-        let folder = matches!(shape, Shape::FolderName);
+        let shape = self.table.field(name).map_or(&FieldShape::Name, |field| &field.shape);
+        let folder = matches!(shape, FieldShape::FolderName);
         match &at.node.value {
             Value::Text(text) if is_name(text) && !(folder && text.starts_with('-')) => Ok(text.clone()),
             Value::Text(text) => {
@@ -290,10 +299,10 @@ impl<'a> Fields<'a> {
 
 impl At<'_> {
     /// One number of a pair.
-    fn coordinate(&self, field: &Field, quantity: &Quantity) -> Result<f64, SceneError> {
+    fn coordinate(&self, field: &Field, quantity: &QuantityRange) -> Result<f64, SceneError> {
         match self.node.value {
             Value::Number(number) if quantity.holds(number) => Ok(number),
-            _ => Err(self.refuse_value(&Shape::Number(*quantity).allowed(), &field.for_example())),
+            _ => Err(self.refuse_value(&FieldShape::Number(*quantity).allowed(), &field.for_example())),
         }
     }
 }

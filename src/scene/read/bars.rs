@@ -3,7 +3,7 @@
 use super::at::{Fields, nearest};
 use crate::scene::Bar;
 use crate::scene::error::SceneError;
-use crate::scene::format::{INERTIA, MASS, OUTRIGHT_BAR, Shape};
+use crate::scene::format::{FieldShape, INERTIA, MASS, OUTRIGHT_BAR};
 use crate::scene::locate::Value;
 
 /// A bar.
@@ -32,11 +32,11 @@ fn uniform_bar(fields: &Fields, name: String) -> Result<Bar, SceneError> {
                     Some(near) => format!("did you mean \"{near}\"?"),
                     None => "\"full\" is m(l² + w²)/12, \"slender\" is m l²/12".to_owned(),
                 };
-                return Err(at.refuse_value(&Shape::Inertia(INERTIA).allowed(), &hint));
+                return Err(at.refuse_value(&FieldShape::Inertia(INERTIA).allowed(), &hint));
             }
             _ => {
                 return Err(at.refuse_value(
-                    &Shape::Inertia(INERTIA).allowed(),
+                    &FieldShape::Inertia(INERTIA).allowed(),
                     "\"full\" is m(l² + w²)/12, \"slender\" is m l²/12",
                 ));
             }

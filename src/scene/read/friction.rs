@@ -2,7 +2,7 @@
 
 use super::at::{At, Fields};
 use crate::scene::error::SceneError;
-use crate::scene::format::{HINGE_FRICTION, SLIDER_FRICTION, Table, WALL_FRICTION};
+use crate::scene::format::{HINGE_FRICTION, KeyTable, SLIDER_FRICTION, WALL_FRICTION};
 use crate::scene::{Friction, FrictionPlace};
 
 /// The friction of all hinges, sliders and walls at these places.
@@ -21,7 +21,7 @@ pub(super) fn all(hinges: &[At], sliders: &[At], walls: &[At]) -> Result<Vec<Fri
 fn add(
     found: &mut Vec<Friction>,
     places: &[At],
-    table: &'static Table,
+    table: &'static KeyTable,
     place: impl Fn(&Fields, usize) -> Result<FrictionPlace, SceneError>,
 ) -> Result<(), SceneError> {
     for (number, at) in places.iter().enumerate() {

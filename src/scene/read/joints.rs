@@ -2,19 +2,19 @@
 
 use super::at::Fields;
 use super::loads::law_of_wall;
-use super::names::Bars;
-use super::resolve::Constants;
+use super::names::BarNames;
+use super::resolve::FormulaConstants;
 use crate::scene::error::SceneError;
 use crate::scene::format::{LINE, RAIL};
 use crate::scene::{Hinge, Lock, Place, Rail, Slider, Wall, Weld};
 
 /// A hinge.
-pub(super) fn hinge(fields: &Fields, name: String, known: &Bars) -> Result<Hinge, SceneError> {
+pub(super) fn hinge(fields: &Fields, name: String, known: &BarNames) -> Result<Hinge, SceneError> {
     Ok(Hinge { name, between: known.between(fields, "hinge")? })
 }
 
 /// A slider.
-pub(super) fn slider(fields: &Fields, name: String, known: &Bars) -> Result<Slider, SceneError> {
+pub(super) fn slider(fields: &Fields, name: String, known: &BarNames) -> Result<Slider, SceneError> {
     let point = known.place(&fields.required("point")?)?;
     let rail_at = fields.required("rail")?;
     let rail = rail_at.object(&RAIL)?;
@@ -25,12 +25,12 @@ pub(super) fn slider(fields: &Fields, name: String, known: &Bars) -> Result<Slid
 }
 
 /// A weld.
-pub(super) fn weld(fields: &Fields, name: String, known: &Bars) -> Result<Weld, SceneError> {
+pub(super) fn weld(fields: &Fields, name: String, known: &BarNames) -> Result<Weld, SceneError> {
     Ok(Weld { name, between: known.between(fields, "weld")? })
 }
 
 /// A lock.
-pub(super) fn lock(fields: &Fields, name: String, known: &Bars) -> Result<Lock, SceneError> {
+pub(super) fn lock(fields: &Fields, name: String, known: &BarNames) -> Result<Lock, SceneError> {
     let bar = known.bar(fields, "a lock holds the angle of a bar; the ground does not turn")?;
     let relative_to = known.relative_to(fields, bar, "leave it out to lock the angle from +x")?;
     Ok(Lock { name, bar, relative_to, angle: fields.number_if_any("angle")? })
@@ -40,8 +40,8 @@ pub(super) fn lock(fields: &Fields, name: String, known: &Bars) -> Result<Lock, 
 pub(super) fn wall(
     fields: &Fields,
     name: String,
-    known: &Bars,
-    constants: &Constants,
+    known: &BarNames,
+    constants: &FormulaConstants,
 ) -> Result<Wall, SceneError> {
     let bar = known.bar(fields, "a wall stops a point of a bar")?;
     let point = fields.pair("point")?;

@@ -2,13 +2,13 @@
 
 use super::at::{At, Fields, listed, nearest};
 use super::loads;
-use super::names::Bars;
-use super::resolve::{Known, check_name, fits, refused};
+use super::names::BarNames;
+use super::resolve::{Valued, check_name, fits, refused};
 use crate::scene::error::SceneError;
-use crate::scene::format::{Field, Quantity, SCENE, Shape};
+use crate::scene::format::{Field, FieldShape, QuantityRange, SCENE};
 use crate::scene::formula::unit::Dimension;
 use crate::scene::law::{Direction, Integral, Load, LoadLaw, NamedPoint, SceneEvent, Signal};
-use crate::scene::locate::{Member, Node, Value};
+use crate::scene::locate::{Located, Member, Value};
 use crate::scene::names::{Bound, Names, Scope};
 use crate::scene::set::hint;
 use crate::scene::{Coupling, Force, Scene, Spring, Torque, TorsionSpring};
@@ -35,7 +35,7 @@ pub(super) fn split<T>(all: Vec<Either<T>>, laws: &mut Vec<LoadLaw>) -> Vec<T> {
 }
 
 /// A text, or a number as one.
-fn written(node: &Node) -> Option<String> {
+fn written(node: &Located) -> Option<String> {
     match &node.value {
         Value::Text(text) => Some(text.clone()),
         Value::Number(number) => Some(format!("{number:?}")),
@@ -56,7 +56,7 @@ fn formula_if_any(fields: &Fields, name: &str) -> Result<Option<String>, SceneEr
     fields.optional(name).map(|_| formula(fields, name)).transpose()
 }
 
-fn is_formula(node: &Node) -> bool {
+fn is_formula(node: &Located) -> bool {
     match &node.value {
         Value::Text(text) => text.trim().parse::<f64>().is_err(),
         Value::List(nodes) => nodes.iter().any(is_formula),
@@ -77,7 +77,7 @@ fn without_law(fields: &Fields) -> Result<(), SceneError> {
 }
 
 /// A force, or one by formulas.
-pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Either<Force>, SceneError> {
+pub(super) fn force(fields: &Fields, name: String, known: &BarNames) -> Result<Either<Force>, SceneError> {
     let at = fields.required("force")?;
     let nodes = match &at.node.value {
         Value::List(nodes) if nodes.len() == 2 && is_formula(at.node) => nodes,
@@ -102,7 +102,7 @@ pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Eithe
 }
 
 /// A torque, or one by a formula.
-pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Either<Torque>, SceneError> {
+pub(super) fn torque(fields: &Fields, name: String, known: &BarNames) -> Result<Either<Torque>, SceneError> {
     if !is_formula(fields.required("torque")?.node) {
         return loads::torque(fields, name, known).map(Either::Plain);
     }
@@ -113,7 +113,7 @@ pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Eith
 }
 
 /// A spring, or one by formulas.
-pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Either<Spring>, SceneError> {
+pub(super) fn spring(fields: &Fields, name: String, known: &BarNames) -> Result<Either<Spring>, SceneError> {
     if fields.table.field("stiffness").is_some() {
         return loads::spring(fields, name, known).map(Either::Plain);
     }
@@ -129,7 +129,7 @@ pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Eith
 pub(super) fn torsion_spring(
     fields: &Fields,
     name: String,
-    known: &Bars,
+    known: &BarNames,
 ) -> Result<Either<TorsionSpring>, SceneError> {
     if fields.table.field("stiffness").is_some() {
         return loads::torsion_spring(fields, name, known).map(Either::Plain);
@@ -145,7 +145,7 @@ pub(super) fn torsion_spring(
 }
 
 /// A point with a name.
-pub(super) fn point(fields: &Fields, name: String, known: &Bars) -> Result<NamedPoint, SceneError> {
+pub(super) fn point(fields: &Fields, name: String, known: &BarNames) -> Result<NamedPoint, SceneError> {
     let at = fields.required("name")?;
     check_name(at.source, &name, at.node.span, &at.path, &[])?;
     Ok(NamedPoint { name, place: known.place_of(fields)? })
@@ -182,7 +182,7 @@ pub(super) fn event(fields: &Fields, name: String) -> Result<SceneEvent, SceneEr
 pub(super) fn names(at: &At) -> Result<Vec<String>, SceneError> {
     let hint = "for example [\"latch\"]";
     let Value::List(nodes) = &at.node.value else {
-        return Err(at.refuse_value(&Shape::Names.allowed(), hint));
+        return Err(at.refuse_value(&FieldShape::Names.allowed(), hint));
     };
     let name = |(number, node)| match &at.item(node, number).node.value {
         Value::Text(name) => Ok(name.clone()),
@@ -195,7 +195,7 @@ pub(super) fn names(at: &At) -> Result<Vec<String>, SceneError> {
 fn pairs<'a>(at: &At<'a>) -> Result<Vec<(String, String)>, SceneError> {
     let hint = "for example {\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}";
     let Value::Object(members) = &at.node.value else {
-        return Err(at.refuse_value(&Shape::Signals.allowed(), hint));
+        return Err(at.refuse_value(&FieldShape::Signals.allowed(), hint));
     };
     let pair = |member: &Member| {
         let refused = || at.member(member).refuse_value("must be a formula", hint);
@@ -215,7 +215,7 @@ fn check_keys<'a>(at: &At<'a>, mut taken: Vec<&'a str>) -> Result<(), SceneError
 }
 
 /// The signals of a scene.
-pub(super) fn signals(fields: &Fields, taken: &[Known]) -> Result<Vec<Signal>, SceneError> {
+pub(super) fn signals(fields: &Fields, taken: &[Valued]) -> Result<Vec<Signal>, SceneError> {
     let Some(at) = fields.optional("signals") else { return Ok(Vec::new()) };
     let all = pairs(&at)?;
     if all.len() > MOST {
@@ -235,9 +235,9 @@ const COLUMNS: [&str; 5] = ["kinetic", "potential", "work", "imbalance", "fricti
 /// The integrals of a scene of so many bars.
 pub(super) fn integrals(
     fields: &Fields,
-    parameters: &[Known],
+    parameters: &[Valued],
     signals: &[Signal],
-    bars: &Bars,
+    bars: &BarNames,
 ) -> Result<Vec<Integral>, SceneError> {
     let Some(at) = fields.optional("integrals") else { return Ok(Vec::new()) };
     let mut taken: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
@@ -253,7 +253,7 @@ pub(super) fn integrals(
 
 /// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events
 /// name.
-pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> Result<(), SceneError> {
+pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Valued]) -> Result<(), SceneError> {
     let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
     let is_plain = is_plain && scene.walls.iter().all(|wall| wall.aim.is_none());
     if is_plain && scene.events.is_empty() && scene.inactive.is_empty() && scene.couplings.is_empty() {
@@ -344,15 +344,15 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Known]) -> R
 }
 
 /// What the field of a part must come to.
-fn quantity_of(list: &str, key: &str, part: &At) -> Option<Quantity> {
-    let Some(Field { shape: Shape::List { of, .. }, .. }) = SCENE.field(list) else { return None };
+fn quantity_of(list: &str, key: &str, part: &At) -> Option<QuantityRange> {
+    let Some(Field { shape: FieldShape::List { of, .. }, .. }) = SCENE.field(list) else { return None };
     let table = crate::scene::format::kind(of, |key| part.has(key))?;
     match table.field(key).map(|field| &field.shape) {
         Some(
-            Shape::Formula(quantity)
-            | Shape::LawNumber(quantity)
-            | Shape::LawPair(quantity)
-            | Shape::Law(_, quantity),
+            FieldShape::Formula(quantity)
+            | FieldShape::LawNumber(quantity)
+            | FieldShape::LawPair(quantity)
+            | FieldShape::Law(_, quantity),
         ) => Some(*quantity),
         _ => None,
     }
@@ -363,10 +363,10 @@ fn judge(
     at: &At,
     text: &str,
     scope: &Scope,
-    quantity: Option<&Quantity>,
+    quantity: Option<&QuantityRange>,
 ) -> Result<(Bound, Option<Dimension>), SceneError> {
     let allowed =
-        quantity.map_or("must be a formula".to_owned(), |quantity| Shape::Formula(*quantity).allowed());
+        quantity.map_or("must be a formula".to_owned(), |quantity| FieldShape::Formula(*quantity).allowed());
     let refused = |error| refused(at.source, at.node.span, &at.path, &allowed, &error);
     let (bound, dimension) = scope.bind(text).map_err(refused)?;
     if let Some(quantity) = quantity {

@@ -1,17 +1,17 @@
 //! What acts on bodies: springs, torsion springs, forces, torques and motors, with their laws.
 
 use super::at::{At, Fields, listed, nearest};
-use super::names::Bars;
-use super::resolve::Constants;
+use super::names::BarNames;
+use super::resolve::FormulaConstants;
 use crate::scene::error::SceneError;
-use crate::scene::format::{DRIVE, Field, Shape};
+use crate::scene::format::{DRIVE, Field, FieldShape};
 use crate::scene::locate::Value;
 use crate::scene::{
     Coupled, Coupling, Drive, Force, Law, Motor, Sine, Slider, Spring, Torque, TorsionSpring,
 };
 
 /// A spring.
-pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spring, SceneError> {
+pub(super) fn spring(fields: &Fields, name: String, known: &BarNames) -> Result<Spring, SceneError> {
     let (stiffness, free_length, damping) =
         (fields.number("stiffness")?, fields.number("free_length")?, fields.number_or("damping", 0.0)?);
     let rigid = fields.word_or_first("model")? == 1;
@@ -40,7 +40,7 @@ pub(super) fn spring(fields: &Fields, name: String, known: &Bars) -> Result<Spri
 pub(super) fn torsion_spring(
     fields: &Fields,
     name: String,
-    known: &Bars,
+    known: &BarNames,
 ) -> Result<TorsionSpring, SceneError> {
     let (bar, relative_to) = coil_bodies(fields, known)?;
     Ok(TorsionSpring {
@@ -54,21 +54,21 @@ pub(super) fn torsion_spring(
 }
 
 /// The bar that a torsion spring turns, and the one its angle is measured from.
-pub(super) fn coil_bodies(fields: &Fields, known: &Bars) -> Result<(usize, Option<usize>), SceneError> {
+pub(super) fn coil_bodies(fields: &Fields, known: &BarNames) -> Result<(usize, Option<usize>), SceneError> {
     let hint = "a torsion spring turns a bar; name the ground, if anything, in `relative_to`";
     let bar = known.bar(fields, hint)?;
     Ok((bar, known.relative_to(fields, bar, "leave it out for an angle from +x")?))
 }
 
 /// The bar that a torque acts on, and the one that takes its opposite.
-pub(super) fn torque_bodies(fields: &Fields, known: &Bars) -> Result<(usize, Option<usize>), SceneError> {
+pub(super) fn torque_bodies(fields: &Fields, known: &BarNames) -> Result<(usize, Option<usize>), SceneError> {
     let hint = "a torque on the ground moves nothing; name the ground, if anything, in `relative_to`";
     let bar = known.bar(fields, hint)?;
     Ok((bar, known.relative_to(fields, bar, "leave it out where the ground takes the opposite torque")?))
 }
 
 /// A force.
-pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Force, SceneError> {
+pub(super) fn force(fields: &Fields, name: String, known: &BarNames) -> Result<Force, SceneError> {
     Ok(Force {
         name,
         bar: known.bar(fields, "a force on the ground moves nothing")?,
@@ -80,7 +80,7 @@ pub(super) fn force(fields: &Fields, name: String, known: &Bars) -> Result<Force
 }
 
 /// A torque.
-pub(super) fn torque(fields: &Fields, name: String, known: &Bars) -> Result<Torque, SceneError> {
+pub(super) fn torque(fields: &Fields, name: String, known: &BarNames) -> Result<Torque, SceneError> {
     let (bar, relative_to) = torque_bodies(fields, known)?;
     Ok(Torque {
         name,
@@ -102,9 +102,9 @@ pub(super) enum AnyMotor<'a> {
 pub(super) fn motor<'a>(
     fields: &Fields<'a>,
     name: String,
-    known: &Bars,
+    known: &BarNames,
     sliders: &[Slider],
-    constants: &Constants,
+    constants: &FormulaConstants,
 ) -> Result<AnyMotor<'a>, SceneError> {
     if let Value::Text(text) = &fields.required("law")?.node.value
         && constants.is_of_place(text)
@@ -147,14 +147,14 @@ fn slider(at: &At, sliders: &[Slider]) -> Result<usize, SceneError> {
             }
             None => format!("known sliders: {}", listed(&names)),
         };
-        at.refuse_value(&Shape::SliderName.allowed(), &hint)
+        at.refuse_value(&FieldShape::SliderName.allowed(), &hint)
     })
 }
 
 /// The law of a wall, if it has one: of time, or of where the mechanism is.
 pub(super) fn law_of_wall(
     fields: &Fields,
-    constants: &Constants,
+    constants: &FormulaConstants,
 ) -> Result<(Option<Law>, Option<String>), SceneError> {
     let Some(at) = fields.optional("law") else { return Ok((None, None)) };
     match &at.node.value {
@@ -164,7 +164,7 @@ pub(super) fn law_of_wall(
 }
 
 /// The law of a motor or wall: a sum, or a formula that is none.
-fn motor_law(fields: &Fields, constants: &Constants) -> Result<Law, SceneError> {
+fn motor_law(fields: &Fields, constants: &FormulaConstants) -> Result<Law, SceneError> {
     let at = fields.required("law")?;
     let Value::Text(text) = &at.node.value else { return law(fields) };
     let profile = constants.profile(text);
@@ -177,12 +177,12 @@ fn motor_law(fields: &Fields, constants: &Constants) -> Result<Law, SceneError> 
 
 /// The field `law`, in the units that its table says.
 fn law(fields: &Fields) -> Result<Law, SceneError> {
-    let Some(Field { shape: Shape::Law(table, _), .. }) = fields.table.field("law") else {
+    let Some(Field { shape: FieldShape::Law(table, _), .. }) = fields.table.field("law") else {
         return Err(fields.at.refuse("has no law", "must be of a kind that has one", fields.table.about));
     };
     let law = fields.required("law")?.object(table)?;
     let mut sines = Vec::new();
-    if let (Some(list), Some(Field { shape: Shape::List { of: [sine], .. }, .. })) =
+    if let (Some(list), Some(Field { shape: FieldShape::List { of: [sine], .. }, .. })) =
         (law.optional("sines"), table.field("sines"))
     {
         for at in list.items("sines", table)? {

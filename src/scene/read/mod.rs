@@ -22,13 +22,13 @@ pub(super) use start::GivenStart;
 use super::error::SceneError;
 use super::fit;
 use super::format::{LONGEST_FILE, SCENE, plain};
-use super::locate::{Node, Source, Text};
+use super::locate::{Located, Text, Texts};
 use super::set::{Override, put};
 use super::{Coupling, Drive, Motor, Scene};
 use laws::Either;
 use loads::AnyMotor;
-use names::{Bars, named};
-use resolve::{Constants, Resolved};
+use names::{BarNames, named};
+use resolve::{FormulaConstants, Resolved};
 use std::io::Read;
 use std::path::Path;
 
@@ -61,7 +61,7 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     String::from_utf8(bytes).map_err(|error| {
         let good = error.utf8_error().valid_up_to();
         let json = String::from_utf8_lossy(error.as_bytes()).into_owned();
-        let source = Source { file, texts: vec![Text { set: None, json: without_mark(&json).to_owned() }] };
+        let source = Texts { file, texts: vec![Text { set: None, json: without_mark(&json).to_owned() }] };
         let good = good.saturating_sub(json.len() - source.texts[0].json.len());
         let span = source.span(0, good, good + char::REPLACEMENT_CHARACTER.len_utf8());
         let hint = "save the file as UTF-8; names of bars and hinges are plain ASCII anyway";
@@ -97,10 +97,10 @@ pub(super) fn put_together(
     text: &str,
     source: &str,
     overrides: &[Override],
-) -> Result<(Source, Node), SceneError> {
+) -> Result<(Texts, Located), SceneError> {
     let mut texts = vec![Text { set: None, json: without_mark(text).to_owned() }];
     texts.extend(overrides.iter().map(Override::text));
-    let source = Source { file: source.to_owned(), texts };
+    let source = Texts { file: source.to_owned(), texts };
     let mut tree = source.tree(0)?;
     for (number, set) in overrides.iter().enumerate() {
         put(&source, &mut tree, set, source.tree(number + 1)?)?;
@@ -119,7 +119,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let description = fields.text_or_empty("description")?;
     let gravity = fields.pair("gravity")?;
     let (bars, bar_places) = named(&fields, "bars", bars::bar)?;
-    let known = Bars::of(&bars);
+    let known = BarNames::of(&bars);
     let (hinges, hinge_places) =
         named(&fields, "hinges", |fields, name| joints::hinge(fields, name, &known))?;
     let (sliders, slider_places) =
@@ -145,7 +145,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let forces = laws::split(forces, &mut laws);
     let torques = laws::split(torques, &mut laws);
     laws.extend(potentials);
-    let constants = Constants::new(&parameters, &tables);
+    let constants = FormulaConstants::new(&parameters, &tables);
     let (any, _) =
         named(&fields, "motors", |fields, name| loads::motor(fields, name, &known, &sliders, &constants))?;
     let (motors, motor_places, drives, couplings) = sorted(any);

@@ -2,8 +2,8 @@
 
 use super::at::{At, Fields, listed, nearest};
 use crate::scene::error::SceneError;
-use crate::scene::format::{Field, GROUND, PLACE, Shape, Table, kind};
-use crate::scene::locate::{Node, Value};
+use crate::scene::format::{Field, FieldShape, GROUND, KeyTable, PLACE, kind};
+use crate::scene::locate::{Located, Value};
 use crate::scene::{Bar, Place};
 use std::collections::HashMap;
 
@@ -13,14 +13,14 @@ pub(super) fn named<'a, T>(
     list: &str,
     one: impl Fn(&Fields<'a>, String) -> Result<T, SceneError>,
 ) -> Result<(Vec<T>, Vec<At<'a>>), SceneError> {
-    let mut names = Names::default();
+    let mut names = UniqueNames::default();
     let mut read = Vec::new();
     let places = match scene.table.field(list) {
         Some(field) if field.required => scene.required(list)?.items(list, scene.table)?,
         _ => scene.optional(list).map_or(Ok(Vec::new()), |at| at.items(list, scene.table))?,
     };
-    let kinds: &[&'static Table] =
-        if let Some(Field { shape: Shape::List { of, .. }, .. }) = scene.table.field(list) {
+    let kinds: &[&'static KeyTable] =
+        if let Some(Field { shape: FieldShape::List { of, .. }, .. }) = scene.table.field(list) {
             of
         } else {
             &[]
@@ -41,9 +41,9 @@ pub(super) fn named<'a, T>(
 
 /// Names of one kind, each with the path of its owner.
 #[derive(Default)]
-struct Names(HashMap<String, String>);
+struct UniqueNames(HashMap<String, String>);
 
-impl Names {
+impl UniqueNames {
     fn admit(&mut self, name: &str, at: &At) -> Result<(), SceneError> {
         match self.0.insert(name.to_owned(), at.path.clone()) {
             None => Ok(()),
@@ -55,12 +55,12 @@ impl Names {
 }
 
 /// The bars by name.
-pub(super) struct Bars<'a> {
+pub(super) struct BarNames<'a> {
     pub bars: &'a [Bar],
     numbers: HashMap<&'a str, usize>,
 }
 
-impl<'a> Bars<'a> {
+impl<'a> BarNames<'a> {
     pub fn of(bars: &'a [Bar]) -> Self {
         Self {
             bars,
@@ -76,7 +76,7 @@ impl<'a> Bars<'a> {
     /// The bar named at `at`, or the ground.
     pub fn body(&self, at: &At) -> Result<Option<usize>, SceneError> {
         let Value::Text(name) = &at.node.value else {
-            return Err(at.refuse_value(&Shape::Body { ground: true }.allowed(), &self.hint("")));
+            return Err(at.refuse_value(&FieldShape::Body { ground: true }.allowed(), &self.hint("")));
         };
         if name == GROUND {
             return Ok(None);
@@ -91,7 +91,7 @@ impl<'a> Bars<'a> {
         let at = fields.required("body")?;
         match self.body(&at)? {
             Some(bar) => Ok(bar),
-            None => Err(at.refuse_value(&Shape::Body { ground: false }.allowed(), hint)),
+            None => Err(at.refuse_value(&FieldShape::Body { ground: false }.allowed(), hint)),
         }
     }
 
@@ -129,13 +129,13 @@ impl<'a> Bars<'a> {
         let at = fields.required("between")?;
         let Value::List(nodes) = &at.node.value else {
             return Err(at.refuse_value(
-                &Shape::Between.allowed(),
+                &FieldShape::Between.allowed(),
                 "for example {\"body\": \"ground\", \"point\": [0, 0]} for one of them",
             ));
         };
         let [first, second] = nodes.as_slice() else {
             let hint = format!("a {what} joins exactly two bodies; this list has {}", nodes.len());
-            return Err(at.refuse("does not have two places", &Shape::Between.allowed(), &hint));
+            return Err(at.refuse("does not have two places", &FieldShape::Between.allowed(), &hint));
         };
         let places = [self.place(&at.item(first, 0))?, self.place(&at.item(second, 1))?];
         self.on_two_bodies(&at, places[0].bar, places[1].bar, what)?;
@@ -163,7 +163,7 @@ impl<'a> Bars<'a> {
 }
 
 /// The parameters that events set.
-pub(super) fn set_by_events(tree: &Node) -> Vec<String> {
+pub(super) fn set_by_events(tree: &Located) -> Vec<String> {
     let Some(Value::List(events)) = tree.at("events").map(|events| &events.value) else { return Vec::new() };
     let set = events.iter().filter_map(|event| match &event.at("set")?.value {
         Value::Object(members) => Some(members),

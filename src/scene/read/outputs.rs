@@ -3,8 +3,8 @@
 use super::at::{At, Fields};
 use super::resolve::refused;
 use crate::scene::error::SceneError;
-use crate::scene::format::Shape;
-use crate::scene::locate::{Node, Value};
+use crate::scene::format::FieldShape;
+use crate::scene::locate::{Located, Value};
 use crate::scene::{Output, OutputNames, Scene};
 
 const HINT: &str = "for example {\"bearing\": \"A.force\"} or [\"A.force\", \"tip.x\"]";
@@ -13,7 +13,7 @@ const MOST: usize = 1000;
 /// The longest name \[bytes\].
 const LONGEST: usize = 64;
 
-fn formula(at: &At, node: &Node) -> Result<String, SceneError> {
+fn formula(at: &At, node: &Located) -> Result<String, SceneError> {
     match &node.value {
         Value::Text(text) => Ok(text.clone()),
         _ => Err(at.refuse_value("must be a formula in quotes", HINT)),
@@ -57,7 +57,7 @@ pub(super) fn outputs(fields: &Fields) -> Result<Vec<Output>, SceneError> {
                 add(&at, Output { name: formula.clone(), formula })?;
             }
         }
-        _ => return Err(at.refuse_value(&Shape::Outputs.allowed(), HINT)),
+        _ => return Err(at.refuse_value(&FieldShape::Outputs.allowed(), HINT)),
     }
     Ok(outputs)
 }

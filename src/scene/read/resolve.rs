@@ -7,10 +7,10 @@ use super::at::At;
 use super::names::set_by_events;
 use super::tables;
 use crate::scene::error::SceneError;
-use crate::scene::format::{FACTOR_LAW, Quantity, SCENE, Shape, Table, about, kind};
+use crate::scene::format::{FACTOR_LAW, FieldShape, KeyTable, QuantityRange, SCENE, about, kind};
 use crate::scene::formula::unit::Dimension;
 use crate::scene::formula::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant};
-use crate::scene::locate::{Member, Node, Source, Span, Value, push_index, push_key};
+use crate::scene::locate::{Located, Member, Span, Texts, Value, push_index, push_key};
 use crate::scene::{Law, Parameter, PointTable, Profile, Sine};
 
 /// Names that formulas give a meaning of their own.
@@ -19,32 +19,32 @@ const RESERVED: [&str; 5] = ["t", "pi", "length", "rate", "angle"];
 const MOST: usize = 1000;
 
 /// A parameter with what is known of it beside its value.
-pub(super) struct Known {
+pub(super) struct Valued {
     pub name: String,
     pub value: f64,
     pub dimension: Option<Dimension>,
 }
 
-impl From<&Known> for Parameter {
-    fn from(known: &Known) -> Self {
+impl From<&Valued> for Parameter {
+    fn from(known: &Valued) -> Self {
         Self { name: known.name.clone(), value: known.value }
     }
 }
 
 /// What formulas are made of.
 pub(super) struct Resolved {
-    pub parameters: Vec<Known>,
+    pub parameters: Vec<Valued>,
     pub tables: Vec<PointTable>,
 }
 
 /// What formulas of time may use beside it: parameters and tables.
-pub(super) struct Constants<'a> {
-    parameters: &'a [Known],
+pub(super) struct FormulaConstants<'a> {
+    parameters: &'a [Valued],
     tables: Vec<Interpolant>,
 }
 
-impl<'a> Constants<'a> {
-    pub fn new(parameters: &'a [Known], tables: &[PointTable]) -> Self {
+impl<'a> FormulaConstants<'a> {
+    pub fn new(parameters: &'a [Valued], tables: &[PointTable]) -> Self {
         let tables = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
         Self { parameters, tables }
     }
@@ -69,7 +69,7 @@ impl<'a> Constants<'a> {
 ///
 /// # Errors
 /// A formula that is none, a name that nothing has, a dimension that does not fit, a cycle.
-pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Resolved, SceneError> {
+pub(super) fn resolve(source: &Texts, tree: &mut Located) -> Result<Resolved, SceneError> {
     let tables = tables::tables(&At { source, node: tree, path: String::new() })?;
     let functions: Vec<_> = tables.iter().map(|table| Interpolant::new(&table.name, &table.points)).collect();
     let parameters = parameters(source, tree, &functions)?;
@@ -80,7 +80,7 @@ pub(super) fn resolve(source: &Source, tree: &mut Node) -> Result<Resolved, Scen
 
 /// Refuses a name that formulas cannot use.
 pub(super) fn check_name(
-    source: &Source,
+    source: &Texts,
     name: &str,
     span: Span,
     path: &str,
@@ -112,7 +112,7 @@ pub(super) fn check_name(
 
 /// An error about a formula in the text at `span`, with the bytes at fault marked.
 pub(super) fn refused(
-    source: &Source,
+    source: &Texts,
     span: Span,
     path: &str,
     allowed: &str,
@@ -124,19 +124,19 @@ pub(super) fn refused(
 }
 
 /// The parameters, in the order of the text.
-fn parameters(source: &Source, tree: &Node, tables: &[Interpolant]) -> Result<Vec<Known>, SceneError> {
+fn parameters(source: &Texts, tree: &Located, tables: &[Interpolant]) -> Result<Vec<Valued>, SceneError> {
     let Value::Object(members) = &tree.value else { return Ok(Vec::new()) };
     let Some(holder) = members.iter().find(|member| member.key == "parameters") else {
         return Ok(Vec::new());
     };
     let Value::Object(members) = &holder.node.value else { return Ok(Vec::new()) };
-    let allowed = Shape::Parameters.allowed();
+    let allowed = FieldShape::Parameters.allowed();
     if members.len() > MOST {
         let problem = format!("has {} entries", members.len());
         return Err(source.refusal(holder.span, "parameters", &problem, &allowed, "compute the rest before"));
     }
     let mut order =
-        Order { source, names: Vec::new(), formulas: Vec::new(), known: Vec::new(), open: Vec::new() };
+        InOrder { source, names: Vec::new(), formulas: Vec::new(), known: Vec::new(), open: Vec::new() };
     for member in members {
         let mut path = "parameters".to_owned();
         push_key(&mut path, &member.key);
@@ -158,14 +158,15 @@ fn parameters(source: &Source, tree: &Node, tables: &[Interpolant]) -> Result<Ve
         order.names.push(&member.key);
     }
     (0..order.names.len()).try_for_each(|number| order.settle(number))?;
-    let Order { names, known, .. } = order;
-    let parameter = |(name, (value, dimension)): (&str, _)| Known { name: name.to_owned(), value, dimension };
+    let InOrder { names, known, .. } = order;
+    let parameter =
+        |(name, (value, dimension)): (&str, _)| Valued { name: name.to_owned(), value, dimension };
     Ok(names.into_iter().zip(known.into_iter().flatten()).map(parameter).collect())
 }
 
 /// Evaluates parameters after those they are made of.
-struct Order<'a> {
-    source: &'a Source,
+struct InOrder<'a> {
+    source: &'a Texts,
     names: Vec<&'a str>,
     /// Path, place and formula of each; none of a number.
     formulas: Vec<(String, Span, Option<Formula>)>,
@@ -174,14 +175,14 @@ struct Order<'a> {
     open: Vec<usize>,
 }
 
-impl Order<'_> {
+impl InOrder<'_> {
     fn settle(&mut self, number: usize) -> Result<(), SceneError> {
         if self.known[number].is_some() {
             return Ok(());
         }
         let (path, span, formula) = self.formulas[number].clone();
         let Some(formula) = formula else { return Ok(()) };
-        let (source, allowed) = (self.source, Shape::Parameters.allowed());
+        let (source, allowed) = (self.source, FieldShape::Parameters.allowed());
         let refused = |error: FormulaError| refused(source, span, &path, &allowed, &error);
         if self.open.contains(&number) || self.open.len() >= DEEPEST {
             let chain: Vec<&str> = self.open.iter().chain([&number]).map(|&one| self.names[one]).collect();
@@ -214,8 +215,8 @@ type Argument = (Option<f64>, Option<Dimension>);
 type Arguments = (Vec<Option<f64>>, Vec<Option<Dimension>>);
 
 struct Resolver<'a> {
-    source: &'a Source,
-    parameters: &'a [Known],
+    source: &'a Texts,
+    parameters: &'a [Valued],
     tables: &'a [Interpolant],
     /// Parameters that events set: formulas of them, where there are laws, are more than numbers.
     set: Vec<String>,
@@ -223,7 +224,7 @@ struct Resolver<'a> {
 
 impl Resolver<'_> {
     /// All members of an object.
-    fn members(&self, node: &mut Node, table: &'static Table, path: &str) -> Result<(), SceneError> {
+    fn members(&self, node: &mut Located, table: &'static KeyTable, path: &str) -> Result<(), SceneError> {
         let Value::Object(members) = &mut node.value else { return Ok(()) };
         for member in members {
             if let Some(field) = table.field(&member.key) {
@@ -235,8 +236,8 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    fn visit(&self, node: &mut Node, shape: &Shape, path: &str) -> Result<(), SceneError> {
-        let each = |nodes: &mut [Node], one: &dyn Fn(&mut Node, &str) -> Result<(), SceneError>| {
+    fn visit(&self, node: &mut Located, shape: &FieldShape, path: &str) -> Result<(), SceneError> {
+        let each = |nodes: &mut [Located], one: &dyn Fn(&mut Located, &str) -> Result<(), SceneError>| {
             nodes.iter_mut().enumerate().try_for_each(|(number, node)| {
                 let mut inner = path.to_owned();
                 push_index(&mut inner, number);
@@ -245,42 +246,42 @@ impl Resolver<'_> {
         };
         match (shape, &mut node.value) {
             // A word of bars of another kind, of which the reader of bars speaks.
-            (Shape::Number(_), Value::Text(text)) if path.ends_with(".inertia") && is_of_shape(text) => {
+            (FieldShape::Number(_), Value::Text(text)) if path.ends_with(".inertia") && is_of_shape(text) => {
                 Ok(())
             }
-            (Shape::Number(quantity) | Shape::LawNumber(quantity), Value::Text(_)) => {
+            (FieldShape::Number(quantity) | FieldShape::LawNumber(quantity), Value::Text(_)) => {
                 self.number(node, quantity, shape, path)
             }
-            (Shape::Inertia(quantity), Value::Text(text)) if !is_of_shape(text) => {
+            (FieldShape::Inertia(quantity), Value::Text(text)) if !is_of_shape(text) => {
                 // A word that is nearly one of the two is left to the reader, who knows what was meant.
                 if Formula::parse_with(text, self.tables).is_ok_and(|formula| self.knows(&formula)) {
                     return self.number(node, quantity, shape, path);
                 }
                 Ok(())
             }
-            (Shape::Pair(quantity), Value::List(nodes)) => {
-                each(nodes, &|node, path| self.visit(node, &Shape::Number(*quantity), path))
+            (FieldShape::Pair(quantity), Value::List(nodes)) => {
+                each(nodes, &|node, path| self.visit(node, &FieldShape::Number(*quantity), path))
             }
-            (Shape::LawPair(quantity), Value::List(nodes)) => {
-                each(nodes, &|node, path| self.visit(node, &Shape::LawNumber(*quantity), path))
+            (FieldShape::LawPair(quantity), Value::List(nodes)) => {
+                each(nodes, &|node, path| self.visit(node, &FieldShape::LawNumber(*quantity), path))
             }
-            (Shape::Law(_, quantity), Value::Text(text)) => {
+            (FieldShape::Law(_, quantity), Value::Text(text)) => {
                 // What is no sum is left to the reader of motors.
                 if let Some(law) = self.law(text, node.span, quantity, shape, path)? {
                     node.value = law_object(node.span, &law);
                 }
                 Ok(())
             }
-            (Shape::Object(table) | Shape::Law(table, _), _) => self.members(node, table, path),
-            (Shape::Between, Value::List(nodes)) => {
+            (FieldShape::Object(table) | FieldShape::Law(table, _), _) => self.members(node, table, path),
+            (FieldShape::Between, Value::List(nodes)) => {
                 each(nodes, &|node, path| self.members(node, &crate::scene::format::PLACE, path))
             }
-            (Shape::List { of, .. }, Value::List(nodes)) => each(nodes, &|node, path| {
+            (FieldShape::List { of, .. }, Value::List(nodes)) => each(nodes, &|node, path| {
                 let Value::Object(members) = &node.value else { return Ok(()) };
                 let has = |key: &str| members.iter().any(|member| member.key == key);
                 kind(of, has).map_or(Ok(()), |table| self.members(node, table, path))
             }),
-            (Shape::ByBar(table), Value::Object(members)) => members.iter_mut().try_for_each(|member| {
+            (FieldShape::ByBar(table), Value::Object(members)) => members.iter_mut().try_for_each(|member| {
                 let mut inner = path.to_owned();
                 push_key(&mut inner, &member.key);
                 self.members(&mut member.node, table, &inner)
@@ -294,13 +295,13 @@ impl Resolver<'_> {
         &self,
         text: &str,
         span: Span,
-        quantity: &Quantity,
-        shape: &Shape,
+        quantity: &QuantityRange,
+        shape: &FieldShape,
         path: &str,
     ) -> Result<Option<Law>, SceneError> {
         let refused = |error: FormulaError| refused(self.source, span, path, &shape.allowed(), &error);
         let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
-        let is_motor = !matches!(shape, Shape::Law(table, _) if std::ptr::eq(*table, &FACTOR_LAW));
+        let is_motor = !matches!(shape, FieldShape::Law(table, _) if std::ptr::eq(*table, &FACTOR_LAW));
         if is_motor && !is_of_time(&formula, self.parameters) {
             return Ok(None);
         }
@@ -325,7 +326,7 @@ impl Resolver<'_> {
         formula.names().find(|name| self.set.iter().any(|set| set == name))
     }
 
-    fn find(&self, name: &str) -> Option<&Known> {
+    fn find(&self, name: &str) -> Option<&Valued> {
         self.parameters.iter().find(|known| known.name == name)
     }
 
@@ -357,9 +358,9 @@ impl Resolver<'_> {
     /// Puts the number in the place of its formula.
     fn number(
         &self,
-        node: &mut Node,
-        quantity: &Quantity,
-        shape: &Shape,
+        node: &mut Located,
+        quantity: &QuantityRange,
+        shape: &FieldShape,
         path: &str,
     ) -> Result<(), SceneError> {
         let Value::Text(text) = &node.value else { return Ok(()) };
@@ -370,7 +371,7 @@ impl Resolver<'_> {
         let refused = |error: FormulaError| refused(self.source, node.span, path, &shape.allowed(), &error);
         let formula = Formula::parse_with(text, self.tables).map_err(refused)?;
         let is_law = !self.knows(&formula) || self.is_set(&formula).is_some();
-        if matches!(shape, Shape::LawNumber(_)) && is_law {
+        if matches!(shape, FieldShape::LawNumber(_)) && is_law {
             return Ok(());
         }
         let (values, dimensions) = self.arguments(&formula, &[]).map_err(refused)?;
@@ -389,7 +390,7 @@ impl Resolver<'_> {
 }
 
 /// True where a formula has no names but t and those of parameters.
-fn is_of_time(formula: &Formula, parameters: &[Known]) -> bool {
+fn is_of_time(formula: &Formula, parameters: &[Valued]) -> bool {
     formula.names().all(|name| name == "t" || parameters.iter().any(|known| known.name == name))
 }
 
@@ -400,17 +401,17 @@ fn is_of_shape(word: &str) -> bool {
 
 /// A law as the object that could stand in its formula's place.
 fn law_object(span: Span, law: &Law) -> Value {
-    let number = |value: f64| Node { span, value: Value::Number(value) };
-    let member = |key: &str, node: Node| Member { key: key.to_owned(), span, node };
+    let number = |value: f64| Located { span, value: Value::Number(value) };
+    let member = |key: &str, node: Located| Member { key: key.to_owned(), span, node };
     let sine = |sine: &Sine| {
         let members = vec![
             member("amplitude", number(sine.amplitude)),
             member("frequency", number(sine.frequency)),
             member("phase", number(sine.phase)),
         ];
-        Node { span, value: Value::Object(members) }
+        Located { span, value: Value::Object(members) }
     };
-    let sines = Node { span, value: Value::List(law.sines.iter().map(sine).collect()) };
+    let sines = Located { span, value: Value::List(law.sines.iter().map(sine).collect()) };
     Value::Object(vec![
         member("start", number(law.start)),
         member("rate", number(law.rate)),
@@ -423,7 +424,7 @@ fn law_object(span: Span, law: &Law) -> Value {
 pub(super) fn fits(
     formula: &Formula,
     dimension: Option<Dimension>,
-    quantity: &Quantity,
+    quantity: &QuantityRange,
 ) -> Result<(), FormulaError> {
     let wanted = Dimension::of(quantity.unit);
     match dimension {

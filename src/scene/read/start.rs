@@ -1,9 +1,9 @@
 //! What a file says of the start.
 
 use super::at::{At, Fields};
-use super::names::Bars;
+use super::names::BarNames;
 use crate::scene::error::SceneError;
-use crate::scene::format::{START, Shape};
+use crate::scene::format::{FieldShape, START};
 use crate::scene::locate::Value;
 
 /// The start of one bar as given.
@@ -23,13 +23,13 @@ pub(in crate::scene) struct GivenStart<'a> {
 /// The starts that the file gives, one for each bar.
 pub(super) fn starts<'a>(
     scene: &Fields<'a>,
-    known: &Bars,
+    known: &BarNames,
 ) -> Result<Vec<Option<GivenStart<'a>>>, SceneError> {
     let mut given: Vec<Option<GivenStart>> = known.bars.iter().map(|_| None).collect();
     let Some(at) = scene.optional("start") else { return Ok(given) };
     let Value::Object(members) = &at.node.value else {
         return Err(at.refuse_value(
-            &Shape::ByBar(&START).allowed(),
+            &FieldShape::ByBar(&START).allowed(),
             "for example \"start\": {\"bar1\": {\"phi\": 0, \"omega\": 0}}",
         ));
     };

@@ -4,9 +4,9 @@ use super::at::At;
 use super::resolve::check_name;
 use crate::scene::PointTable;
 use crate::scene::error::SceneError;
-use crate::scene::format::Shape;
+use crate::scene::format::FieldShape;
 use crate::scene::formula::POINTS;
-use crate::scene::locate::{Node, Value};
+use crate::scene::locate::{Located, Value};
 use std::io::Read;
 use std::path::Path;
 
@@ -46,7 +46,7 @@ pub(super) fn tables(root: &At) -> Result<Vec<PointTable>, SceneError> {
 }
 
 fn refused(at: &At) -> SceneError {
-    at.refuse_value(&Shape::Tables.allowed(), HINT)
+    at.refuse_value(&FieldShape::Tables.allowed(), HINT)
 }
 
 /// Refuses a number of points.
@@ -56,11 +56,11 @@ fn counted(table: &At, count: usize) -> Result<(), SceneError> {
         return Ok(());
     }
     let hint = "thin it out, or write a formula";
-    Err(table.refuse(&format!("has {count} points"), &Shape::Tables.allowed(), hint))
+    Err(table.refuse(&format!("has {count} points"), &FieldShape::Tables.allowed(), hint))
 }
 
 /// Points written in the scene.
-fn listed(table: &At, nodes: &[Node]) -> Result<Vec<[f64; 2]>, SceneError> {
+fn listed(table: &At, nodes: &[Located]) -> Result<Vec<[f64; 2]>, SceneError> {
     counted(table, nodes.len())?;
     let mut points: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
     for (number, node) in nodes.iter().enumerate() {

@@ -1,27 +1,27 @@
 //! Paths of numbers, followed through the format's tables and a scene's tree side by side.
 
 use super::member;
-use crate::scene::format::{Field, SCENE, Shape, Table, UNIFORM_BAR, kind};
-use crate::scene::locate::{Node, Value, push_index, push_key};
+use crate::scene::format::{Field, FieldShape, KeyTable, SCENE, UNIFORM_BAR, kind};
+use crate::scene::locate::{Located, Value, push_index, push_key};
 use crate::scene::read::{listed, nearest};
-use crate::scene::set::{Step, hint, name, steps};
+use crate::scene::set::{PathStep, hint, name, steps};
 
 /// Follows a path through the format's tables and the scene's tree side by side.
-pub(in crate::scene) struct Walk<'a> {
-    pub tree: &'a Node,
+pub(in crate::scene) struct FormatWalk<'a> {
+    pub tree: &'a Located,
 }
 
-impl Walk<'_> {
+impl FormatWalk<'_> {
     /// The unit of the number at the end of a path; else what is wrong and a hint.
     pub fn unit(&self, path: &str) -> Result<&'static str, (String, String)> {
         let steps = steps(path).ok_or_else(|| {
             ("it is not a path".to_owned(), "keys, names and [indices] joined by dots".to_owned())
         })?;
         let mut steps = steps.into_iter().peekable();
-        let (mut table, mut node, mut walked): (&'static Table, Option<&Node>, String) =
+        let (mut table, mut node, mut walked): (&'static KeyTable, Option<&Located>, String) =
             (&SCENE, Some(self.tree), String::new());
         loop {
-            let Some(Step::Key(key)) = steps.next() else { return Err(no_number(&walked, table)) };
+            let Some(PathStep::Key(key)) = steps.next() else { return Err(no_number(&walked, table)) };
             let Some(field) = table.field(key) else {
                 let keys: Vec<&str> = table.fields.iter().map(|field| field.name).collect();
                 return Err((format!("{} has no `{key}`", table.title), hint(key, &keys)));
@@ -39,20 +39,28 @@ impl Walk<'_> {
                 ));
             }
             match (&field.shape, steps.peek()) {
-                (Shape::Number(quantity) | Shape::LawNumber(quantity) | Shape::Inertia(quantity), None) => {
+                (
+                    FieldShape::Number(quantity)
+                    | FieldShape::LawNumber(quantity)
+                    | FieldShape::Inertia(quantity),
+                    None,
+                ) => {
                     return Ok(quantity.unit);
                 }
-                (Shape::Parameters | Shape::Signals, Some(Step::Key(name))) => {
+                (FieldShape::Parameters | FieldShape::Signals, Some(PathStep::Key(name))) => {
                     element_by_key(node, name, &mut walked)?;
                     steps.next();
                     return if steps.next().is_none() { Ok("") } else { Err(no_number(&walked, table)) };
                 }
-                (Shape::Tables, Some(Step::Key(name))) => {
+                (FieldShape::Tables, Some(PathStep::Key(name))) => {
                     let points = element_by_key(node, name, &mut walked)?;
                     steps.next();
                     return coordinate(points, &mut steps, &mut walked);
                 }
-                (Shape::Pair(quantity) | Shape::LawPair(quantity), Some(Step::Index(0 | 1))) => {
+                (
+                    FieldShape::Pair(quantity) | FieldShape::LawPair(quantity),
+                    Some(PathStep::Index(0 | 1)),
+                ) => {
                     steps.next();
                     return if steps.next().is_none() {
                         Ok(quantity.unit)
@@ -60,19 +68,19 @@ impl Walk<'_> {
                         Err(no_number(&walked, table))
                     };
                 }
-                (Shape::Object(inner) | Shape::Law(inner, _), Some(_)) => table = inner,
-                (Shape::ByBar(inner), Some(Step::Key(bar))) => {
+                (FieldShape::Object(inner) | FieldShape::Law(inner, _), Some(_)) => table = inner,
+                (FieldShape::ByBar(inner), Some(PathStep::Key(bar))) => {
                     node = element_by_key(node, bar, &mut walked)?;
                     steps.next();
                     table = inner;
                 }
-                (Shape::List { of, .. }, Some(step)) => {
+                (FieldShape::List { of, .. }, Some(step)) => {
                     node = element(node, step, &mut walked)?;
                     steps.next();
                     table =
                         kind(of, |key| node.is_some_and(|node| member(node, key).is_some())).unwrap_or(table);
                 }
-                (Shape::Between, Some(step)) => {
+                (FieldShape::Between, Some(step)) => {
                     node = element(node, step, &mut walked)?;
                     steps.next();
                     table = &crate::scene::format::PLACE;
@@ -85,13 +93,15 @@ impl Walk<'_> {
 
 /// A coordinate of a point of a table that is written out.
 fn coordinate<'a>(
-    points: Option<&Node>,
-    steps: &mut impl Iterator<Item = Step<'a>>,
+    points: Option<&Located>,
+    steps: &mut impl Iterator<Item = PathStep<'a>>,
     walked: &mut String,
 ) -> Result<&'static str, (String, String)> {
-    let path: Vec<Step> = steps.collect();
-    let is_list = |node: &Node| matches!(node.value, Value::List(_));
-    if let ([point @ Step::Index(_), Step::Index(0 | 1)], true) = (&path[..], points.is_some_and(is_list)) {
+    let path: Vec<PathStep> = steps.collect();
+    let is_list = |node: &Located| matches!(node.value, Value::List(_));
+    if let ([point @ PathStep::Index(_), PathStep::Index(0 | 1)], true) =
+        (&path[..], points.is_some_and(is_list))
+    {
         element(points, point, walked)?;
         return Ok("");
     }
@@ -99,18 +109,18 @@ fn coordinate<'a>(
     Err((format!("{walked} is a table, not a number"), hint))
 }
 
-fn no_number(walked: &str, table: &Table) -> (String, String) {
+fn no_number(walked: &str, table: &KeyTable) -> (String, String) {
     (format!("{walked} is {}, not a number", table.title), format!("go on with one of {}", table.keys()))
 }
 
 /// What is wrong with a path that ends too early or too late at a field.
 fn example(walked: &str, field: &Field) -> (String, String) {
     let hint = match &field.shape {
-        Shape::Pair(_) | Shape::LawPair(_) => format!("{walked}[0] or {walked}[1]"),
-        Shape::Object(table) | Shape::Law(table, _) | Shape::ByBar(table) => {
+        FieldShape::Pair(_) | FieldShape::LawPair(_) => format!("{walked}[0] or {walked}[1]"),
+        FieldShape::Object(table) | FieldShape::Law(table, _) | FieldShape::ByBar(table) => {
             format!("go on, in the end with one of {}", table.keys())
         }
-        Shape::List { of, .. } => {
+        FieldShape::List { of, .. } => {
             format!("go on with the name of one, then one of {}", of.first().unwrap_or(&&UNIFORM_BAR).keys())
         }
         shape => format!("it {}", shape.allowed()),
@@ -120,38 +130,38 @@ fn example(walked: &str, field: &Field) -> (String, String) {
 
 /// An element of a list by name or index.
 fn element<'a>(
-    node: Option<&'a Node>,
-    step: &Step,
+    node: Option<&'a Located>,
+    step: &PathStep,
     walked: &mut String,
-) -> Result<Option<&'a Node>, (String, String)> {
+) -> Result<Option<&'a Located>, (String, String)> {
     let Some(Value::List(nodes)) = node.map(|node| &node.value) else { return Ok(None) };
     let names: Vec<&str> = nodes.iter().filter_map(name).collect();
     let found = match step {
-        Step::Index(index) => nodes.get(*index),
-        Step::Key(key) => nodes.iter().find(|node| name(node) == Some(key)),
+        PathStep::Index(index) => nodes.get(*index),
+        PathStep::Key(key) => nodes.iter().find(|node| name(node) == Some(key)),
     };
     if found.is_none() {
         let (what, hint) = match step {
-            Step::Index(index) => {
+            PathStep::Index(index) => {
                 (format!("[{index}]"), format!("indices count from 0; there are {}", nodes.len()))
             }
-            Step::Key(key) => (format!(" `{key}`"), hint(key, &names)),
+            PathStep::Key(key) => (format!(" `{key}`"), hint(key, &names)),
         };
         return Err((format!("{walked} has no{what}"), hint));
     }
     match step {
-        Step::Index(index) => push_index(walked, *index),
-        Step::Key(key) => push_key(walked, key),
+        PathStep::Index(index) => push_index(walked, *index),
+        PathStep::Key(key) => push_key(walked, key),
     }
     Ok(found)
 }
 
 /// The start of a bar.
 fn element_by_key<'a>(
-    node: Option<&'a Node>,
+    node: Option<&'a Located>,
     bar: &str,
     walked: &mut String,
-) -> Result<Option<&'a Node>, (String, String)> {
+) -> Result<Option<&'a Located>, (String, String)> {
     let Some(Value::Object(members)) = node.map(|node| &node.value) else { return Ok(None) };
     let Some(found) = members.iter().find(|member| member.key == bar) else {
         let known: Vec<&str> = members.iter().map(|member| member.key.as_str()).collect();

@@ -15,8 +15,8 @@ use crate::arithmetic::sincos;
 use crate::arithmetic::sum::two_sum;
 use crate::dynamics::State;
 use crate::dynamics::looped::NEAR;
-use crate::dynamics::natural::Reduced;
-use crate::dynamics::natural::keeper::{CLOSE, Keeper};
+use crate::dynamics::natural::ReducedMatrices;
+use crate::dynamics::natural::keeper::{CLOSE, NaturalKeeper};
 
 /// Turns up to this \[rad\] are their sines' series.
 const SMALL: f64 = 1e-4;
@@ -25,29 +25,29 @@ const MOST: usize = room(4);
 
 /// Up to four, eight or sixteen bodies.
 #[derive(Clone, Debug)]
-pub enum Natural {
-    Few(Box<Bench<1>>),
-    Several(Box<Bench<2>>),
-    Many(Box<Bench<4>>),
+pub enum NaturalProjection {
+    Few(Box<NaturalScratch<1>>),
+    Several(Box<NaturalScratch<2>>),
+    Many(Box<NaturalScratch<4>>),
 }
 
 /// Constants, and elements and rates of the state faced last.
 #[derive(Clone, Debug)]
-pub struct Bench<const B: usize> {
-    keeper: Keeper<B>,
+pub struct NaturalScratch<const B: usize> {
+    keeper: NaturalKeeper<B>,
     z: [Row<B>; 2],
     rate: Row<B>,
     /// What rates count as at least \[rad/s\].
     unit: f64,
 }
 
-impl Natural {
+impl NaturalProjection {
     /// Of a form's matrices, with the mechanism's unit of rates \[rad/s\].
-    pub fn new(reduced: &Reduced, unit: f64) -> Self {
+    pub fn new(reduced: &ReducedMatrices, unit: f64) -> Self {
         match reduced.free.len() {
-            0..=4 => Self::Few(Box::new(Bench::new(reduced, unit))),
-            5..=8 => Self::Several(Box::new(Bench::new(reduced, unit))),
-            _ => Self::Many(Box::new(Bench::new(reduced, unit))),
+            0..=4 => Self::Few(Box::new(NaturalScratch::new(reduced, unit))),
+            5..=8 => Self::Several(Box::new(NaturalScratch::new(reduced, unit))),
+            _ => Self::Many(Box::new(NaturalScratch::new(reduced, unit))),
         }
     }
 
@@ -65,17 +65,17 @@ impl Natural {
     /// the angle form knows what to leave out.
     pub fn land(&mut self, state: &mut State, z: &mut [Complex<f64>]) -> Option<[f64; 2]> {
         match self {
-            Self::Few(bench) => lanes::run(Land { bench, state, z }, false),
-            Self::Several(bench) => lanes::run(Land { bench, state, z }, false),
-            Self::Many(bench) => lanes::run(Land { bench, state, z }, false),
+            Self::Few(bench) => lanes::run(ProjectNatural { bench, state, z }, false),
+            Self::Several(bench) => lanes::run(ProjectNatural { bench, state, z }, false),
+            Self::Many(bench) => lanes::run(ProjectNatural { bench, state, z }, false),
         }
     }
 }
 
-impl<const B: usize> Bench<B> {
-    fn new(reduced: &Reduced, unit: f64) -> Self {
+impl<const B: usize> NaturalScratch<B> {
+    fn new(reduced: &ReducedMatrices, unit: f64) -> Self {
         let zero = [[[0.0; 4]; B]; 2];
-        Self { keeper: Keeper::new(reduced), z: zero, rate: [[0.0; 4]; B], unit }
+        Self { keeper: NaturalKeeper::new(reduced), z: zero, rate: [[0.0; 4]; B], unit }
     }
 }
 
@@ -85,7 +85,7 @@ fn vector<const B: usize>(x: &[Row<B>; 2], i: usize) -> Complex<f64> {
 }
 
 struct PositionStage<'a, const B: usize> {
-    bench: &'a mut Bench<B>,
+    bench: &'a mut NaturalScratch<B>,
     state: &'a State,
     z: &'a mut [Complex<f64>],
 }
@@ -95,7 +95,7 @@ impl<const B: usize> Code for PositionStage<'_, B> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { bench: Bench { z, rate, .. }, state, z: elements } = self;
+        let Self { bench: NaturalScratch { z, rate, .. }, state, z: elements } = self;
         let n = elements.len();
         let (mut angle, mut rest) = ([[0.0; 4]; B], [[0.0; 4]; B]);
         angle.as_flattened_mut()[..n].copy_from_slice(&state.y[..n]);
@@ -112,18 +112,18 @@ impl<const B: usize> Code for PositionStage<'_, B> {
     }
 }
 
-struct Land<'a, const B: usize> {
-    bench: &'a mut Bench<B>,
+struct ProjectNatural<'a, const B: usize> {
+    bench: &'a mut NaturalScratch<B>,
     state: &'a mut State,
     z: &'a mut [Complex<f64>],
 }
 
-impl<const B: usize> Code for Land<'_, B> {
+impl<const B: usize> Code for ProjectNatural<'_, B> {
     type Output = Option<[f64; 2]>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<[f64; 2]> {
-        let Self { bench: Bench { keeper, z, rate, unit }, state, z: elements } = self;
+        let Self { bench: NaturalScratch { keeper, z, rate, unit }, state, z: elements } = self;
         let n = elements.len();
         let moved = keeper.project_back::<L>(z);
         // What is not a number is not sound.

@@ -1,16 +1,16 @@
 //! What every tableau must fulfil.
 
 use super::dense::expand;
-use super::{NESTED, Pair, Row};
+use super::{EmbeddedPair, NESTED, Row};
 
-pub fn rows_sum_to_nodes<P: Pair>(tolerance: f64) {
+pub fn rows_sum_to_nodes<P: EmbeddedPair>(tolerance: f64) {
     for (row, c) in P::A.iter().zip(&P::C[1..]) {
         assert!((row.iter().map(|entry| entry.1).sum::<f64>() - c).abs() < tolerance);
     }
 }
 
 /// Σ b c^(k-1) = 1/k.
-pub fn quadrature<P: Pair>(order: i32, tolerance: f64) {
+pub fn quadrature<P: EmbeddedPair>(order: i32, tolerance: f64) {
     for k in 1..=order {
         let sum: f64 = P::B.iter().map(|&(i, b)| b * P::C[i].powi(k - 1)).sum();
         assert!((sum - 1.0 / f64::from(k)).abs() < tolerance, "order {k}: {sum}");
@@ -18,7 +18,7 @@ pub fn quadrature<P: Pair>(order: i32, tolerance: f64) {
 }
 
 /// y' = t^(m-1) is interpolated exactly up to m = order.
-pub fn interpolation<P: Pair>(order: i32, tolerance: f64) {
+pub fn interpolation<P: EmbeddedPair>(order: i32, tolerance: f64) {
     for m in 1..=order {
         let (t, h) = (0.3f64, 0.7);
         let rate = |t: f64| t.powi(m - 1);

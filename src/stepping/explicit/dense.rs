@@ -1,13 +1,13 @@
 //! The dense output of a step, for the search for events in it.
 
 use super::super::Statistics;
-use super::super::event::{Dense, Search, Stride};
-use super::{Explicit, Pair};
+use super::super::event::{Dense, SearchScratch, Stride};
+use super::{EmbeddedPair, Explicit};
 use crate::dynamics::{OdeSystem, State};
 
 /// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far,
 /// at both ends of the step.
-pub(super) fn highest<P: Pair>() -> f64 {
+pub(super) fn highest<P: EmbeddedPair>() -> f64 {
     let (low, high) = (P::DEGREE / 2, P::DEGREE.div_ceil(2));
     let [s, t] = [low, high].map(|power| power as f64 / P::DEGREE as f64);
     libm::pow(s, low as f64) * libm::pow(t, high as f64)
@@ -30,7 +30,7 @@ pub(super) fn expand(nested: &[f64], powers: &mut [f64]) {
     }
 }
 
-impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
+impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
     fn dense(
         &mut self,
         field: &mut F,
@@ -67,7 +67,7 @@ impl<P: Pair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
         (&self.next, &self.k[P::STAGES * n..(P::STAGES + 1) * n])
     }
 
-    fn search(&mut self) -> &mut Search {
+    fn search(&mut self) -> &mut SearchScratch {
         &mut self.search
     }
 }

@@ -3,7 +3,7 @@
 mod scratch;
 use super::newton::Newton;
 use super::sums::{combine, largest, shifted, sum_of};
-use super::tableau::{Tableau, lane};
+use super::tableau::{GaussTableau, lane};
 use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, NEARLY, NEWTON_STEPS, SETTLED};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::eight::{LANES, Octet};
@@ -14,7 +14,7 @@ use crate::stepping::{Statistics, StepError};
 
 /// Scratch space of d unknowns.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
+pub(super) struct GaussScratch {
     /// The step the next two were formed for \[s\].
     pub step: f64,
     /// h b_j, each rounded once; zero in lanes without a stage \[s\].
@@ -51,9 +51,9 @@ const NOISE: f64 = 1e-9;
 const MOST_ITERATIONS: usize = 60;
 
 /// One step about to be taken.
-struct Step<'a> {
-    tableau: &'a Tableau,
-    scratch: &'a mut Scratch,
+struct GaussStep<'a> {
+    tableau: &'a GaussTableau,
+    scratch: &'a mut GaussScratch,
     /// Evaluations after the last iteration that carry what doubles leave out.
     exact: u32,
     newton: &'a mut Option<Box<Newton>>,
@@ -72,7 +72,7 @@ pub(super) fn step<F: OdeSystem + ?Sized>(
     statistics.check(gauss.label(), state.time.hi, gauss.scratch.step)?;
     let Gauss { tableau, scratch, exact, newton, slow, portable, .. } = &mut *gauss;
     let exact = if problem.has_exact_rates() { *exact } else { 0 };
-    let mut step = Step { tableau, scratch, exact, newton, slow: *slow, angles: problem.angles() };
+    let mut step = GaussStep { tableau, scratch, exact, newton, slow: *slow, angles: problem.angles() };
     lanes::run(Take { step: &mut step, problem: &mut Of(problem), state, statistics }, *portable);
     if gauss.scratch.newton_left == NEWTON_STEPS {
         gauss.follow(problem, state)?;
@@ -85,7 +85,7 @@ pub(super) fn step<F: OdeSystem + ?Sized>(
 }
 
 /// What a step asks of a field.
-trait Rates {
+trait StageRates {
     fn rates(&mut self, points: &mut Points);
     fn exact_rates(&mut self, points: &mut Points);
     fn jacobian(&mut self, t: Time, y: &[f64], jacobian: &mut [f64]) -> bool;
@@ -94,7 +94,7 @@ trait Rates {
 /// A field behind a table of functions, so that the steps are compiled once and not with every field.
 struct Of<'a, F: ?Sized>(&'a mut F);
 
-impl<F: OdeSystem + ?Sized> Rates for Of<'_, F> {
+impl<F: OdeSystem + ?Sized> StageRates for Of<'_, F> {
     fn rates(&mut self, points: &mut Points) {
         self.0.rates(points);
     }
@@ -110,8 +110,8 @@ impl<F: OdeSystem + ?Sized> Rates for Of<'_, F> {
 
 /// One step but its acceptance.
 struct Take<'a, 'b> {
-    step: &'a mut Step<'b>,
-    problem: &'a mut dyn Rates,
+    step: &'a mut GaussStep<'b>,
+    problem: &'a mut dyn StageRates,
     state: &'a State,
     statistics: &'a mut Statistics,
 }
@@ -125,10 +125,10 @@ impl Code for Take<'_, '_> {
     }
 }
 
-impl Step<'_> {
+impl GaussStep<'_> {
     /// All of one step but its acceptance.
     #[inline(always)]
-    fn take<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
+    fn take<L: Lanes>(&mut self, problem: &mut dyn StageRates, state: &State, statistics: &mut Statistics) {
         self.predict::<L>(state);
         // Beside the increments there is a number where the last step was made by Newton's method.
         let (known, all) = (state.memory.len(), self.tableau.nodes.len() * state.y.len() + 1);
@@ -193,7 +193,7 @@ impl Step<'_> {
     #[inline(always)]
     fn iteration<L: Lanes>(
         &mut self,
-        problem: &mut dyn Rates,
+        problem: &mut dyn StageRates,
         state: &State,
         statistics: &mut Statistics,
     ) -> bool {
@@ -231,7 +231,7 @@ impl Step<'_> {
     /// their changes fall no further.  A rest of the iteration would have the direction of time in it, and
     /// drift.
     #[inline(always)]
-    fn refine<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
+    fn refine<L: Lanes>(&mut self, problem: &mut dyn StageRates, state: &State, statistics: &mut Statistics) {
         self.restage_exactly::<L>(state);
         self.scratch.least.fill(f64::INFINITY);
         let mut idle = 0;
@@ -252,7 +252,12 @@ impl Step<'_> {
     }
 
     /// The Jacobian at the middle of the predicted step and its factors; false where the field has none.
-    fn differentiate(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) -> bool {
+    fn differentiate(
+        &mut self,
+        problem: &mut dyn StageRates,
+        state: &State,
+        statistics: &mut Statistics,
+    ) -> bool {
         self.predict::<Portable>(state);
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         let scratch = &mut *self.scratch;
@@ -277,7 +282,7 @@ impl Step<'_> {
     /// All of a step but its acceptance by Newton's method, from the predicted stages and the factors in
     /// place.
     #[inline(always)]
-    fn solve<L: Lanes>(&mut self, problem: &mut dyn Rates, state: &State, statistics: &mut Statistics) {
+    fn solve<L: Lanes>(&mut self, problem: &mut dyn StageRates, state: &State, statistics: &mut Statistics) {
         let (s, d) = (self.tableau.nodes.len(), state.y.len());
         let last = match state.memory.split_first() {
             Some((&step, last)) if step == self.scratch.step && last.len() >= s * d => &last[..s * d],
@@ -308,7 +313,7 @@ impl Step<'_> {
     #[inline(always)]
     fn iterate<L: Lanes, const LOW: bool>(
         &mut self,
-        problem: &mut dyn Rates,
+        problem: &mut dyn StageRates,
         state: &State,
         statistics: &mut Statistics,
         most: usize,
@@ -370,7 +375,7 @@ impl Step<'_> {
     /// What L leaves out.
     #[inline(always)]
     fn multiply_low<L: Lanes>(&mut self) {
-        let Scratch { span, points, increment, increment_low, .. } = &mut *self.scratch;
+        let GaussScratch { span, points, increment, increment_low, .. } = &mut *self.scratch;
         let span = span.halves::<L>();
         for (k, left) in increment_low.iter_mut().enumerate() {
             let (rate, low, product) =

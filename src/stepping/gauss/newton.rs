@@ -16,15 +16,15 @@
 //! of symplectic implicit Runge–Kutta schemes with simplified Newton iterations*, Numer. Algorithms 78
 //! (2018).
 
-use super::tableau::{Tableau, lane};
+use super::tableau::{GaussTableau, lane};
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::Octet;
-use crate::stepping::linear::{Entry, Factors};
+use crate::stepping::linear::{LuFactors, MatrixEntry};
 use nalgebra::{DMatrix, linalg::Schur};
 
 /// A mode of A; of a pair of complex ones that above the real axis.
 #[derive(Clone, Debug)]
-struct Mode {
+struct GaussMode {
     value: Complex<f64>,
     right: Vec<Complex<f64>>,
     left: Vec<Complex<f64>>,
@@ -36,25 +36,25 @@ struct Mode {
 /// it.
 #[derive(Clone, Debug)]
 pub(super) struct Newton {
-    modes: Vec<Mode>,
+    modes: Vec<GaussMode>,
     /// The collocation polynomial of one step carried on over the next, from increments to increments (s ×
     /// s).
     forecast: Vec<f64>,
     /// J (d × d).
     pub jacobian: Vec<f64>,
-    factors: Vec<Factors<Complex<f64>>>,
+    factors: Vec<LuFactors<Complex<f64>>>,
     wide: Vec<Complex<f64>>,
     /// R, stage by stage, then the corrections of L (s × d).
     pub correction: Vec<f64>,
 }
 
 /// The largest |mu|: iterations contract by about h rho times that.
-pub(super) fn largest_mode(tableau: &Tableau) -> f64 {
+pub(super) fn largest_mode(tableau: &GaussTableau) -> f64 {
     values(tableau).iter().fold(0.0, |most: f64, value| most.max(value.norm_squared().sqrt()))
 }
 
 /// The eigenvalues of A on and above the real axis.
-fn values(tableau: &Tableau) -> Vec<Complex<f64>> {
+fn values(tableau: &GaussTableau) -> Vec<Complex<f64>> {
     let s = tableau.nodes.len();
     let a = DMatrix::from_fn(s, s, |i, j| tableau.entry(i, j));
     let values = Schur::try_new(a, f64::EPSILON, 1000).map(|schur| schur.complex_eigenvalues());
@@ -63,7 +63,7 @@ fn values(tableau: &Tableau) -> Vec<Complex<f64>> {
 }
 
 impl Newton {
-    pub fn new(tableau: &Tableau) -> Self {
+    pub fn new(tableau: &GaussTableau) -> Self {
         let s = tableau.nodes.len();
         let a: Vec<f64> = (0..s * s).map(|at| tableau.entry(at / s, at % s)).collect();
         let transposed: Vec<f64> = (0..s * s).map(|at| a[at % s * s + at / s]).collect();
@@ -72,7 +72,7 @@ impl Newton {
             // round.
             let off = value.times(1.0 + 1e-7);
             let vector = |matrix: &[f64]| {
-                let mut factors = Factors::default();
+                let mut factors = LuFactors::default();
                 factors.of_shifted(off.reciprocal(), matrix, s);
                 let mut x = vec![Complex::new(1.0, 0.5); s];
                 for _ in 0..4 {
@@ -85,11 +85,11 @@ impl Newton {
             let (right, mut left) = (vector(&a), vector(&transposed));
             let one = right.iter().zip(&left).fold(Complex::ZERO, |sum: Complex<f64>, (&r, &l)| sum + r * l);
             left.iter_mut().for_each(|l| *l = *l * one.reciprocal());
-            Mode { value, right, left, weight: if value.im > 1e-9 { 2.0 } else { 1.0 } }
+            GaussMode { value, right, left, weight: if value.im > 1e-9 { 2.0 } else { 1.0 } }
         });
-        let modes: Vec<Mode> = modes.collect();
+        let modes: Vec<GaussMode> = modes.collect();
         Self {
-            factors: vec![Factors::default(); modes.len()],
+            factors: vec![LuFactors::default(); modes.len()],
             modes,
             forecast: (0..s * s).map(|at| tableau.carried(at / s, at % s)).collect(),
             jacobian: Vec::new(),
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn the_modes_make_up_the_matrix() {
         for s in 2..=8 {
-            let tableau = Tableau::new(s);
+            let tableau = GaussTableau::new(s);
             let newton = Newton::new(&tableau);
             assert_eq!(newton.modes.len(), s.div_ceil(2));
             for i in 0..s {
@@ -173,6 +173,6 @@ mod tests {
             let largest = largest_mode(&tableau);
             assert!(largest < 0.2887 && largest > 0.05, "s = {s}: {largest}");
         }
-        assert!((largest_mode(&Tableau::new(2)) - 1.0 / 12.0_f64.sqrt()).abs() < 1e-12);
+        assert!((largest_mode(&GaussTableau::new(2)) - 1.0 / 12.0_f64.sqrt()).abs() < 1e-12);
     }
 }

@@ -30,7 +30,7 @@ use crate::arithmetic::{DoubleDouble, Scalar};
 
 /// Nodes, weights and matrices of one Gauss method of s stages.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Tableau {
+pub(super) struct GaussTableau {
     /// c (s), rising, in (0, 1).
     pub nodes: Vec<DoubleDouble>,
     /// b (s), positive.
@@ -49,7 +49,7 @@ pub(super) fn lane(i: usize, s: usize) -> usize {
     if 2 * i < s { i } else { LANES / 2 + s - 1 - i }
 }
 
-impl Tableau {
+impl GaussTableau {
     /// The method of `stages` stages.
     pub fn new(stages: usize) -> Self {
         let (nodes, weights) = quadrature(stages);
@@ -157,14 +157,14 @@ mod tests {
         DoubleDouble::ONE / DoubleDouble::of(k as f64)
     }
 
-    fn a(tableau: &Tableau, i: usize, j: usize) -> DoubleDouble {
+    fn a(tableau: &GaussTableau, i: usize, j: usize) -> DoubleDouble {
         integral(&tableau.nodes, &tableau.weights, j, DoubleDouble::ZERO, tableau.nodes[i])
     }
 
     #[test]
     fn weights_integrate_every_power_up_to_twice_the_stages() {
         for s in 2..=8 {
-            let tableau = Tableau::new(s);
+            let tableau = GaussTableau::new(s);
             let quadrature = |k: usize| {
                 tableau
                     .nodes
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn stages_integrate_every_power_up_to_the_stages() {
         for s in 2..=8 {
-            let tableau = Tableau::new(s);
+            let tableau = GaussTableau::new(s);
             for i in 0..s {
                 for k in 1..=s {
                     let sum = (0..s).fold(DoubleDouble::ZERO, |sum, j| {
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn the_exact_coefficients_are_symplectic() {
         for s in 2..=8 {
-            let tableau = Tableau::new(s);
+            let tableau = GaussTableau::new(s);
             let b = &tableau.weights;
             for i in 0..s {
                 for j in 0..s {
@@ -211,7 +211,7 @@ mod tests {
     }
 
     /// sigma as the stored halves make it, exactly.
-    fn stored(tableau: &Tableau, s: usize, i: usize, j: usize) -> DoubleDouble {
+    fn stored(tableau: &GaussTableau, s: usize, i: usize, j: usize) -> DoubleDouble {
         let (row, column) = (lane(i, s) % 4, lane(j, s) % 4);
         let sign = |mirrored: bool| if mirrored { -1.0 } else { 1.0 };
         let (even, odd) = (
@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn the_stored_coefficients_are_symplectic_and_symmetric_exactly() {
         for s in 2..=8 {
-            let tableau = Tableau::new(s);
+            let tableau = GaussTableau::new(s);
             for i in 0..s {
                 for j in 0..s {
                     let (sigma, mirror) =
@@ -251,7 +251,7 @@ mod tests {
     #[test]
     fn the_forecast_carries_polynomials_on() {
         for s in 2..=8 {
-            let tableau = Tableau::new(s);
+            let tableau = GaussTableau::new(s);
             for i in 0..s {
                 for k in 1..=s {
                     let sum = (0..s).fold(0.0, |sum, j| {
@@ -273,7 +273,7 @@ mod tests {
     #[test]
     fn two_stages_are_the_textbook_ones() {
         // Hammer and Hollingsworth (1955): c = 1/2 ∓ √3/6, a_12 = 1/4 - √3/6.
-        let (tableau, root) = (Tableau::new(2), DoubleDouble::of(3.0).sqrt() / DoubleDouble::of(6.0));
+        let (tableau, root) = (GaussTableau::new(2), DoubleDouble::of(3.0).sqrt() / DoubleDouble::of(6.0));
         assert!((tableau.nodes[0] - (DoubleDouble::of(0.5) - root)).hi.abs() < TINY);
         assert!((a(&tableau, 0, 1) - (DoubleDouble::of(0.25) - root)).hi.abs() < TINY);
     }
@@ -293,7 +293,7 @@ mod tests {
 
     /// The state at time 1 after `steps` steps, all in double-double.
     fn simulate(tree: &Tree, stages: usize, steps: usize) -> [DoubleDouble; 4] {
-        let tableau = Tableau::new(stages);
+        let tableau = GaussTableau::new(stages);
         let h = reciprocal(steps);
         let matrix: Vec<DoubleDouble> =
             (0..stages * stages).map(|k| h * a(&tableau, k / stages, k % stages)).collect();

@@ -1,9 +1,9 @@
 //! The dense output of a step, for the search for events in it.
 
 use super::super::Statistics;
-use super::super::event::{Dense, Search, Stride};
+use super::super::event::{Dense, SearchScratch, Stride};
 use super::Radau;
-use super::newton::Solved;
+use super::newton::NewtonEnd;
 use crate::dynamics::{OdeSystem, State};
 
 impl<F: OdeSystem + ?Sized> Stride<F> for Radau {
@@ -32,7 +32,7 @@ impl<F: OdeSystem + ?Sized> Stride<F> for Radau {
         self.factor(h, state.y.len());
         let mut contraction = 1.0;
         let has_converged =
-            matches!(self.solve(field, state, h, &mut contraction, statistics), Solved::Converged(..));
+            matches!(self.solve(field, state, h, &mut contraction, statistics), NewtonEnd::Converged(..));
         self.close(state);
         field.rhs(state.time + h, &self.work.next, &mut self.work.next_rate);
         statistics.evaluations += 1;
@@ -43,7 +43,7 @@ impl<F: OdeSystem + ?Sized> Stride<F> for Radau {
         (&self.work.next, &self.work.next_rate)
     }
 
-    fn search(&mut self) -> &mut Search {
+    fn search(&mut self) -> &mut SearchScratch {
         &mut self.work.search
     }
 }

@@ -1,17 +1,17 @@
 //! The stages of a step by simplified Newton: Jacobian, factors, starting values, iteration.
 
-use super::{KEPT, Radau, Work};
+use super::{KEPT, Radau, RadauScratch};
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::{fast_two_sum, two_sum};
 use crate::dynamics::{OdeSystem, State};
 use crate::stepping::Statistics;
-use crate::stepping::linear::Factors;
+use crate::stepping::linear::LuFactors;
 
 /// Contraction from which the iteration counts as diverging.
 const DIVERGING: f64 = 0.99;
 
 /// How an iteration ended.
-pub enum Solved {
+pub enum NewtonEnd {
     /// Its contraction, and the iterations taken.
     Converged(f64, usize),
     /// It would take too long: a factor for the step.
@@ -43,7 +43,7 @@ impl Radau {
     pub(super) fn factor(&mut self, h: f64, dimension: usize) {
         let Self { tableau, work, .. } = self;
         work.real.of_shifted(h * tableau.real.value, &work.jacobian, dimension);
-        work.pairs.resize_with(tableau.pairs.len(), Factors::default);
+        work.pairs.resize_with(tableau.pairs.len(), LuFactors::default);
         for (factors, mode) in work.pairs.iter_mut().zip(tableau.pairs) {
             factors.of_shifted(mode.value.times(h), &work.jacobian, dimension);
         }
@@ -81,7 +81,7 @@ impl Radau {
         h: f64,
         contraction: &mut f64,
         statistics: &mut Statistics,
-    ) -> Solved {
+    ) -> NewtonEnd {
         let (s, d) = (self.tableau.stages(), state.y.len());
         let most = if s == 3 { 7 } else { 12 };
         let relative = self.tolerance.relative;
@@ -99,7 +99,7 @@ impl Radau {
             }
             let size = (sum / (s * d) as f64).sqrt();
             if !size.is_finite() {
-                return Solved::NotFinite;
+                return NewtonEnd::NotFinite;
             }
             if sweep > 1 {
                 let ratio = size / before;
@@ -108,26 +108,26 @@ impl Radau {
                 let converges = theta < DIVERGING;
                 if !converges {
                     return if size <= enough * 1e-2 {
-                        Solved::Converged(theta, sweep)
+                        NewtonEnd::Converged(theta, sweep)
                     } else {
-                        Solved::Slow(0.5)
+                        NewtonEnd::Slow(0.5)
                     };
                 }
                 *contraction = theta / (1.0 - theta);
             }
             if *contraction * size <= enough {
-                return Solved::Converged(theta, sweep);
+                return NewtonEnd::Converged(theta, sweep);
             }
             if sweep > 1 {
                 let left = most as f64 - 1.0 - sweep as f64;
                 let forecast = *contraction * size * libm::pow(theta, left) / enough;
                 if forecast >= 1.0 {
-                    return Solved::Slow(0.8 * libm::pow(forecast.clamp(1e-4, 20.0), -1.0 / (4.0 + left)));
+                    return NewtonEnd::Slow(0.8 * libm::pow(forecast.clamp(1e-4, 20.0), -1.0 / (4.0 + left)));
                 }
             }
             before = size.max(f64::EPSILON);
         }
-        Solved::Slow(0.5)
+        NewtonEnd::Slow(0.5)
     }
 
     /// h A F - Z into `change`.
@@ -159,7 +159,7 @@ impl Radau {
     /// The residual in `change` becomes the correction.
     fn correct(&mut self, d: usize) {
         let Self { tableau, work, .. } = self;
-        let Work { change, rates: corrections, mode, wide, real, pairs, .. } = work;
+        let RadauScratch { change, rates: corrections, mode, wide, real, pairs, .. } = work;
         // The rates have served; their room takes the sum over the modes.
         for k in 0..d {
             mode[k] =

@@ -14,7 +14,7 @@ use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 
 /// A mode of A: its value and vectors.
 #[derive(Debug)]
-pub(super) struct Mode<T: 'static> {
+pub(super) struct RadauMode<T: 'static> {
     /// mu.
     pub value: T,
     /// r (s), A r = mu r.
@@ -25,15 +25,15 @@ pub(super) struct Mode<T: 'static> {
 
 /// One Radau IIA method of s stages.
 #[derive(Clone, Debug)]
-pub(super) struct Tableau {
+pub(super) struct RadauTableau {
     /// c (s), rising; the last is one.
     pub nodes: &'static [DoubleDouble],
     /// a, row by row (s × s).
     pub a: Vec<f64>,
     /// The real mode.
-    pub real: &'static Mode<f64>,
+    pub real: &'static RadauMode<f64>,
     /// One of each pair of complex modes.
-    pub pairs: &'static [Mode<Complex<f64>>],
+    pub pairs: &'static [RadauMode<Complex<f64>>],
     /// e (s).
     pub estimate: Vec<f64>,
     /// 1/Π_(k≠j) (x_j - x_k) of the nodes 0, c (s + 1).
@@ -55,13 +55,13 @@ const NODES_THREE: [DoubleDouble; 3] = [
     DoubleDouble { hi: 1.0, lo: 0.0 },
 ];
 
-const REAL_THREE: Mode<f64> = Mode {
+const REAL_THREE: RadauMode<f64> = RadauMode {
     value: 0.27488882959567734,
     right: &[0.09443876248897524, 0.2502131229653333, 1.0],
     left: &[4.178718591551905, 0.32768282076106237, 0.5233764454994495],
 };
 
-const PAIRS_THREE: [Mode<Complex<f64>>; 1] = [Mode {
+const PAIRS_THREE: [RadauMode<Complex<f64>>; 1] = [RadauMode {
     value: z(0.16255558520216132, 0.1849493244071408),
     right: &[
         z(-0.1412552950209542, -0.030029194105147424),
@@ -83,7 +83,7 @@ const NODES_FIVE: [DoubleDouble; 5] = [
     DoubleDouble { hi: 1.0, lo: 0.0 },
 ];
 
-const REAL_FIVE: Mode<f64> = Mode {
+const REAL_FIVE: RadauMode<f64> = RadauMode {
     value: 0.15906584442746913,
     right: &[0.013576867344947943, 0.0016179004017190875, 0.07915785334744721, 0.41225608268046143, 1.0],
     left: &[
@@ -95,8 +95,8 @@ const REAL_FIVE: Mode<f64> = Mode {
     ],
 };
 
-const PAIRS_FIVE: [Mode<Complex<f64>>; 2] = [
-    Mode {
+const PAIRS_FIVE: [RadauMode<Complex<f64>>; 2] = [
+    RadauMode {
         value: z(0.1331790770182996, 0.07499451183581853),
         right: &[
             z(-0.011478515255229515, -0.01401985889287541),
@@ -113,7 +113,7 @@ const PAIRS_FIVE: [Mode<Complex<f64>>; 2] = [
             z(0.2656140579191533, 0.5237317439676688),
         ],
     },
-    Mode {
+    RadauMode {
         value: z(0.06506577854574362, 0.11646852774031707),
         right: &[
             z(-0.010242047817908826, 0.04767387729029572),
@@ -132,7 +132,7 @@ const PAIRS_FIVE: [Mode<Complex<f64>>; 2] = [
     },
 ];
 
-impl Tableau {
+impl RadauTableau {
     /// The method of three or five stages; `None` for any other number.
     pub fn new(stages: usize) -> Option<Self> {
         let (nodes, real, pairs): (&[DoubleDouble], _, &[_]) = match stages {
@@ -272,7 +272,7 @@ mod tests {
     #[test]
     fn the_last_stage_is_the_new_state_and_the_first_order_of_both_tables_is_the_published_one() {
         let root = 6.0_f64.sqrt();
-        let tableau = Tableau::new(3).expect("three stages");
+        let tableau = RadauTableau::new(3).expect("three stages");
         let published = [
             (88.0 - 7.0 * root) / 360.0,
             (296.0 - 169.0 * root) / 1800.0,
@@ -293,13 +293,13 @@ mod tests {
             tableau.estimate
         );
         assert!((tableau.real.value - 0.274_888_829_595_677_4).abs() < 1e-16);
-        assert!(Tableau::new(4).is_none());
+        assert!(RadauTableau::new(4).is_none());
     }
 
     #[test]
     fn the_modes_are_those_of_the_matrix() {
         for s in [3, 5] {
-            let tableau = Tableau::new(s).expect("a method");
+            let tableau = RadauTableau::new(s).expect("a method");
             let modes = std::iter::once((
                 z(tableau.real.value, 0.0),
                 widen(tableau.real.right),
@@ -326,7 +326,7 @@ mod tests {
     #[test]
     fn the_polynomial_goes_through_its_points_and_the_estimate_has_order_s() {
         for s in [3, 5] {
-            let tableau = Tableau::new(s).expect("a method");
+            let tableau = RadauTableau::new(s).expect("a method");
             let mut weights = vec![0.0; s];
             for power in 1..=s {
                 tableau.lagrange(1.7, &mut weights);

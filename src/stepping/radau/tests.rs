@@ -65,8 +65,8 @@ fn the_order_of_a_step_is_the_declared_one() {
 /// estimate sees no more.
 #[test]
 fn what_has_died_away_costs_nothing() {
-    struct Fast;
-    impl OdeSystem for Fast {
+    struct FastDecay;
+    impl OdeSystem for FastDecay {
         fn dimension(&self) -> usize {
             2
         }
@@ -88,9 +88,10 @@ fn what_has_died_away_costs_nothing() {
         let mut radau = Radau::new(stages, Tolerance { relative: 1e-8, absolute: 1e-8 }).expect("a method");
         let mut state = State { y: vec![1.0, 3.0], low: vec![0.0; 2], ..State::default() };
         let mut statistics = Statistics::default();
-        let reached = radau.advance(&mut Fast, &mut state, Time::of(2.0), &mut statistics, &mut |_, _| {
-            Ok(super::super::Seen::Kept)
-        });
+        let reached =
+            radau.advance(&mut FastDecay, &mut state, Time::of(2.0), &mut statistics, &mut |_, _| {
+                Ok(super::super::Seen::Kept)
+            });
         assert_eq!(reached, Ok(crate::stepping::Reached::Until));
         let exact = (-2.0_f64).exp();
         assert!(state.y.iter().all(|y| (y - exact).abs() < 1e-7), "{:?}", state.y);

@@ -17,7 +17,7 @@ const LOST: f64 = 1e-11;
 
 /// A matrix with a row and column per row in the loop, then its factors.
 #[derive(Clone, Debug, Default)]
-pub struct Matrix {
+pub struct LoopMatrix {
     /// Entries, row by row (R × R).
     pub entries: Vec<f64>,
     /// Reciprocal pivots (R), zero for rows that are lost.
@@ -30,7 +30,7 @@ pub struct Matrix {
     scratch: Vec<f64>,
 }
 
-impl Matrix {
+impl LoopMatrix {
     /// Room for rows of these scales.
     pub fn resize(&mut self, scales: &[f64]) {
         let rows = scales.len();
@@ -161,8 +161,8 @@ pub fn project(
 mod tests {
     use super::*;
 
-    fn matrix(entries: &[f64], rows: usize) -> Matrix {
-        let mut matrix = Matrix::default();
+    fn matrix(entries: &[f64], rows: usize) -> LoopMatrix {
+        let mut matrix = LoopMatrix::default();
         matrix.resize(&vec![4.0; rows]);
         matrix.entries.copy_from_slice(entries);
         matrix

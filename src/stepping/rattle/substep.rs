@@ -2,8 +2,8 @@
 
 mod coupling;
 mod velocity;
-use self::coupling::Couplings;
-use super::newton::{Matrix, project};
+use self::coupling::CouplingScratch;
+use super::newton::{LoopMatrix, project};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::natural::{Demand, Guide, Natural};
 use crate::dynamics::tree::size;
@@ -24,7 +24,7 @@ const KEPT: f64 = 1e-10;
 
 /// Why a substep failed, with the row or element at fault.
 #[derive(Clone, Copy, Debug)]
-pub enum Failure {
+pub enum SubstepFailure {
     /// A force.
     NotFinite(usize),
     /// No multipliers found.
@@ -35,7 +35,7 @@ pub enum Failure {
 
 /// A step's unknowns and scratch space, for n elements and R rows (one a body, then one a guide).
 #[derive(Clone, Debug, Default)]
-pub struct Work {
+pub struct SubstepScratch {
     /// z (n).
     z: Vec<Complex<DoubleDouble>>,
     /// z' (n).
@@ -66,13 +66,13 @@ pub struct Work {
     /// C_t of the guides at `here`.
     drive: Vec<f64>,
     /// What is left of gears and cams.
-    couplings: Couplings,
+    couplings: CouplingScratch,
     /// mu (R).
     multiplier: Vec<f64>,
     /// mu at the beginning of the iterations (R).
     guess: Vec<f64>,
     /// Newton matrix, then its factors.
-    newton: Matrix,
+    newton: LoopMatrix,
     /// S (R × R), then its factors, its reciprocal pivots, and what these are measured against.
     schur: Vec<f64>,
     pivot: Vec<f64>,
@@ -92,7 +92,7 @@ pub struct Work {
     scale: f64,
 }
 
-impl Work {
+impl SubstepScratch {
     /// Room for a mechanism.
     pub fn resize(&mut self, natural: &Natural) {
         let (n, rows, guides) = (natural.elements(), natural.rows(), natural.guides().len());
@@ -179,7 +179,7 @@ impl Work {
         natural: &Natural,
         h: f64,
         end: Time,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SubstepFailure> {
         self.predict::<N, GUIDED>(natural, h, end);
         self.solve_position::<N, GUIDED>(natural, h)?;
         self.kick::<N, true>(h);
@@ -250,11 +250,11 @@ impl Work {
         &mut self,
         natural: &Natural,
         h: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SubstepFailure> {
         self.guess.copy_from_slice(&self.multiplier);
         match self.iteration::<N, GUIDED, false>(natural, h) {
             Ok(()) => Ok(()),
-            Err(failure @ Failure::NotFinite(_)) => Err(failure),
+            Err(failure @ SubstepFailure::NotFinite(_)) => Err(failure),
             Err(_) => {
                 self.multiplier.copy_from_slice(&self.guess);
                 self.iteration::<N, GUIDED, true>(natural, h)
@@ -268,7 +268,7 @@ impl Work {
         &mut self,
         natural: &Natural,
         h: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SubstepFailure> {
         let push = 0.5 * h * h;
         let mut last = f64::INFINITY;
         for iteration in 0..SWEEPS {
@@ -281,7 +281,7 @@ impl Work {
                 self.newton_matrix::<N, GUIDED>(natural, push);
                 let is_sound = if GUIDED { self.newton.factor::<0>() } else { self.newton.factor::<N>() };
                 if !is_sound {
-                    return Err(self.lost().unwrap_or(Failure::NotConverged(0)));
+                    return Err(self.lost().unwrap_or(SubstepFailure::NotConverged(0)));
                 }
             }
             let rows = rows::<N, GUIDED>(self.change.len());
@@ -303,7 +303,7 @@ impl Work {
                 }
             }
             if !largest.is_finite() {
-                return Err(self.lost().unwrap_or(Failure::NotConverged(culprit)));
+                return Err(self.lost().unwrap_or(SubstepFailure::NotConverged(culprit)));
             }
             // Sweeps contract by about largest/last, so this is what the next one would still change.
             if largest == 0.0 || (iteration > 0 && largest * largest <= LEFT_OVER * scale * last) {
@@ -312,22 +312,22 @@ impl Work {
             }
             if largest >= last {
                 if last > STALLED * scale {
-                    return Err(Failure::NotConverged(culprit));
+                    return Err(SubstepFailure::NotConverged(culprit));
                 }
                 self.accelerate::<N, GUIDED>();
                 return Ok(());
             }
             last = largest;
         }
-        Err(Failure::NotConverged(0))
+        Err(SubstepFailure::NotConverged(0))
     }
 
     /// The element whose force is not finite.
-    fn lost(&self) -> Option<Failure> {
+    fn lost(&self) -> Option<SubstepFailure> {
         self.free
             .iter()
             .position(|free| !(free.re.is_finite() && free.im.is_finite()))
-            .map(Failure::NotFinite)
+            .map(SubstepFailure::NotFinite)
     }
 
     /// W (F - g mu) from the columns W g at hand.

@@ -1,6 +1,6 @@
 //! Functions known by their values alone: Chebyshev interpolants, of as high a degree as they need.
 
-use super::{Curve, Part, ROUNDING};
+use super::{Curve, IntervalBounds, ROUNDING};
 
 use std::sync::OnceLock;
 
@@ -180,8 +180,8 @@ impl Curve for Chebyshev {
         [self.coefficients[0] + x * b - before, 2.0 * (b + x * slope - slope_before)]
     }
 
-    fn about(&self, centre: f64, _radius: f64) -> Part {
+    fn about(&self, centre: f64, _radius: f64) -> IntervalBounds {
         let [value, slope] = self.at(centre);
-        Part { value, slope, bend: self.bend, rounding: ROUNDING * self.most() }
+        IntervalBounds { value, slope, bend: self.bend, rounding: ROUNDING * self.most() }
     }
 }

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 
 /// The first passage of a polynomial.
 fn crossing(powers: &[f64], end: f64) -> Crossing {
-    super::crossing(&Powers { powers, end }, end)
+    super::crossing(&PowerSeries { powers, end }, end)
 }
 
 /// Powers of Π (t - root), times `factor`.
@@ -35,12 +35,12 @@ fn zeros_between_two_parts_are_found() {
     for place in [0.25, 0.5, 0.75] {
         for factor in [1.0, -1.0] {
             let powers = through(&[place; 3], factor);
-            let found = root(&Powers { powers: &powers, end: 1.0 }, 0.0, 0.0, 1.0);
+            let found = root(&PowerSeries { powers: &powers, end: 1.0 }, 0.0, 0.0, 1.0);
             assert!(found.is_some_and(|t| (t - place).abs() < 1e-5), "{place} {factor}: {found:?}");
         }
         // Touched, not passed.
         let powers = through(&[place; 2], -1.0);
-        assert_eq!(root(&Powers { powers: &powers, end: 1.0 }, 0.0, 0.0, 1.0), None);
+        assert_eq!(root(&PowerSeries { powers: &powers, end: 1.0 }, 0.0, 0.0, 1.0), None);
     }
 }
 
@@ -50,7 +50,7 @@ fn where_rounding_is_all_there_is_signs_tell_and_few_parts_are_looked_at() {
         [(vec![0.5; 12], 0.0, None), (vec![0.5; 11], 0.0, Some(0.5)), (vec![0.5; 12], -1e-9, Some(f64::NAN))]
     {
         let powers = through(&roots, if roots.len() % 2 == 0 { 1.0 } else { -1.0 });
-        let (found, parts) = search(&Powers { powers: &powers, end: 1.0 }, level, 0.0, 1.0);
+        let (found, parts) = search(&PowerSeries { powers: &powers, end: 1.0 }, level, 0.0, 1.0);
         assert!(parts < 1000, "{} roots: {parts} parts", roots.len());
         match (found, falls) {
             (None, falls) => assert!(falls.is_none_or(f64::is_nan), "lost"),
@@ -59,13 +59,13 @@ fn where_rounding_is_all_there_is_signs_tell_and_few_parts_are_looked_at() {
         }
     }
     for nothing in [0.0, f64::NAN] {
-        let (found, parts) = search(&Powers { powers: &[nothing; 21], end: 1.0 }, 0.0, 0.0, 1.0);
+        let (found, parts) = search(&PowerSeries { powers: &[nothing; 21], end: 1.0 }, 0.0, 0.0, 1.0);
         assert!(found.is_none() && parts < 1000);
     }
     // Noise about a level.
     let powers: Vec<f64> =
         (0..21).map(|m| if m == 0 { 1e-12 } else { 1e-17 * f64::from(m % 3 - 1) }).collect();
-    let (_, parts) = search(&Powers { powers: &powers, end: 1.0 }, 1e-12, 0.0, 1.0);
+    let (_, parts) = search(&PowerSeries { powers: &powers, end: 1.0 }, 1e-12, 0.0, 1.0);
     assert!(parts < 1000, "{parts}");
 }
 
@@ -121,7 +121,7 @@ proptest! {
         2..22), start in 1e-6..1.0_f64) {
         let mut powers = powers;
         powers[0] = start;
-        agrees(&Powers { powers: &powers, end: 1.0 }, crossing(&powers, 1.0))?;
+        agrees(&PowerSeries { powers: &powers, end: 1.0 }, crossing(&powers, 1.0))?;
     }
 
     #[test]
@@ -161,7 +161,7 @@ fn a_minimum_whose_side_is_unknown_is_told() {
     let dip = |height: f64| [0.36 + height, -1.2, 1.0];
     for (height, is_known) in [(5e-7, false), (-5e-7, false), (2e-6, true), (-2e-6, true), (0.0, false)] {
         let powers = dip(height);
-        let curve = Powers { powers: &powers, end: 1.0 };
+        let curve = PowerSeries { powers: &powers, end: 1.0 };
         let passes = if let Crossing::At(t) = crossing(&powers, 1.0) { Some(t) } else { None };
         let found = doubtful(&curve, 1e-6, |_| 1e-6, [0.0, 1.0], passes);
         assert_eq!(found.is_none(), is_known, "{height}: {found:?}");

@@ -24,21 +24,21 @@ mod vectors;
 
 pub(super) use self::clock::LaneClock;
 use self::clock::LaneStep;
-use self::driven::DrivenTeam;
-use self::free::FreeTeam;
-use self::looped::LoopTeam;
-pub use self::passage::Passage;
+use self::driven::DrivenLanes;
+use self::free::FreeLanes;
+use self::looped::LoopLanes;
+pub use self::passage::TakenStep;
 use self::passage::coordinates;
 pub(crate) use self::passage::read;
 use self::slots::LaneSlots;
-pub(super) use self::swinging::{SwingingTeam, law_of as swinging_law};
-use self::trees::TreeTeam;
+pub(super) use self::swinging::{SwingingLanes, law_of as swinging_law};
+use self::trees::TreeLanes;
 use self::vectors::{added, flaw_of, load, moved, pair, store, unit};
-use super::{JUDGES, Kernel, Taylor, stop};
+use super::{ExpansionKernel, JUDGES, Taylor, stop};
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::looped::reduced;
-use crate::dynamics::natural::Reduced;
+use crate::dynamics::natural::ReducedMatrices;
 use crate::dynamics::series::lanes::{OwnNumbers, are_equal};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
@@ -70,7 +70,7 @@ pub struct BatchMember<'a> {
     /// impact.
     pub has_left: bool,
     /// Its mechanism in natural coordinates and its numbers, once they have been asked for.
-    reduced: OnceLock<Option<Arc<Reduced>>>,
+    reduced: OnceLock<Option<Arc<ReducedMatrices>>>,
     numbers: OnceLock<Arc<OwnNumbers>>,
 }
 
@@ -83,7 +83,7 @@ impl<'a> BatchMember<'a> {
     }
 
     /// The matrices of its mechanism in natural coordinates, without redundant rows, where there are any.
-    fn reduced(&self) -> Option<&Reduced> {
+    fn reduced(&self) -> Option<&ReducedMatrices> {
         let find = || reduced(&self.mechanism.without_redundant_rows()).map(Arc::new);
         self.reduced.get_or_init(find).as_deref()
     }
@@ -100,16 +100,16 @@ impl<'a> BatchMember<'a> {
 }
 
 /// Sees a step of the trajectory of a number.
-pub type Watch<'a> = dyn FnMut(usize, &Passage) -> Going + 'a;
+pub type Watch<'a> = dyn FnMut(usize, &TakenStep) -> Going + 'a;
 
 /// What trajectories in lanes are shown to, each by its number, and what takes those on that leave.
 pub(crate) trait BatchObserver {
     /// Shown a step that a trajectory is about to make, as its series have it, where events may end the
     /// motion; true where it is not to be made in a lane.
-    fn ahead(&mut self, number: usize, step: &Passage) -> bool;
+    fn ahead(&mut self, number: usize, step: &TakenStep) -> bool;
 
     /// Shown a step that was made.
-    fn step(&mut self, number: usize, step: &Passage) -> Going;
+    fn step(&mut self, number: usize, step: &TakenStep) -> Going;
 
     /// Takes on a trajectory that has left from where it stands, and is shown as many steps as that takes.
     fn alone(&mut self, number: usize, member: &mut BatchMember) -> Going;
@@ -119,11 +119,11 @@ pub(crate) trait BatchObserver {
 struct StepsAlone<'a, 'b>(&'a mut Watch<'b>);
 
 impl BatchObserver for StepsAlone<'_, '_> {
-    fn ahead(&mut self, _: usize, _: &Passage) -> bool {
+    fn ahead(&mut self, _: usize, _: &TakenStep) -> bool {
         false
     }
 
-    fn step(&mut self, number: usize, step: &Passage) -> Going {
+    fn step(&mut self, number: usize, step: &TakenStep) -> Going {
         (self.0)(number, step)
     }
 
@@ -164,8 +164,8 @@ impl Batch {
     }
 
     /// The same by another kernel: `Portable` does without the processor's lanes.
-    pub fn with_kernel(self, kernel: Kernel) -> Self {
-        Self { is_portable: kernel != Kernel::Fastest, ..self }
+    pub fn with_kernel(self, kernel: ExpansionKernel) -> Self {
+        Self { is_portable: kernel != ExpansionKernel::Fastest, ..self }
     }
 
     /// The method for one trajectory alone, at the same tolerance.
@@ -250,33 +250,33 @@ impl Batch {
         members.iter_mut().for_each(|member| member.has_left = false);
         while let Some(next) = is_done.iter().position(|is_done| !is_done) {
             let like = members[next].mechanism;
-            macro_rules! try_teams {
-                ($($team:ty),*) => {$(
-                    if goes_on(like) && <$team>::fits(&members[next], &members[next]) {
+            macro_rules! try_kernels {
+                ($($kernel:ty),*) => {$(
+                    if goes_on(like) && <$kernel>::fits(&members[next], &members[next]) {
                         let fits = |one: &BatchMember| {
                             let is_same = std::ptr::eq(one.mechanism, like);
-                            is_same || goes_on(one.mechanism) && <$team>::fits(one, &members[next])
+                            is_same || goes_on(one.mechanism) && <$kernel>::fits(one, &members[next])
                         };
                         let fits: Vec<bool> =
                             members.iter().zip(&is_done).map(|(one,
                                 is_done)| !is_done && fits(one)).collect();
                         is_done.iter_mut().zip(&fits).for_each(|(is_done, &fits)| *is_done |= fits);
-                        self.integrate_those::<$team>(next, &fits, members, until, observer);
+                        self.integrate_those::<$kernel>(next, &fits, members, until, observer);
                         continue;
                     }
                 )*};
             }
-            try_teams!(FreeTeam<1, false>, FreeTeam<2, false>, FreeTeam<3, false>, FreeTeam<4, false>);
-            try_teams!(FreeTeam<5, false>, FreeTeam<6, false>);
-            try_teams!(FreeTeam<1, true>, FreeTeam<2, true>, FreeTeam<3, true>, FreeTeam<4, true>);
-            try_teams!(DrivenTeam, SwingingTeam, LoopTeam, TreeTeam);
+            try_kernels!(FreeLanes<1, false>, FreeLanes<2, false>, FreeLanes<3, false>, FreeLanes<4, false>);
+            try_kernels!(FreeLanes<5, false>, FreeLanes<6, false>);
+            try_kernels!(FreeLanes<1, true>, FreeLanes<2, true>, FreeLanes<3, true>, FreeLanes<4, true>);
+            try_kernels!(DrivenLanes, SwingingLanes, LoopLanes, TreeLanes);
             members[next].stopped = Some(unsuited(&members[next]));
             is_done[next] = true;
         }
     }
 
     /// Integrates those that fit beside one of them.
-    fn integrate_those<T: Team>(
+    fn integrate_those<T: LaneKernel>(
         &self,
         like: usize,
         fits: &[bool],
@@ -302,7 +302,7 @@ fn unsuited(member: &BatchMember) -> StepError {
 }
 
 /// The trajectories in the lanes, all of one kind of mechanism: their constants, their states, their series.
-pub(super) trait Team {
+pub(super) trait LaneKernel {
     /// Empty lanes for trajectories that fit beside this one, for series up to an order.
     fn new(like: &BatchMember, order: usize, vectors: Vectors) -> Self;
 
@@ -314,7 +314,7 @@ pub(super) trait Team {
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64;
 
     /// Keeps an empty lane busy with something harmless.
-    fn park(&mut self, lane: usize);
+    fn set_idle(&mut self, lane: usize);
 
     /// Begins a step, from when the lanes are.
     fn begin<W: EightLanes>(&mut self, clock: &LaneClock);
@@ -350,7 +350,7 @@ pub(super) trait Team {
     fn wrap(&mut self, lane: usize, turns: &mut [i64]);
 
     /// Writes a lane's unknowns into a state.
-    fn leave(&self, lane: usize, state: &mut State);
+    fn write_state(&self, lane: usize, state: &mut State);
 
     /// Angle \[rad\], continued from that at the start in [-π, π], and rate \[rad/s\] of a body `after` \[s\]
     /// from the start of the step last expanded.
@@ -387,7 +387,7 @@ struct Integration<'a, 'b, T> {
     observer: &'a mut dyn BatchObserver,
 }
 
-impl<T: Team> WideCode for Integration<'_, '_, T> {
+impl<T: LaneKernel> WideCode for Integration<'_, '_, T> {
     type Output = ();
 
     #[inline(always)]
@@ -399,11 +399,11 @@ impl<T: Team> WideCode for Integration<'_, '_, T> {
                 return;
             }
             self.lanes.clock.look::<W>();
-            self.lanes.team.begin::<W>(&self.lanes.clock);
-            self.lanes.team.expand::<W>(order);
+            self.lanes.kernel.begin::<W>(&self.lanes.clock);
+            self.lanes.kernel.expand::<W>(order);
             self.lanes.choose_steps::<W>(order, self.batch.tolerance);
             self.lanes.look_ahead(order, self.members, self.observer);
-            self.lanes.team.finish::<W>(order, &self.lanes.clock.taken);
+            self.lanes.kernel.finish::<W>(order, &self.lanes.clock.taken);
             let ends = self.lanes.clock.ends::<W>();
             self.lanes.arrive(order, self.members, &ends, self.until, self.observer);
             self.lanes.bring_back(self.batch, self.members, self.until, self.observer);

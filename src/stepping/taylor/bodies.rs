@@ -52,13 +52,13 @@ pub struct Bodies<const B: usize, const S: usize> {
     /// The energy scale times the unit of time \[J s\].
     energy: f64,
     /// Of the step's start, over the columns.
-    columns: Vec<Column<B>>,
-    scratch: Box<Scratch<B>>,
+    columns: Vec<MatrixColumn<B>>,
+    scratch: Box<BodiesScratch<B>>,
 }
 
 /// One column of each matrix at the step's start.
 #[derive(Clone, Debug)]
-struct Column<const B: usize> {
+struct MatrixColumn<const B: usize> {
     /// M_0 beside its diagonal.
     mass: Row<B>,
     /// M_0⁻¹, -C, -S.
@@ -70,7 +70,7 @@ struct Column<const B: usize> {
 /// Coefficients of one step.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-struct Scratch<const B: usize> {
+struct BodiesScratch<const B: usize> {
     /// c and s.
     e: [[Row<B>; 2]; MOST + 2],
     /// v and the two components of P.
@@ -79,7 +79,7 @@ struct Scratch<const B: usize> {
 
 /// What the newest coefficients are made from.
 #[derive(Clone, Copy)]
-struct Start<L, const B: usize> {
+struct NewestTerms<L, const B: usize> {
     e: [[L; B]; 2],
     v: [L; B],
     weight: [[L; B]; 2],
@@ -88,7 +88,7 @@ struct Start<L, const B: usize> {
 
 /// g without v_0 e_{k+1}, and the products with P.
 #[derive(Clone, Copy)]
-struct Sums<L, const B: usize> {
+struct BodySums<L, const B: usize> {
     g: [[L; B]; 2],
     load: [L; B],
 }
@@ -133,14 +133,14 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
             weight,
             springs,
             energy: mechanism.energy_scale * mechanism.units.time,
-            columns: vec![Column { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
-            scratch: Box::new(Scratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
+            columns: vec![MatrixColumn { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
+            scratch: Box::new(BodiesScratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
         })
     }
 
     /// Writes the powers of the last step.
     pub fn powers(&self, powers: &mut MotionPowers) {
-        let Scratch { e, v } = &*self.scratch;
+        let BodiesScratch { e, v } = &*self.scratch;
         let unit = |m: usize, k: usize| Complex::new(at(&e[m][0], k), at(&e[m][1], k));
         powers.take((self.count, self.order), |m, k| at(&v[m][0], k), unit);
     }
@@ -167,9 +167,9 @@ fn apply<'a, L: Lanes, const B: usize>(columns: impl Iterator<Item = &'a Row<B>>
 /// The sums of order k, k even, and those of order k+1 as far as they are known before it: without the term
 /// of v_{k+1} and e_1.
 #[inline(always)]
-fn sums<L: Lanes, const B: usize>(scratch: &Scratch<B>, k: usize) -> [Sums<L, B>; 2] {
+fn sums<L: Lanes, const B: usize>(scratch: &BodiesScratch<B>, k: usize) -> [BodySums<L, B>; 2] {
     let zero = [L::splat(0.0); B];
-    let mut sums = [Sums { g: [zero; 2], load: zero }; 2];
+    let mut sums = [BodySums { g: [zero; 2], load: zero }; 2];
     for b in 0..B {
         let nothing = L::splat(0.0);
         let mut chains = [[nothing; 4]; 2];
@@ -193,7 +193,7 @@ fn sums<L: Lanes, const B: usize>(scratch: &Scratch<B>, k: usize) -> [Sums<L, B>
 
 /// e_{k+1} from f_k.
 #[inline(always)]
-fn turn<L: Lanes, const B: usize>(scratch: &mut Scratch<B>, k: usize, f: [[L; B]; 2]) -> [[L; B]; 2] {
+fn turn<L: Lanes, const B: usize>(scratch: &mut BodiesScratch<B>, k: usize, f: [[L; B]; 2]) -> [[L; B]; 2] {
     let mut e = f;
     for b in 0..B {
         (e[0][b], e[1][b]) = (L::splat(0.0).sub(over(f[1][b], k + 1)), over(f[0][b], k + 1));
@@ -205,14 +205,14 @@ fn turn<L: Lanes, const B: usize>(scratch: &mut Scratch<B>, k: usize, f: [[L; B]
 /// Order k: v_{k+1}, P_{k+1} and f_{k+1} from the sums, e_{k+1}, and what springs add to P_{k+1}.
 #[inline(always)]
 fn order<L: Lanes, const B: usize>(
-    (coupling, columns): (&[Row<B>], &[Column<B>]),
-    start: &Start<L, B>,
-    scratch: &mut Scratch<B>,
+    (coupling, columns): (&[Row<B>], &[MatrixColumn<B>]),
+    start: &NewestTerms<L, B>,
+    scratch: &mut BodiesScratch<B>,
     k: usize,
-    sums: Sums<L, B>,
+    sums: BodySums<L, B>,
     (e, pull): ([[L; B]; 2], Option<[[L; B]; 2]>),
 ) -> [[L; B]; 2] {
-    let Sums { mut g, load: mut r } = sums;
+    let BodySums { mut g, load: mut r } = sums;
     let [c, s]: [[L; B]; 2] = [load(&scratch.e[k][0]), load(&scratch.e[k][1])];
     for b in 0..B {
         (g[0][b], g[1][b]) = (start.v[b].mul_add(e[0][b], g[0][b]), start.v[b].mul_add(e[1][b], g[1][b]));
@@ -251,7 +251,7 @@ fn order<L: Lanes, const B: usize>(
 /// M_0⁻¹ r/(k+1) - C g_x - S g_y.
 #[inline(always)]
 fn solved<L: Lanes, const B: usize>(
-    columns: &[Column<B>],
+    columns: &[MatrixColumn<B>],
     k: usize,
     mut r: [L; B],
     g: [[L; B]; 2],
@@ -281,8 +281,8 @@ fn solved<L: Lanes, const B: usize>(
 /// The same for the first orders, rounded, not merely computed: one step of the residual.
 #[inline(always)]
 fn refined<L: Lanes, const B: usize>(
-    (coupling, columns): (&[Row<B>], &[Column<B>]),
-    start: &Start<L, B>,
+    (coupling, columns): (&[Row<B>], &[MatrixColumn<B>]),
+    start: &NewestTerms<L, B>,
     k: usize,
     mut r: [L; B],
     g: [[L; B]; 2],
@@ -328,7 +328,7 @@ pub fn step<L: Lanes, const B: usize, const S: usize>(
         ..
     } = bodies;
     let last = *last;
-    let start: Start<L, B> = Start {
+    let start: NewestTerms<L, B> = NewestTerms {
         e: [load(&scratch.e[0][0]), load(&scratch.e[0][1])],
         v: load(&scratch.v[0][0]),
         weight: [load(&weight[0]), load(&weight[1])],

@@ -27,7 +27,7 @@ use super::step_size::{self, StepSize};
 use super::terms::{left_over, reciprocal};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::scene::Law;
 
@@ -36,7 +36,7 @@ pub const MOST: usize = 24;
 
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
-pub struct Driven {
+pub struct DrivenKernel {
     /// The body that is driven, and its law.
     pub(super) body: usize,
     pub(super) law: Law,
@@ -55,14 +55,14 @@ pub struct Driven {
 
 /// Angle and rate of the free body and the motor's work, and what their leading parts leave out.
 #[derive(Clone, Copy, Debug)]
-pub struct Flow {
+pub struct DrivenFlow {
     /// Leading parts.
     pub high: [f64; 3],
     /// What they leave out.
     pub low: [f64; 3],
 }
 
-impl Flow {
+impl DrivenFlow {
     /// From the unknowns `[phi, v, work]`.
     #[inline(always)]
     pub fn of(state: &State) -> Self {
@@ -84,24 +84,24 @@ impl Flow {
 /// Coefficients of one step.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct Scratch {
+pub struct DrivenScratch {
     /// E.
     e: [[f64; 4]; MOST + 1],
     /// v in every lane.
     v: [[f64; 4]; MOST + 1],
 }
 
-impl Default for Scratch {
+impl Default for DrivenScratch {
     fn default() -> Self {
         Self { e: [[0.0; 4]; MOST + 1], v: [[0.0; 4]; MOST + 1] }
     }
 }
 
-impl Driven {
+impl DrivenKernel {
     /// The driven body and its law, of two bodies on their axes, one driven from the ground, no springs.
     pub(super) fn pattern(mechanism: &Mechanism) -> Option<(usize, &Law)> {
         let tree = &mechanism.tree;
-        let [ConstraintEquation { measure: Measure::Angle { body, base: None }, law: Some(law), .. }] =
+        let [ConstraintEquation { measure: RowMeasure::Angle { body, base: None }, law: Some(law), .. }] =
             &mechanism.constraints[..]
         else {
             return None;
@@ -154,7 +154,7 @@ impl Driven {
 /// What orders k and k+1 need of the coefficients up to E_k and v_k: both at once, so that each v is loaded
 /// for two products.
 #[inline(always)]
-fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [L; 2] {
+fn older<L: Lanes>(scratch: &DrivenScratch, k: usize) -> [L; 2] {
     // From the middle outwards in two chains, the newest coefficients last.
     let mut sums = [[L::splat(0.0); 2]; 2];
     let middle = k / 2;
@@ -172,7 +172,7 @@ fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [L; 2] {
 
 /// E_k, and v_k in every lane (m_0 where k = 0).
 #[derive(Clone, Copy)]
-struct Newest<L> {
+struct DrivenNewest<L> {
     e: L,
     v: L,
 }
@@ -180,13 +180,13 @@ struct Newest<L> {
 /// Order k: from the newest coefficients to the next ones, which are also written.
 #[inline(always)]
 fn order<L: Lanes>(
-    driven: &Driven,
-    start: Newest<L>,
-    scratch: &mut Scratch,
+    driven: &DrivenKernel,
+    start: DrivenNewest<L>,
+    scratch: &mut DrivenScratch,
     older: L,
-    newest: Newest<L>,
+    newest: DrivenNewest<L>,
     k: usize,
-) -> Newest<L> {
+) -> DrivenNewest<L> {
     let [load, load_rest] = driven.load[k + 1];
     // Low parts join before the rounding; in high orders they are too small to matter.
     let loads = if k < 12 {
@@ -201,18 +201,18 @@ fn order<L: Lanes>(
     let e = left_over(sum, k + 1);
     scratch.e[k + 1] = e.array();
     scratch.v[k + 1] = v.array();
-    Newest { e, v }
+    DrivenNewest { e, v }
 }
 
 /// Two orders, the first of them even.
 #[inline(always)]
 fn two_orders<L: Lanes>(
-    driven: &Driven,
-    start: Newest<L>,
-    scratch: &mut Scratch,
-    newest: Newest<L>,
+    driven: &DrivenKernel,
+    start: DrivenNewest<L>,
+    scratch: &mut DrivenScratch,
+    newest: DrivenNewest<L>,
     k: usize,
-) -> Newest<L> {
+) -> DrivenNewest<L> {
     let [first, second] = older(scratch, k);
     let newest = order(driven, start, scratch, first, newest, k);
     order(driven, start, scratch, second, newest, k + 1)
@@ -220,7 +220,11 @@ fn two_orders<L: Lanes>(
 
 /// Orders 0 to P-1, for even P; all coefficients are in the scratch then.
 #[inline(always)]
-fn expand<L: Lanes, const P: usize>(driven: &Driven, start: Newest<L>, scratch: &mut Scratch) {
+fn expand<L: Lanes, const P: usize>(
+    driven: &DrivenKernel,
+    start: DrivenNewest<L>,
+    scratch: &mut DrivenScratch,
+) {
     let mut newest = start;
     if !L::UNROLLED {
         for k in (0..P).step_by(2) {
@@ -243,10 +247,10 @@ fn expand<L: Lanes, const P: usize>(driven: &Driven, start: Newest<L>, scratch: 
 /// leaves `flow` alone where it is useless.
 #[inline(always)]
 pub fn step<L: Lanes, const P: usize>(
-    driven: &Driven,
+    driven: &DrivenKernel,
     step_size: &StepSize,
-    scratch: &mut Scratch,
-    flow: &mut Flow,
+    scratch: &mut DrivenScratch,
+    flow: &mut DrivenFlow,
     t: Time,
     left: f64,
 ) -> (f64, f64) {
@@ -256,7 +260,7 @@ pub fn step<L: Lanes, const P: usize>(
         (DoubleDouble::sum(phi, flow.low[0]) - DoubleDouble::of(driven.law.start) - t.scale(w)).reduced();
     let e =
         direction::unit(L::of([phi, phi, psi.hi, psi.hi]), L::of([flow.low[0], flow.low[0], psi.lo, psi.lo]));
-    let start = Newest { e, v: L::of([v, v, v - w, v - w]) };
+    let start = DrivenNewest { e, v: L::of([v, v, v - w, v - w]) };
     scratch.e[0] = e.array();
     expand::<L, P>(driven, start, scratch);
     if !scratch.v[P][0].is_finite() {
@@ -280,7 +284,12 @@ pub fn step<L: Lanes, const P: usize>(
 
 /// Takes `flow` from the step's start on by `h` \[s\].
 #[inline(always)]
-pub fn go<L: Lanes, const P: usize>(driven: &Driven, scratch: &Scratch, flow: &mut Flow, h: f64) {
+pub fn go<L: Lanes, const P: usize>(
+    driven: &DrivenKernel,
+    scratch: &DrivenScratch,
+    flow: &mut DrivenFlow,
+    h: f64,
+) {
     let (w, v) = (driven.law.rate, flow.high[1]);
     let [c, s, x, y] = scratch.e[0];
     let ([c_moved, s_moved, x_moved, y_moved], [angle, rate, _, swept]) = increments::<L, P>(scratch, h);
@@ -304,7 +313,7 @@ pub fn go<L: Lanes, const P: usize>(driven: &Driven, scratch: &Scratch, flow: &m
 /// Increments over `h` \[s\]: of E; and `[mean of v less v_0, increment of v, –, mean of E's last lane less
 /// its start]`.
 #[inline(always)]
-fn increments<L: Lanes, const P: usize>(scratch: &Scratch, h: f64) -> ([f64; 4], [f64; 4]) {
+fn increments<L: Lanes, const P: usize>(scratch: &DrivenScratch, h: f64) -> ([f64; 4], [f64; 4]) {
     let square = L::splat(h * h);
     let mut chains = [[L::splat(0.0); 2]; 2];
     let mut k = P;

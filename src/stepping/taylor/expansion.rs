@@ -1,7 +1,7 @@
 //! The series of any mechanism about a step's start, and how far it carries.
 
-use super::super::event::Found;
-use super::super::search::Powers;
+use super::super::event::FirstEvent;
+use super::super::search::PowerSeries;
 use super::{JUDGES, LEADING, step_size};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, DoubleDouble};
@@ -246,7 +246,7 @@ impl<T: Coefficient> Expansion<T> {
 
     /// Of `h` \[s\] what comes before the force that presses a hinge or rail that slides passes zero.
     pub fn until_reversal(&self, h: f64) -> f64 {
-        let mut found = Found::Nothing;
+        let mut found = FirstEvent::Nothing;
         for mut powers in self.series.pressing() {
             let scale = powers.iter().rev().fold(0.0, |sum: f64, power| sum * h + power.abs());
             if !(scale > 0.0 && scale.is_finite()) {
@@ -255,7 +255,7 @@ impl<T: Coefficient> Expansion<T> {
             powers.iter_mut().for_each(|power| *power /= scale);
             // Rounding, where it begins at zero.
             powers[0] = powers[0].max(0.0);
-            found = found.or_earlier(0, &Powers { powers: &powers, end: found.end(h) }, h);
+            found = found.or_earlier(0, &PowerSeries { powers: &powers, end: found.end(h) }, h);
         }
         found.end(h)
     }

@@ -11,7 +11,7 @@
 //!     f_{k+1} = g + v_{k+1} e_0
 //! ```
 
-use super::pair::{self, Flow, Newest, Pair, Start};
+use super::pair::{self, PairFlow, PairKernel, PairNewest, PairStart};
 use super::step_size::{self, StepSize};
 use super::terms::{LEFT, over_first, reciprocal};
 use super::wide::{self, Wide};
@@ -22,8 +22,8 @@ pub const LEADING: usize = 4;
 
 /// Coefficients of one step.
 #[derive(Clone, Debug, Default)]
-pub struct Scratch {
-    pair: pair::Scratch,
+pub struct ExtendedScratch {
+    pair: pair::PairScratch,
     /// What the first v leave out.
     low: [[f64; 4]; LEADING + 1],
 }
@@ -39,10 +39,10 @@ fn part<L: Lanes>(signs: [f64; 4], k: usize) -> Wide<L> {
 /// alone where it is useless.
 #[inline(always)]
 pub fn step<L: Lanes, const P: usize>(
-    pair: &Pair,
+    pair: &PairKernel,
     step_size: &StepSize,
-    scratch: &mut Scratch,
-    flow: &mut Flow,
+    scratch: &mut ExtendedScratch,
+    flow: &mut PairFlow,
     left: f64,
 ) -> (f64, f64) {
     let twice = |[_, a, _, b]: [f64; 4]| [a, a, b, b];
@@ -85,8 +85,12 @@ pub fn step<L: Lanes, const P: usize>(
         (plain.e[k], plain.v[k], plain.g[k]) = (e[k].hi.array(), v[k].hi.array(), g[k].hi.array());
         scratch.low[k] = v[k].lo.array();
     }
-    let start = Start::new(pair, e[0].hi, v[0].hi, [inverse[0].hi, inverse[1].hi]);
-    pair::expand::<L, P, LEADING>(&start, plain, Newest { v: v[LEADING].hi, e: e[LEADING].hi, g: rest.hi });
+    let start = PairStart::new(pair, e[0].hi, v[0].hi, [inverse[0].hi, inverse[1].hi]);
+    pair::expand::<L, P, LEADING>(
+        &start,
+        plain,
+        PairNewest { v: v[LEADING].hi, e: e[LEADING].hi, g: rest.hi },
+    );
     let wanted = pair::wanted::<L, P>(step_size, plain);
     if wanted.is_nan() {
         return (wanted, 0.0);
@@ -100,7 +104,7 @@ pub fn step<L: Lanes, const P: usize>(
 
 /// Takes `flow` from the step's start on by `h` \[s\].
 #[inline(always)]
-pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) {
+pub fn go<L: Lanes, const P: usize>(scratch: &ExtendedScratch, flow: &mut PairFlow, h: f64) {
     // Powers beyond the leading ones by two Horner chains.
     let v = &scratch.pair.v;
     let square = L::splat(h * h);

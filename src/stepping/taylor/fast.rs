@@ -1,14 +1,14 @@
 //! Which fast kernel fits a mechanism and an order.
 
 use super::bodies::{self, Bodies};
-use super::driven::{self, Driven};
+use super::driven::{self, DrivenKernel};
 use super::extended;
-use super::looped::{self, Looped};
-use super::pair::{self, Pair};
+use super::looped::{self, LoopedKernel};
+use super::pair::{self, PairKernel};
 use super::step_size::StepSize;
 use super::swinging::{self, Swinging};
 use crate::arithmetic::lanes::{self, Code, Lanes};
-use crate::dynamics::natural::Reduced;
+use crate::dynamics::natural::ReducedMatrices;
 use crate::dynamics::{Mechanism, MotionPowers, State};
 use std::fmt::Debug;
 
@@ -21,7 +21,7 @@ const EXTENDED: usize = 24;
 #[derive(Clone, Debug)]
 pub struct Fast {
     settings: Settings,
-    kernel: Box<dyn Kernel>,
+    kernel: Box<dyn FastKernel>,
 }
 
 /// What it was made for.
@@ -35,7 +35,7 @@ struct Settings {
 }
 
 /// A mechanism's own series, with its scratch space.
-trait Series: Clone + Debug + Send + Sync + 'static {
+trait FastSeries: Clone + Debug + Send + Sync + 'static {
     /// One step of a state by at most `left` \[s\]: the step wanted and the step taken, or `None` where the
     /// series of any mechanism must take over.
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)>;
@@ -50,41 +50,41 @@ trait Series: Clone + Debug + Send + Sync + 'static {
 }
 
 /// The same in code of its own for the processor's vectors, or without them.
-trait Kernel: Debug + Send + Sync {
+trait FastKernel: Debug + Send + Sync {
     fn step(&mut self, state: &mut State, left: f64, is_portable: bool) -> Option<(f64, f64)>;
     fn go(&mut self, state: &mut State, h: f64, is_portable: bool);
     fn powers(&self, powers: &mut MotionPowers) -> bool;
-    fn boxed(&self) -> Box<dyn Kernel>;
+    fn boxed(&self) -> Box<dyn FastKernel>;
 }
 
-impl<S: Series> Kernel for S {
+impl<S: FastSeries> FastKernel for S {
     fn step(&mut self, state: &mut State, left: f64, is_portable: bool) -> Option<(f64, f64)> {
-        lanes::run(Stepping(self, state, left), is_portable)
+        lanes::run(FastStep(self, state, left), is_portable)
     }
 
     fn go(&mut self, state: &mut State, h: f64, is_portable: bool) {
-        lanes::run(Going(self, state, h), is_portable);
+        lanes::run(FastAdvance(self, state, h), is_portable);
     }
 
     fn powers(&self, powers: &mut MotionPowers) -> bool {
-        Series::powers(self, powers)
+        FastSeries::powers(self, powers)
     }
 
-    fn boxed(&self) -> Box<dyn Kernel> {
+    fn boxed(&self) -> Box<dyn FastKernel> {
         Box::new(self.clone())
     }
 }
 
-impl Clone for Box<dyn Kernel> {
+impl Clone for Box<dyn FastKernel> {
     fn clone(&self) -> Self {
         self.boxed()
     }
 }
 
 /// A step.
-struct Stepping<'a, S>(&'a mut S, &'a mut State, f64);
+struct FastStep<'a, S>(&'a mut S, &'a mut State, f64);
 
-impl<S: Series> Code for Stepping<'_, S> {
+impl<S: FastSeries> Code for FastStep<'_, S> {
     type Output = Option<(f64, f64)>;
 
     #[inline(always)]
@@ -94,9 +94,9 @@ impl<S: Series> Code for Stepping<'_, S> {
 }
 
 /// A way on.
-struct Going<'a, S>(&'a mut S, &'a mut State, f64);
+struct FastAdvance<'a, S>(&'a mut S, &'a mut State, f64);
 
-impl<S: Series> Code for Going<'_, S> {
+impl<S: FastSeries> Code for FastAdvance<'_, S> {
     type Output = ();
 
     #[inline(always)]
@@ -107,13 +107,13 @@ impl<S: Series> Code for Going<'_, S> {
 
 /// Two bodies, by a series of order `P`.
 #[derive(Clone, Debug)]
-struct OfPair<const P: usize>(Pair, StepSize, Box<pair::Scratch>);
+struct OfPair<const P: usize>(PairKernel, StepSize, Box<pair::PairScratch>);
 
-impl<const P: usize> Series for OfPair<P> {
+impl<const P: usize> FastSeries for OfPair<P> {
     #[inline(always)]
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         let Self(pair, step_size, scratch) = self;
-        let mut flow = pair::Flow::of(pair, state);
+        let mut flow = pair::PairFlow::of(pair, state);
         let steps = pair::step::<L, P>(pair, step_size, scratch, &mut flow, left);
         flow.write(pair, state);
         Some(steps)
@@ -121,7 +121,7 @@ impl<const P: usize> Series for OfPair<P> {
 
     #[inline(always)]
     fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
-        let mut flow = pair::Flow::of(&self.0, state);
+        let mut flow = pair::PairFlow::of(&self.0, state);
         pair::go::<L, P>(&self.2, &mut flow, h);
         flow.write(&self.0, state);
     }
@@ -134,13 +134,13 @@ impl<const P: usize> Series for OfPair<P> {
 
 /// The same with the first orders in double-double.
 #[derive(Clone, Debug)]
-struct OfExtended(Pair, StepSize, Box<extended::Scratch>);
+struct OfExtended(PairKernel, StepSize, Box<extended::ExtendedScratch>);
 
-impl Series for OfExtended {
+impl FastSeries for OfExtended {
     #[inline(always)]
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         let Self(pair, step_size, scratch) = self;
-        let mut flow = pair::Flow::of(pair, state);
+        let mut flow = pair::PairFlow::of(pair, state);
         let steps = extended::step::<L, EXTENDED>(pair, step_size, scratch, &mut flow, left);
         flow.write(pair, state);
         Some(steps)
@@ -148,7 +148,7 @@ impl Series for OfExtended {
 
     #[inline(always)]
     fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
-        let mut flow = pair::Flow::of(&self.0, state);
+        let mut flow = pair::PairFlow::of(&self.0, state);
         extended::go::<L, EXTENDED>(&self.2, &mut flow, h);
         flow.write(&self.0, state);
     }
@@ -156,13 +156,13 @@ impl Series for OfExtended {
 
 /// A bar on one that a motor turns evenly, by a series of order `P`.
 #[derive(Clone, Debug)]
-struct OfDriven<const P: usize>(Box<Driven>, StepSize, Box<driven::Scratch>);
+struct OfDriven<const P: usize>(Box<DrivenKernel>, StepSize, Box<driven::DrivenScratch>);
 
-impl<const P: usize> Series for OfDriven<P> {
+impl<const P: usize> FastSeries for OfDriven<P> {
     #[inline(always)]
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         let Self(driven, step_size, scratch) = self;
-        let mut flow = driven::Flow::of(state);
+        let mut flow = driven::DrivenFlow::of(state);
         let steps = driven::step::<L, P>(driven, step_size, scratch, &mut flow, state.time, left);
         flow.write(state);
         Some(steps)
@@ -170,13 +170,13 @@ impl<const P: usize> Series for OfDriven<P> {
 
     #[inline(always)]
     fn go<L: Lanes>(&mut self, state: &mut State, h: f64) {
-        let mut flow = driven::Flow::of(state);
+        let mut flow = driven::DrivenFlow::of(state);
         driven::go::<L, P>(&self.0, &self.2, &mut flow, h);
         flow.write(state);
     }
 }
 
-impl Series for Swinging {
+impl FastSeries for Swinging {
     #[inline(always)]
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         Some(swinging::step::<L>(self, state, left))
@@ -188,7 +188,7 @@ impl Series for Swinging {
     }
 }
 
-impl<const B: usize, const S: usize> Series for Bodies<B, S> {
+impl<const B: usize, const S: usize> FastSeries for Bodies<B, S> {
     #[inline(always)]
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         Some(bodies::step::<L, B, S>(self, state, left))
@@ -208,7 +208,7 @@ impl<const B: usize, const S: usize> Series for Bodies<B, S> {
     }
 }
 
-impl<const B: usize> Series for Looped<B> {
+impl<const B: usize> FastSeries for LoopedKernel<B> {
     #[inline(always)]
     fn step<L: Lanes>(&mut self, state: &mut State, left: f64) -> Option<(f64, f64)> {
         looped::step::<L, B>(self, state, left)
@@ -230,11 +230,11 @@ impl Fast {
         is_extended: bool,
     ) -> Option<Self> {
         let step_size = |longest| StepSize::new(tolerance, order, longest).over(mechanism.units.time);
-        let kernel: Box<dyn Kernel> = if is_extended {
-            let pair = Pair::new(mechanism).filter(|_| order == EXTENDED)?;
+        let kernel: Box<dyn FastKernel> = if is_extended {
+            let pair = PairKernel::new(mechanism).filter(|_| order == EXTENDED)?;
             let step_size = step_size(pair.longest(order));
             Box::new(OfExtended(pair, step_size, Box::default()))
-        } else if let Some(pair) = Pair::new(mechanism) {
+        } else if let Some(pair) = PairKernel::new(mechanism) {
             let step_size = step_size(pair.longest(order));
             match order {
                 16 => Box::new(OfPair::<16>(pair, step_size, Box::default())),
@@ -242,7 +242,7 @@ impl Fast {
                 24 => Box::new(OfPair::<24>(pair, step_size, Box::default())),
                 _ => return None,
             }
-        } else if let Some(driven) = Driven::new(mechanism).map(Box::new) {
+        } else if let Some(driven) = DrivenKernel::new(mechanism).map(Box::new) {
             let step_size = step_size(driven.longest(order));
             match order {
                 16 => Box::new(OfDriven::<16>(driven, step_size, Box::default())),
@@ -260,11 +260,12 @@ impl Fast {
     }
 
     /// The smallest series that has room for all bodies and springs.
-    fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Box<dyn Kernel>> {
+    fn bodies(mechanism: &Mechanism, tolerance: f64, order: usize) -> Option<Box<dyn FastKernel>> {
         fn of<const B: usize, const S: usize>(
             (mechanism, tolerance, order): (&Mechanism, f64, usize),
-        ) -> Option<Box<dyn Kernel>> {
-            Bodies::<B, S>::new(mechanism, tolerance, order).map(|bodies| Box::new(bodies) as Box<dyn Kernel>)
+        ) -> Option<Box<dyn FastKernel>> {
+            Bodies::<B, S>::new(mechanism, tolerance, order)
+                .map(|bodies| Box::new(bodies) as Box<dyn FastKernel>)
         }
         let wanted = (mechanism, tolerance, order);
         let free = of::<1, 0>(wanted).or_else(|| of::<2, 0>(wanted));
@@ -275,17 +276,17 @@ impl Fast {
     /// asked for, or to 20 where that is higher.
     pub fn of_looped(
         mechanism: &Mechanism,
-        reduced: &Reduced,
+        reduced: &ReducedMatrices,
         tolerance: f64,
         order: usize,
         is_portable: bool,
     ) -> Option<Self> {
         fn of<const B: usize>(
-            (mechanism, reduced): (&Mechanism, &Reduced),
+            (mechanism, reduced): (&Mechanism, &ReducedMatrices),
             tolerance: f64,
             order: usize,
-        ) -> Option<Box<dyn Kernel>> {
-            let looped = Looped::<B>::new(mechanism, reduced, tolerance, order)?;
+        ) -> Option<Box<dyn FastKernel>> {
+            let looped = LoopedKernel::<B>::new(mechanism, reduced, tolerance, order)?;
             Some(Box::new(looped))
         }
         let (wanted, highest) = ((mechanism, reduced), order.max(LOOPED));

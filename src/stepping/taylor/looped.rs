@@ -20,16 +20,16 @@
 
 mod spring;
 
-use self::spring::{Spring, pull};
+use self::spring::{LoopSpring, pull};
 use super::expansion::{larger_size, minus_log2};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::row::{Row, at, load, room, store};
 use crate::arithmetic::{Complex, sincos};
-use crate::dynamics::force::action::Kind;
+use crate::dynamics::force::action::Applied;
 use crate::dynamics::looped::NEAR;
-use crate::dynamics::natural::Reduced;
-use crate::dynamics::natural::keeper::Keeper;
+use crate::dynamics::natural::ReducedMatrices;
+use crate::dynamics::natural::keeper::NaturalKeeper;
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
 
@@ -42,7 +42,7 @@ const LEAST: usize = 8;
 
 /// Constants of the mechanism and coefficients of one step; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
-pub struct Looped<const B: usize> {
+pub struct LoopedKernel<const B: usize> {
     count: usize,
     order: usize,
     log_tolerance: f64,
@@ -50,13 +50,13 @@ pub struct Looped<const B: usize> {
     longest: f64,
     unit: f64,
     /// W, S and V, and the linear rows.
-    keeper: Keeper<B>,
+    keeper: NaturalKeeper<B>,
     /// Gravity and constant forces, and the share of the latter \[N·m\].
     weight: [Row<B>; 2],
     applied: Vec<Complex<f64>>,
     /// Constant torque on each body \[N·m\].
     torque: Row<B>,
-    springs: Vec<Spring>,
+    springs: Vec<LoopSpring>,
     /// Highest power of z summed in the last step.
     summed: usize,
     /// z: powers 0…P+1.
@@ -69,10 +69,15 @@ pub struct Looped<const B: usize> {
     projected: Vec<[Row<B>; 4]>,
 }
 
-impl<const B: usize> Looped<B> {
+impl<const B: usize> LoopedKernel<B> {
     /// The constants of a mechanism with these matrices, where this form fits: up to 4 B bodies, constant
     /// forces, springs without dampers.
-    pub fn new(mechanism: &Mechanism, reduced: &Reduced, tolerance: f64, order: usize) -> Option<Self> {
+    pub fn new(
+        mechanism: &Mechanism,
+        reduced: &ReducedMatrices,
+        tolerance: f64,
+        order: usize,
+    ) -> Option<Self> {
         let n = mechanism.bodies.len();
         let is_plain = !mechanism.is_winding()
             && mechanism.forces.is_empty()
@@ -85,11 +90,11 @@ impl<const B: usize> Looped<B> {
         let mut torque = [[0.0; 4]; B];
         for action in &mechanism.actions {
             match &action.kind {
-                Kind::Force { point, force, follows: false } => {
+                Applied::Force { point, force, follows: false } => {
                     point.spread(*force, |k, force| applied[k] += force)
                 }
-                Kind::Force { .. } => return None,
-                Kind::Torque { torque: value, base } => {
+                Applied::Force { .. } => return None,
+                Applied::Torque { torque: value, base } => {
                     torque[action.body / 4][action.body % 4] += value;
                     if let Some(base) = base {
                         torque[base / 4][base % 4] -= value;
@@ -109,11 +114,11 @@ impl<const B: usize> Looped<B> {
             log_tolerance: libm::log2(tolerance),
             longest: 30.0 + libm::log2(mechanism.units.time),
             unit: mechanism.units.time,
-            keeper: Keeper::new(reduced),
+            keeper: NaturalKeeper::new(reduced),
             weight,
             applied,
             torque,
-            springs: mechanism.springs.iter().map(Spring::new).collect(),
+            springs: mechanism.springs.iter().map(LoopSpring::new).collect(),
             summed: 0,
             z: [[zero; 2]; MOST + 2],
             mu: [zero; MOST],
@@ -126,7 +131,7 @@ impl<const B: usize> Looped<B> {
 
 /// Power zero and one, and the matrices of the step; the least share of a pivot.
 #[inline(always)]
-fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64 {
+fn begin<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, state: &State) -> f64 {
     let n = looped.count;
     let (mut angle, mut rest, mut rate) = ([[0.0; 4]; B], [[0.0; 4]; B], [[0.0; 4]; B]);
     for i in 0..n {
@@ -143,9 +148,9 @@ fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64
         (looped.z[0][0][b], looped.z[0][1][b]) = (c.array(), s.array());
         (looped.z[1][0][b], looped.z[1][1][b]) = (s.mul(w).neg().array(), c.mul(w).array());
     }
-    let Looped { keeper, z, spread, across, projected, .. } = looped;
+    let LoopedKernel { keeper, z, spread, across, projected, .. } = looped;
     let least = keeper.unit_vectors::<L>(&z[0]);
-    let Keeper { columns, schur, minv_jt, .. } = keeper;
+    let NaturalKeeper { columns, schur, minv_jt, .. } = keeper;
     for j in 0..n {
         let mut sum = [[L::ZERO; B]; 2];
         for i in 0..n {
@@ -185,8 +190,8 @@ fn begin<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &State) -> f64
 
 /// Power m of the applied forces, from z_m.
 #[inline(always)]
-fn forces<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) -> [[L; B]; 2] {
-    let Looped { z, weight, torque, springs, .. } = looped;
+fn forces<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, m: usize) -> [[L; B]; 2] {
+    let LoopedKernel { z, weight, torque, springs, .. } = looped;
     let mut force = [[L::ZERO; B]; 2];
     for b in 0..B {
         let torque = L::of(torque[b]);
@@ -218,9 +223,10 @@ fn forces<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) -> [[L; B]
 
 /// mu_m and z_{m+2}.
 #[inline(always)]
-fn order<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) {
+fn order<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, m: usize) {
     let mut f = forces::<L, B>(looped, m);
-    let Looped { count, z, mu, keeper: Keeper { schur, .. }, spread, across, projected, .. } = looped;
+    let LoopedKernel { count, z, mu, keeper: NaturalKeeper { schur, .. }, spread, across, projected, .. } =
+        looped;
     let n = *count;
     let mut q = [L::ZERO; B];
     for b in 0..B {
@@ -272,7 +278,7 @@ fn order<L: Lanes, const B: usize>(looped: &mut Looped<B>, m: usize) {
 /// One step of at most `left` \[s\]; the step wanted and the step taken, or `None` near a singular position.
 #[inline(always)]
 pub fn step<L: Lanes, const B: usize>(
-    looped: &mut Looped<B>,
+    looped: &mut LoopedKernel<B>,
     state: &mut State,
     left: f64,
 ) -> Option<(f64, f64)> {
@@ -298,7 +304,7 @@ pub fn step<L: Lanes, const B: usize>(
 /// The longest step any order allows \[s\], and the power of z that order ends with; not a number where a
 /// coefficient is not.
 #[inline(always)]
-fn step_size<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
+fn step_size<L: Lanes, const B: usize>(looped: &LoopedKernel<B>) -> (f64, usize) {
     let mut roots = [f64::INFINITY; JUDGES];
     let (mut best, mut chosen) = (f64::NEG_INFINITY, looped.order + 1);
     for k in LEAST - JUDGES..=looped.order {
@@ -322,7 +328,7 @@ fn step_size<L: Lanes, const B: usize>(looped: &Looped<B>) -> (f64, usize) {
 
 /// Σ z_k h^k without power zero, and the rates.
 #[inline(always)]
-fn sum<L: Lanes, const B: usize>(looped: &Looped<B>, h: f64) -> [[[L; B]; 2]; 2] {
+fn sum<L: Lanes, const B: usize>(looped: &LoopedKernel<B>, h: f64) -> [[[L; B]; 2]; 2] {
     let step = L::splat(h);
     let mut sums = [[[L::ZERO; B]; 2]; 2];
     for b in 0..B {
@@ -343,7 +349,7 @@ fn sum<L: Lanes, const B: usize>(looped: &Looped<B>, h: f64) -> [[[L; B]; 2]; 2]
 
 /// Takes the state from the step's start on by `h` \[s\], onto all rows.
 #[inline(always)]
-pub fn go<L: Lanes, const B: usize>(looped: &mut Looped<B>, state: &mut State, h: f64) {
+pub fn go<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, state: &mut State, h: f64) {
     let [place, rate] = sum::<L, B>(looped, h);
     let mut z = [store(place[0]), store(place[1])];
     let mut v = [store(rate[0]), store(rate[1])];

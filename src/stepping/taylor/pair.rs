@@ -40,7 +40,7 @@ pub const MOST: usize = 24;
 
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
-pub struct Pair {
+pub struct PairKernel {
     is_single: bool,
     /// e × W as a product with `[c, s, c, s]` \[N·m\].
     pub(super) weight: [f64; 4],
@@ -56,17 +56,17 @@ pub struct Pair {
 
 /// Angles, rates and what they leave out, as `[phi1, v1, phi2, v2]`.
 #[derive(Clone, Copy, Debug)]
-pub struct Flow {
+pub struct PairFlow {
     /// Leading parts.
     pub high: [f64; 4],
     /// What they leave out.
     pub low: [f64; 4],
 }
 
-impl Flow {
+impl PairFlow {
     /// From the unknowns `[phi1, phi2, v1, v2]`, or `[phi1, v1]`.
     #[inline(always)]
-    pub fn of(pair: &Pair, state: &State) -> Self {
+    pub fn of(pair: &PairKernel, state: &State) -> Self {
         let read = |unknowns: &[f64]| match *unknowns {
             [phi, v, ..] if pair.is_single => [phi, v, 0.0, 0.0],
             [phi1, phi2, v1, v2, ..] => [phi1, v1, phi2, v2],
@@ -77,7 +77,7 @@ impl Flow {
 
     /// Back into the state.
     #[inline(always)]
-    pub fn write(&self, pair: &Pair, state: &mut State) {
+    pub fn write(&self, pair: &PairKernel, state: &mut State) {
         for (unknowns, [phi1, v1, phi2, v2]) in [(&mut state.y, self.high), (&mut state.low, self.low)] {
             if pair.is_single {
                 unknowns[..2].copy_from_slice(&[phi1, v1]);
@@ -91,21 +91,21 @@ impl Flow {
 /// Coefficients of one step.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-pub struct Scratch {
+pub struct PairScratch {
     pub(super) e: [[f64; 4]; MOST + 1],
     pub(super) v: [[f64; 4]; MOST + 1],
     /// -A m (f_2, f_1)_m.
     pub(super) g: [[f64; 4]; MOST + 1],
 }
 
-impl Default for Scratch {
+impl Default for PairScratch {
     fn default() -> Self {
         let zeros = [[0.0; 4]; MOST + 1];
         Self { e: zeros, v: zeros, g: zeros }
     }
 }
 
-impl Pair {
+impl PairKernel {
     /// The constants, where this form fits: one or two bodies, all hinges and centres of mass on the bars'
     /// axes, neither springs nor rows nor walls.
     ///
@@ -141,7 +141,7 @@ impl Pair {
     }
 
     /// Writes the powers of a step of some order.
-    pub fn powers(&self, scratch: &Scratch, order: usize, powers: &mut MotionPowers) {
+    pub fn powers(&self, scratch: &PairScratch, order: usize, powers: &mut MotionPowers) {
         let n = if self.is_single { 1 } else { 2 };
         let unit = |m: usize, k: usize| Complex::new(scratch.e[m][2 * k], scratch.e[m][2 * k + 1]);
         powers.take((n, order), |m, k| scratch.v[m][2 * k], unit);
@@ -150,7 +150,7 @@ impl Pair {
 
 /// What every order needs of the step's start.
 #[derive(Clone, Copy)]
-pub struct Start<L> {
+pub struct PairStart<L> {
     weight: L,
     /// -A.
     coupling: L,
@@ -171,10 +171,10 @@ pub struct Start<L> {
     odd: [L; 2],
 }
 
-impl<L: Lanes> Start<L> {
+impl<L: Lanes> PairStart<L> {
     /// From e_0, v_0 and M_0⁻¹ on and off its diagonal.
     #[inline(always)]
-    pub fn new(pair: &Pair, e0: L, v0: L, inverse: [L; 2]) -> Self {
+    pub fn new(pair: &PairKernel, e0: L, v0: L, inverse: [L; 2]) -> Self {
         let left = e0.swap_pairs().mul(L::of(LEFT));
         let (across, far) = (v0.swap_halves(), e0.swap_halves());
         // sin(phi_i - phi_j) with each body's sign.
@@ -202,7 +202,7 @@ impl<L: Lanes> Start<L> {
 
 /// The newest coefficients: v_k, and e_k, g_k.
 #[derive(Clone, Copy)]
-pub struct Newest<L> {
+pub struct PairNewest<L> {
     /// v_k.
     pub v: L,
     /// e_k.
@@ -213,7 +213,7 @@ pub struct Newest<L> {
 
 /// B and X so far.
 #[derive(Clone, Copy)]
-struct Sums<L> {
+struct PairSums<L> {
     b: L,
     x: L,
 }
@@ -223,9 +223,9 @@ struct Sums<L> {
 ///
 /// The terms with j = 1 and the last j are left out: they come last, since they are the newest.
 #[inline(always)]
-fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [Sums<L>; 2] {
+fn older<L: Lanes>(scratch: &PairScratch, k: usize) -> [PairSums<L>; 2] {
     // From the middle outwards in two chains.
-    let zero = Sums { b: L::splat(0.0), x: L::splat(0.0) };
+    let zero = PairSums { b: L::splat(0.0), x: L::splat(0.0) };
     let mut sums = [[zero; 2]; 2];
     let middle = k / 2;
     for step in 0..middle {
@@ -234,7 +234,7 @@ fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [Sums<L>; 2] {
             for (ahead, sums) in sums.iter_mut().enumerate() {
                 if j >= 2 && j + 2 <= k + ahead {
                     let e = L::of(scratch.e[k + 1 + ahead - j]);
-                    sums[chain] = Sums { b: v.mul_add(e, sums[chain].b), x: g.mul_add(e, sums[chain].x) };
+                    sums[chain] = PairSums { b: v.mul_add(e, sums[chain].b), x: g.mul_add(e, sums[chain].x) };
                 }
             }
         }
@@ -243,21 +243,21 @@ fn older<L: Lanes>(scratch: &Scratch, k: usize) -> [Sums<L>; 2] {
 }
 
 #[inline(always)]
-fn total<L: Lanes>(chains: [Sums<L>; 2]) -> Sums<L> {
-    Sums { b: chains[0].b.add(chains[1].b), x: chains[0].x.add(chains[1].x) }
+fn total<L: Lanes>(chains: [PairSums<L>; 2]) -> PairSums<L> {
+    PairSums { b: chains[0].b.add(chains[1].b), x: chains[0].x.add(chains[1].x) }
 }
 
 /// Order k: from v_k, e_k, g_k to the next ones; writes e_{k+1}, v_{k+1} and -A k (f_2, f_1)_k.
 #[inline(always)]
 fn order<L: Lanes>(
-    s: &Start<L>,
-    scratch: &mut Scratch,
-    older: Sums<L>,
-    newest: Newest<L>,
+    s: &PairStart<L>,
+    scratch: &mut PairScratch,
+    older: PairSums<L>,
+    newest: PairNewest<L>,
     k: usize,
-) -> Newest<L> {
-    let Sums { mut b, mut x } = older;
-    let Newest { v, e, g } = newest;
+) -> PairNewest<L> {
+    let PairSums { mut b, mut x } = older;
+    let PairNewest { v, e, g } = newest;
     if k >= 3 {
         let second = L::of(scratch.e[2]);
         b = L::of(scratch.v[k - 1]).mul_add(second, b);
@@ -283,12 +283,17 @@ fn order<L: Lanes>(
     scratch.g[k] = swapped.mul_add(s.far, far).mul(L::splat(k as f64)).array();
     scratch.e[k + 1] = e_next.array();
     scratch.v[k + 1] = next.array();
-    Newest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
+    PairNewest { v: next, e: e_next, g: s.v0.mul_add(e_next, v.mul_add(s.e1, b)) }
 }
 
 /// Two orders, the first of them even.
 #[inline(always)]
-fn two_orders<L: Lanes>(start: &Start<L>, scratch: &mut Scratch, newest: Newest<L>, k: usize) -> Newest<L> {
+fn two_orders<L: Lanes>(
+    start: &PairStart<L>,
+    scratch: &mut PairScratch,
+    newest: PairNewest<L>,
+    k: usize,
+) -> PairNewest<L> {
     let [first, second] = older(scratch, k);
     let newest = order(start, scratch, first, newest, k);
     order(start, scratch, second, newest, k + 1)
@@ -297,9 +302,9 @@ fn two_orders<L: Lanes>(start: &Start<L>, scratch: &mut Scratch, newest: Newest<
 /// Orders FROM to P-1 from the newest coefficients, those of order FROM; both even.
 #[inline(always)]
 pub fn expand<L: Lanes, const P: usize, const FROM: usize>(
-    start: &Start<L>,
-    scratch: &mut Scratch,
-    mut newest: Newest<L>,
+    start: &PairStart<L>,
+    scratch: &mut PairScratch,
+    mut newest: PairNewest<L>,
 ) {
     if !L::UNROLLED {
         for k in (FROM..P).step_by(2) {
@@ -320,7 +325,7 @@ pub fn expand<L: Lanes, const P: usize, const FROM: usize>(
 
 /// The step the last coefficients want \[s\]; not a number where one of them is not.
 #[inline(always)]
-pub fn wanted<L: Lanes, const P: usize>(step_size: &StepSize, scratch: &Scratch) -> f64 {
+pub fn wanted<L: Lanes, const P: usize>(step_size: &StepSize, scratch: &PairScratch) -> f64 {
     let v = L::of(scratch.v[P]).abs();
     // Not a number in any order reaches the last one.
     if !v.add(v.swap_halves()).array()[0].is_finite() {
@@ -338,10 +343,10 @@ pub fn wanted<L: Lanes, const P: usize>(step_size: &StepSize, scratch: &Scratch)
 /// alone where it is useless.
 #[inline(always)]
 pub fn step<L: Lanes, const P: usize>(
-    pair: &Pair,
+    pair: &PairKernel,
     step_size: &StepSize,
-    scratch: &mut Scratch,
-    flow: &mut Flow,
+    scratch: &mut PairScratch,
+    flow: &mut PairFlow,
     left: f64,
 ) -> (f64, f64) {
     let [phi1, v1, phi2, v2] = flow.high;
@@ -357,7 +362,7 @@ pub fn step<L: Lanes, const P: usize>(
     let determinant = L::splat(pair.product.0).sub(m.mul_add(m, L::splat(-pair.product.1)));
     let reciprocal = L::of([1.0 / determinant.array()[0]; 4]);
     let inverse = [L::of([d2, d2, d1, d1]).mul(reciprocal), L::splat(0.0).sub(m).mul(reciprocal)];
-    let start = Start::new(pair, e0, v0, inverse);
+    let start = PairStart::new(pair, e0, v0, inverse);
     let e1 = start.e1;
     let g1 = v0.mul(e1);
     let load = pair_sum(coupling.neg_mul_add(e0.mul(g1.swap_halves()), start.weight.mul(e0)));
@@ -378,7 +383,8 @@ pub fn step<L: Lanes, const P: usize>(
     scratch.v[0] = v0.array();
     scratch.v[1] = first.array();
     let zero = L::splat(0.0);
-    let newest = order(&start, scratch, Sums { b: zero, x: zero }, Newest { v: first, e: e1, g: g1 }, 1);
+    let newest =
+        order(&start, scratch, PairSums { b: zero, x: zero }, PairNewest { v: first, e: e1, g: g1 }, 1);
     expand::<L, P, 2>(&start, scratch, newest);
     let wanted = wanted::<L, P>(step_size, scratch);
     if wanted.is_nan() {
@@ -393,7 +399,7 @@ pub fn step<L: Lanes, const P: usize>(
 
 /// Takes `flow` from the step's start on by `h` \[s\].
 #[inline(always)]
-pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) {
+pub fn go<L: Lanes, const P: usize>(scratch: &PairScratch, flow: &mut PairFlow, h: f64) {
     let (high, low) = (L::of(flow.high), L::of(flow.low));
     let rates = L::of([flow.high[1], 0.0, flow.high[3], 0.0]);
     let (increment, rest) = increment::<L, P>(scratch, rates, low, h);
@@ -404,7 +410,7 @@ pub fn go<L: Lanes, const P: usize>(scratch: &Scratch, flow: &mut Flow, h: f64) 
 /// Increments `[phi1, v1, phi2, v2]` over `h` \[s\]: even and odd powers in two Horner chains; and what the
 /// rates' low parts move the angles by.
 #[inline(always)]
-fn increment<L: Lanes, const P: usize>(scratch: &Scratch, rates: L, low: L, h: f64) -> (L, L) {
+fn increment<L: Lanes, const P: usize>(scratch: &PairScratch, rates: L, low: L, h: f64) -> (L, L) {
     let square = L::splat(h * h);
     let mut chains = [L::splat(0.0); 2];
     let mut k = P;

@@ -23,7 +23,7 @@ use crate::arithmetic::lanes::row::{Row, at, room, store};
 use crate::arithmetic::lanes::{Code, Lanes};
 use crate::dynamics::Mechanism;
 use crate::dynamics::force::span::SpanLaw;
-use crate::dynamics::force::{Spring, UserForce};
+use crate::dynamics::force::{CompiledSpring, UserForce};
 use crate::dynamics::point::Point;
 
 /// Largest order there is room for.
@@ -49,13 +49,13 @@ pub struct Springs<const B: usize, const S: usize> {
     /// Springs with laws of their own, in the lanes behind the built-in ones.
     laws: Vec<LawSeries>,
     does_work: bool,
-    scratch: Box<Scratch<S>>,
+    scratch: Box<SpringScratch<S>>,
 }
 
 /// Coefficients of one step.
 #[derive(Clone, Debug)]
 #[repr(align(64))]
-struct Scratch<const S: usize> {
+struct SpringScratch<const S: usize> {
     /// 1/q_0.
     inverse: Row<S>,
     /// D.
@@ -105,7 +105,7 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             }
         }
         let zero = [[0.0; 4]; S];
-        let rate = |springs: &[Spring]| mechanism.tree.fastest_rate(springs);
+        let rate = |springs: &[CompiledSpring]| mechanism.tree.fastest_rate(springs);
         let mut measured = row(&|i| if springs[i].needs_length() { 1.0 } else { 0.0 });
         let mut most = row(&|i| rate(&springs[i..=i]).powi(2) - rate(&[]).powi(2));
         for (i, law) in laws.iter().enumerate().map(|(i, law)| (springs.len() + i, law)) {
@@ -125,7 +125,7 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             most,
             does_work: is_damped || laws.iter().any(LawSeries::does_work),
             laws,
-            scratch: Box::new(Scratch {
+            scratch: Box::new(SpringScratch {
                 inverse: zero,
                 x: [zero; MOST + 2],
                 y: [zero; MOST + 2],
@@ -247,7 +247,7 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             }
         }
         if !self.laws.is_empty() {
-            L::apart(Factors(self, m));
+            L::apart(SpringLawFactors(self, m));
         }
     }
 
@@ -307,16 +307,16 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             scratch.power[m] = each.fold(0.0, |sum, (&damping, &lost)| sum - damping * lost);
         }
         if !self.laws.is_empty() {
-            L::apart(Work(self, m));
+            L::apart(SpringWork(self, m));
         }
         [px, py]
     }
 }
 
 /// Laws are followed by themselves: in the loop over orders they cost springs without them 5 % of a step.
-struct Factors<'a, const B: usize, const S: usize>(&'a mut Springs<B, S>, usize);
+struct SpringLawFactors<'a, const B: usize, const S: usize>(&'a mut Springs<B, S>, usize);
 
-impl<const B: usize, const S: usize> Code for Factors<'_, B, S> {
+impl<const B: usize, const S: usize> Code for SpringLawFactors<'_, B, S> {
     type Output = ();
 
     #[inline(always)]
@@ -326,9 +326,9 @@ impl<const B: usize, const S: usize> Code for Factors<'_, B, S> {
 }
 
 /// What they do to the power, likewise.
-struct Work<'a, const B: usize, const S: usize>(&'a mut Springs<B, S>, usize);
+struct SpringWork<'a, const B: usize, const S: usize>(&'a mut Springs<B, S>, usize);
 
-impl<const B: usize, const S: usize> Code for Work<'_, B, S> {
+impl<const B: usize, const S: usize> Code for SpringWork<'_, B, S> {
     type Output = ();
 
     #[inline(always)]
@@ -343,9 +343,16 @@ fn in_lanes(force: &UserForce) -> Option<&SpanLaw> {
 }
 
 /// A spring of 1 N/m along a span.
-fn of_stiffness_one(span: &Point) -> Spring {
+fn of_stiffness_one(span: &Point) -> CompiledSpring {
     let name = String::new();
-    Spring { name, bodies: [None; 2], span: span.clone(), stiffness: 1.0, free_length: 0.0, damping: 0.0 }
+    CompiledSpring {
+        name,
+        bodies: [None; 2],
+        span: span.clone(),
+        stiffness: 1.0,
+        free_length: 0.0,
+        damping: 0.0,
+    }
 }
 
 /// Σ a_j b_{last-j} and Σ a_j c_{last-j}, from the middle outwards in two chains each, so that the newest

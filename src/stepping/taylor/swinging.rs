@@ -4,7 +4,7 @@
 //! Of the four lanes of a vector one counts, and its bits are those of a trajectory among others.  Wins over
 //! the series of any mechanism (whole runs by `taylor`): 2.6 times on `motor_sine` at 1e-9, 2.8 at 1e-13.
 
-use super::batch::{BatchMember, LaneClock, SwingingTeam, Team, swinging_law};
+use super::batch::{BatchMember, LaneClock, LaneKernel, SwingingLanes, swinging_law};
 use super::step_size::{self, StepSize};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Lanes;
@@ -17,7 +17,7 @@ const UNKNOWNS: usize = 3;
 /// The trajectory, and the series of its last step.
 #[derive(Clone, Debug)]
 pub struct Swinging {
-    team: SwingingTeam,
+    kernel: SwingingLanes,
     clock: LaneClock,
     step_size: StepSize,
     order: usize,
@@ -31,23 +31,23 @@ impl Swinging {
         let zero = vec![0.0; UNKNOWNS];
         let state = State { y: zero.clone(), low: zero, ..State::default() };
         let member = BatchMember::new(mechanism, state);
-        let mut team = SwingingTeam::new(&member, order, Vectors::Portable);
-        let longest = team.take_in(0, &member, order);
+        let mut kernel = SwingingLanes::new(&member, order, Vectors::Portable);
+        let longest = kernel.take_in(0, &member, order);
         let step_size = StepSize::new(tolerance, order, longest).over(mechanism.units.time);
-        Some(Self { team, clock: LaneClock::new(tolerance, order, Time::default()), step_size, order })
+        Some(Self { kernel, clock: LaneClock::new(tolerance, order, Time::default()), step_size, order })
     }
 }
 
 /// One step of at most `left` \[s\]; returns the step wanted, and leaves the state alone where it is useless.
 #[inline(always)]
 pub fn step<L: Lanes>(own: &mut Swinging, state: &mut State, left: f64) -> (f64, f64) {
-    let Swinging { team, clock, step_size, order } = own;
+    let Swinging { kernel, clock, step_size, order } = own;
     clock.set(0, state.time);
-    team.stand(0, state);
-    team.begin::<FirstHalf<L>>(clock);
-    team.expand::<FirstHalf<L>>(*order);
-    let sizes = team.sizes::<FirstHalf<L>>(*order);
-    if !team.power_of(0, 0, *order).is_finite() {
+    kernel.set_state(0, state);
+    kernel.begin::<FirstHalf<L>>(clock);
+    kernel.expand::<FirstHalf<L>>(*order);
+    let sizes = kernel.sizes::<FirstHalf<L>>(*order);
+    if !kernel.power_of(0, 0, *order).is_finite() {
         return (f64::NAN, 0.0);
     }
     let mut largest = [0.0; super::JUDGES];
@@ -65,9 +65,9 @@ pub fn step<L: Lanes>(own: &mut Swinging, state: &mut State, left: f64) -> (f64,
 /// Takes a state that stands where the last step began on by `h` \[s\].
 #[inline(always)]
 pub fn go<L: Lanes>(own: &mut Swinging, state: &mut State, h: f64) {
-    own.team.stand(0, state);
+    own.kernel.set_state(0, state);
     let mut taken = [0.0; LANES];
     taken[0] = h;
-    own.team.finish::<FirstHalf<L>>(own.order, &Octet(taken));
-    own.team.leave(0, state);
+    own.kernel.finish::<FirstHalf<L>>(own.order, &Octet(taken));
+    own.kernel.write_state(0, state);
 }

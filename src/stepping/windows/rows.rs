@@ -6,7 +6,7 @@ use crate::dynamics::{OdeSystem, State, Time};
 
 /// The rows of a window.
 #[derive(Clone, Debug, Default)]
-pub struct Rows {
+pub struct WindowRows {
     /// Where it began, with the first step it was given \[s\], and where it was to end.
     pub(super) start: State,
     pub(super) until: Time,
@@ -26,7 +26,7 @@ pub struct Rows {
     pub(super) finishes: bool,
 }
 
-impl Rows {
+impl WindowRows {
     /// True where rows are left on the way to `until`.
     pub(super) fn has_more(&self, until: Time) -> bool {
         self.until == until && self.last + 1 < self.after.len()
@@ -85,7 +85,7 @@ impl Rows {
 
 /// Takes up a state in the middle of a window, or at the beginning of one.
 pub(super) fn begin<F: OdeSystem + ?Sized>(
-    rows: &mut Rows,
+    rows: &mut WindowRows,
     stepper: &Stepper,
     integrate: &mut Integrate,
     field: &mut F,
@@ -93,7 +93,7 @@ pub(super) fn begin<F: OdeSystem + ?Sized>(
     until: Time,
 ) -> Result<(), StepError> {
     super::super::refuse_the_past(stepper.name, state, until, field.time_unit())?;
-    if let Some((start, row)) = Rows::recall(state, until) {
+    if let Some((start, row)) = WindowRows::recall(state, until) {
         let is_known = rows.start == start && rows.has_more(until);
         if !is_known {
             part(rows, stepper, integrate, field, &start, until, &mut Statistics::default())?;

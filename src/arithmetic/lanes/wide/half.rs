@@ -1,7 +1,7 @@
 //! Four lanes in code that is written over eight.
 
 use super::super::{Arithmetic, Lanes, Signed};
-use super::{EightLanes, Slots, Task, each_of_eight};
+use super::{EightLanes, SlotTask, Slots, each_of_eight};
 
 /// Four lanes for a single trajectory in code over eight: those beyond are left out.
 #[derive(Clone, Copy, Debug)]
@@ -91,7 +91,7 @@ impl<L: Lanes> Slots for FirstHalf<L> {
     }
 
     #[inline(always)]
-    fn perform<T: Task>(task: T) -> T::Output {
+    fn perform<T: SlotTask>(task: T) -> T::Output {
         L::perform(task)
     }
 }

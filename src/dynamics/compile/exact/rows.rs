@@ -7,7 +7,7 @@ use crate::arithmetic::tape::Slot;
 use crate::arithmetic::{Over, Real, Scalar};
 #[cfg(feature = "digits")]
 use crate::dynamics::configuration::{Configuration, Values};
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Constants;
 use crate::scene::Decimal;
@@ -24,7 +24,7 @@ impl<T: Constants<Constant = T> + Over<T> + Decimal> ExactMechanism<T> {
             let phase = row.law.as_ref().map(|law| (T::law_value(law, t), T::phase(law, t).rate));
             let (mut wanted, mut rate) = phase.unwrap_or((T::ZERO, T::ZERO));
             if let Some(aim) = &row.aim {
-                aim.at(T::moment(t), Posture { phi, z: &z, omega }, |slots| {
+                aim.at(T::moment(t), ConstraintArguments { phi, z: &z, omega }, |slots| {
                     let slot = |slot: Slot| slots[slot as usize];
                     (wanted, rate) = (wanted + slot(aim.value), rate + slot(aim.drive));
                     aim.slopes.iter().for_each(|&(k, slope)| jacobian[k] -= slot(slope));

@@ -7,7 +7,7 @@
 use super::super::coefficient::{SeriesNumber, Terms};
 use super::super::factors::Scale;
 use super::super::rows::RowSeries;
-use super::super::user::{At, UserSeries};
+use super::super::user::{PowersAt, UserSeries};
 use crate::arithmetic::Complex;
 use crate::dynamics::force::UserForce;
 
@@ -28,7 +28,7 @@ impl<T: SeriesNumber> PointForces<T> {
     }
 
     /// Finds power m of F, from the powers up to m of the motion's elements.
-    pub fn advance(&mut self, terms: &Terms<T::Constant>, m: usize, at: At<T>, scale: &Scale<T>) {
+    pub fn advance(&mut self, terms: &Terms<T::Constant>, m: usize, at: PowersAt<T>, scale: &Scale<T>) {
         for (row, series) in &mut self.0 {
             if let Some(force) = of_row(terms, *row) {
                 series.advance(force, m, at, scale);

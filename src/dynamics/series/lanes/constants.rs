@@ -10,9 +10,9 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::{Complex, Real};
 use crate::dynamics::Mechanism;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
-use crate::dynamics::force::action::Kind;
-use crate::dynamics::force::{Action, Spring, Torsion, UserForce};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
+use crate::dynamics::force::action::Applied;
+use crate::dynamics::force::{AppliedAction, CompiledSpring, Torsion, UserForce};
 use crate::dynamics::impact::Contact;
 use crate::dynamics::law::{Law, Sine};
 use crate::dynamics::partition::CoordinatePartition;
@@ -26,9 +26,9 @@ use std::sync::Arc;
 pub struct TermSet<C> {
     tree: Tree<C>,
     partition: CoordinatePartition<C>,
-    springs: Vec<Spring<C>>,
+    springs: Vec<CompiledSpring<C>>,
     torsions: Vec<Torsion<C>>,
-    actions: Vec<Action<C>>,
+    actions: Vec<AppliedAction<C>>,
     forces: Vec<UserForce<C>>,
     constraints: Vec<ConstraintEquation<C>>,
 }
@@ -202,8 +202,8 @@ fn point<C>(point: &Point, of: &mut impl FnMut(f64) -> C) -> Point<C> {
     }
 }
 
-fn spring<C>(spring: &Spring, of: &mut impl FnMut(f64) -> C) -> Spring<C> {
-    Spring {
+fn spring<C>(spring: &CompiledSpring, of: &mut impl FnMut(f64) -> C) -> CompiledSpring<C> {
+    CompiledSpring {
         name: spring.name.clone(),
         bodies: spring.bodies,
         span: point(&spring.span, of),
@@ -224,21 +224,21 @@ fn torsion<C>(torsion: &Torsion, of: &mut impl FnMut(f64) -> C) -> Torsion<C> {
     }
 }
 
-fn action<C>(action: &Action, of: &mut impl FnMut(f64) -> C) -> Action<C> {
+fn action<C>(action: &AppliedAction, of: &mut impl FnMut(f64) -> C) -> AppliedAction<C> {
     let kind = match &action.kind {
-        Kind::Force { point: at, force, follows } => {
-            Kind::Force { point: point(at, of), force: vector(*force, of), follows: *follows }
+        Applied::Force { point: at, force, follows } => {
+            Applied::Force { point: point(at, of), force: vector(*force, of), follows: *follows }
         }
-        Kind::Torque { torque, base } => Kind::Torque { torque: of(*torque), base: *base },
+        Applied::Torque { torque, base } => Applied::Torque { torque: of(*torque), base: *base },
     };
     let law = action.law.as_ref().map(|one| law(one, of));
-    Action { name: action.name.clone(), body: action.body, kind, law }
+    AppliedAction { name: action.name.clone(), body: action.body, kind, law }
 }
 
 fn equation<C>(row: &ConstraintEquation, of: &mut impl FnMut(f64) -> C) -> ConstraintEquation<C> {
     let measure = match &row.measure {
-        &Measure::Angle { body, base } => Measure::Angle { body, base },
-        Measure::Place(place) => Measure::Place(Quadratic {
+        &RowMeasure::Angle { body, base } => RowMeasure::Angle { body, base },
+        RowMeasure::Place(place) => RowMeasure::Place(Quadratic {
             angles: place.angles,
             constant: of(place.constant),
             linear: place.linear.iter().map(|&(k, g)| (k, vector(g, of))).collect(),
@@ -288,9 +288,9 @@ mod tests {
         assert!(zeros.iter().all(|set| !are_alike(&one, &mechanism(&[set]))));
     }
 
-    struct Rates(LaneConstants, Mechanism);
+    struct RatesInLanes(LaneConstants, Mechanism);
 
-    impl WideCode for Rates {
+    impl WideCode for RatesInLanes {
         type Output = ([f64; LANES], Vec<Law>);
 
         fn run<W: EightLanes>(self) -> Self::Output {
@@ -307,7 +307,7 @@ mod tests {
         let [first, second] = [&one, &other].map(OwnNumbers::of);
         let mut constants = LaneConstants::of(&first);
         assert!(!constants.put(2, &first) && constants.put(2, &second) && !constants.put(2, &second));
-        let (stiffness, laws) = Vectors::Portable.run(Rates(constants, one.clone()));
+        let (stiffness, laws) = Vectors::Portable.run(RatesInLanes(constants, one.clone()));
         for lane in 0..LANES {
             let own = if lane == 2 { &other } else { &one };
             assert_eq!(stiffness[lane], own.torsions[0].stiffness);

@@ -16,12 +16,12 @@ pub struct FactorInLanes<W> {
 
 /// Sums of the next order on their way: of the two components of z w, and of the two terms of z × R.
 #[derive(Clone, Copy, Debug)]
-pub struct Ahead<W> {
+pub struct LaneSumsAhead<W> {
     turned: [W; 2],
     crossed: [W; 2],
 }
 
-impl<W: EightLanes> Default for Ahead<W> {
+impl<W: EightLanes> Default for LaneSumsAhead<W> {
     fn default() -> Self {
         Self { turned: [W::ZERO; 2], crossed: [W::ZERO; 2] }
     }
@@ -57,7 +57,7 @@ impl<W: EightLanes> FactorInLanes<W> {
 
 impl<W: EightLanes> CauchyFactor<InLanes<W>> for FactorInLanes<W> {
     type Scale = ();
-    type Ahead = Ahead<W>;
+    type Ahead = LaneSumsAhead<W>;
 
     fn new(order: usize) -> Self {
         Self { powers: vec![W::ZERO; order + 1], count: 0 }
@@ -113,7 +113,7 @@ impl<W: EightLanes> CauchyFactor<InLanes<W>> for FactorInLanes<W> {
         omega: &Self,
         _scale: &(),
         m: usize,
-        ahead: &mut Ahead<W>,
+        ahead: &mut LaneSumsAhead<W>,
     ) -> [InLanes<W>; 2] {
         let (x, y, w) = (re.powers(0, m + 1), im.powers(0, m + 1), omega.powers(0, m));
         if m % 2 == 1 {
@@ -142,7 +142,7 @@ impl<W: EightLanes> CauchyFactor<InLanes<W>> for FactorInLanes<W> {
         [rest_re, rest_im]: [&Self; 2],
         _scale: &(),
         m: usize,
-        ahead: &mut Ahead<W>,
+        ahead: &mut LaneSumsAhead<W>,
     ) -> InLanes<W> {
         if m == 0 {
             ahead.crossed = [W::ZERO; 2];

@@ -5,13 +5,13 @@
 //! moved as often as it needs by itself, so that none depends on the others.
 
 use super::super::rows::RowMeasures;
-use super::super::user::At;
+use super::super::user::PowersAt;
 use super::super::{Constants, Series, Terms};
 use super::number::InLanes;
-use super::{Landing, Times};
+use super::{StepEnds, Times};
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::{LANES, Octet};
-use crate::arithmetic::lanes::wide::{EightLanes, Task};
+use crate::arithmetic::lanes::wide::{EightLanes, SlotTask};
 use crate::dynamics::schur::NEAR;
 
 /// Rounds of one level, at most.
@@ -147,23 +147,23 @@ impl Sieve {
 }
 
 /// Brings angles and rates of all lanes back, which are left where they are in those that do not land.
-pub(super) struct Land<'a, 'b, W: EightLanes> {
+pub(super) struct ProjectLanes<'a, 'b, W: EightLanes> {
     pub series: &'a mut Series<InLanes<W>>,
     pub regularity: &'a mut Regularity,
     pub begin: &'a mut [Vec<InLanes<W>>; 3],
     pub terms: &'a Terms<'b, InLanes<W>>,
     pub times: Times,
-    pub landing: Landing<'a>,
+    pub landing: StepEnds<'a>,
 }
 
-impl<W: EightLanes> Task for Land<'_, '_, W> {
+impl<W: EightLanes> SlotTask for ProjectLanes<'_, '_, W> {
     type Output = [bool; LANES];
 
     #[inline(always)]
     fn perform(self) -> [bool; LANES] {
         let Self { series, regularity, begin: [u, rest, rate], terms, times, landing } = self;
         let (f, angles) = (u.len(), series.angles);
-        let Landing { high, low, is_going, unit, per_length } = landing;
+        let StepEnds { high, low, is_going, unit, per_length } = landing;
         let per_length = W::of(&per_length.0);
         for c in 0..f {
             u[c] = InLanes(W::of(&high[c].0));
@@ -296,7 +296,7 @@ impl<W: EightLanes> Series<InLanes<W>> {
     #[inline(always)]
     fn aim_here(&mut self) {
         let n = self.elements;
-        let at = At { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
+        let at = PowersAt { time: self.time, phi: &self.phi, z: &self.z, omega: &self.omega, n };
         self.rows.advance_aims(0, at, &self.factors.scale, &mut self.load);
     }
 

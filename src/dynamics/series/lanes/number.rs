@@ -5,7 +5,7 @@ use super::super::{Constants, Series, SeriesNumber, Terms, bodywise, drive};
 use super::factor::FactorInLanes;
 use super::{Times, constants};
 use crate::arithmetic::eight::LANES;
-use crate::arithmetic::lanes::wide::{EightLanes, Task};
+use crate::arithmetic::lanes::wide::{EightLanes, SlotTask};
 use crate::arithmetic::{Complex, DoubleDouble, Over, Real, Scalar, sincos};
 use crate::dynamics::Time;
 use crate::dynamics::law::{Law, Phase, Sine};
@@ -266,7 +266,7 @@ impl<W: EightLanes> SeriesNumber for InLanes<W> {
     const HAS_BORDER: bool = true;
 
     #[inline(never)]
-    fn perform<K: Task>(task: K) -> K::Output {
+    fn perform<K: SlotTask>(task: K) -> K::Output {
         W::perform(task)
     }
 

@@ -33,7 +33,7 @@ impl All {
         let mut found = vec![a.product(&b, &(), 6, 2..=5)];
         found.extend(CauchyFactor::products([&a, &c], &b, &(), 6, 2..=5));
         found.push(CauchyFactor::sum_of_products([[&a, &b], [&c, &d]], -1.0, &(), 6, 2..=5));
-        let mut ahead = Ahead::default();
+        let mut ahead = SumsAhead::default();
         for m in 0..COUNT - 1 {
             found.extend(CauchyFactor::turned([&a, &b], &c, &(), m, &mut ahead));
             found.push(CauchyFactor::crossed([&a, &b], [&c, &d], &(), m, &mut ahead));

@@ -15,7 +15,7 @@
 
 use super::{Kind, RowSeries, bent, in_force};
 use crate::arithmetic::Complex;
-use crate::dynamics::constraint::Measure;
+use crate::dynamics::constraint::RowMeasure;
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::series::order::rows_times;
 use crate::dynamics::series::{SeriesNumber, Terms};
@@ -26,7 +26,7 @@ impl<T: SeriesNumber> RowSeries<T> {
     pub fn renew(&mut self, terms: &Terms<T::Constant>, partition: &CoordinatePartition<T::Constant>) {
         for (kind, row) in self.kinds.iter_mut().zip(in_force(terms.constraints, partition)) {
             match (kind, &row.measure) {
-                (Kind::Place { place, law, aim, .. }, Measure::Place(other)) => {
+                (Kind::Place { place, law, aim, .. }, RowMeasure::Place(other)) => {
                     place.clone_from(other);
                     law.clone_from(&row.law);
                     if let (Some(aim), Some(other)) = (aim, &row.aim) {

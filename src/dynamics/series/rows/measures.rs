@@ -2,7 +2,7 @@
 
 use crate::arithmetic::Real;
 use crate::dynamics::Mechanism;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::partition::CoordinatePartition;
 use crate::dynamics::rank::{Levers, Metric};
 
@@ -34,7 +34,7 @@ impl RowMeasures {
 /// The longest lever of a row; one of an origin is the unit of length \[m\], and so is that of an aim at
 /// least, or 1 where it gives an angle.
 fn longest_lever(row: &ConstraintEquation, unit: f64) -> f64 {
-    let Measure::Place(place) = &row.measure else { return 1.0 };
+    let RowMeasure::Place(place) = &row.measure else { return 1.0 };
     let least = match (&row.aim, row.is_in_radians()) {
         (None, _) => 0.0,
         (Some(_), true) => 1.0,
@@ -48,7 +48,7 @@ fn longest_lever(row: &ConstraintEquation, unit: f64) -> f64 {
 
 /// The coordinates whose magnitudes a row's rounding grows with.
 pub(super) fn growing(row: &ConstraintEquation) -> Vec<usize> {
-    let Measure::Place(place) = &row.measure else { return Vec::new() };
+    let RowMeasure::Place(place) = &row.measure else { return Vec::new() };
     let angles = row.aim.iter().flat_map(|aim| aim.counted_angles());
     let mut growing: Vec<usize> =
         row.coordinates().into_iter().filter(|&k| k >= place.angles).chain(angles).collect();

@@ -2,14 +2,14 @@
 
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::wide::Slots;
-use crate::dynamics::constraint::{ConstraintEquation, Measure};
+use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::series::Terms;
 use crate::dynamics::series::varied::Number;
 use crate::dynamics::tree::Tree;
 
 /// An entry of H.
 #[derive(Clone, Copy, Debug)]
-pub struct Coupling<S> {
+pub struct CouplingEntry<S> {
     /// Its column.
     pub column: usize,
     /// Its value and derivatives.
@@ -19,15 +19,15 @@ pub struct Coupling<S> {
 
 /// Entries of H, row by row, and where rows begin and end.
 #[derive(Debug)]
-pub struct Couplings<S> {
+pub struct CouplingEntries<S> {
     /// Row by row.
-    pub entries: Vec<Coupling<S>>,
+    pub entries: Vec<CouplingEntry<S>>,
     rows: Vec<usize>,
 }
 
 /// What a row asks of a body, g.
 #[derive(Clone, Copy, Debug)]
-pub struct Gradient<S> {
+pub struct RowGradient<S> {
     /// The row and the body.
     pub row: usize,
     pub body: usize,
@@ -38,30 +38,30 @@ pub struct Gradient<S> {
 
 /// The constants and their derivatives.
 #[derive(Debug)]
-pub struct Known<S> {
+pub struct TangentConstants<S> {
     /// H beside the diagonal, and as a matrix.
-    pub coupling: Couplings<S>,
+    pub coupling: CouplingEntries<S>,
     pub matrix: Vec<f64>,
     /// Those entries that have derivatives.
-    pub varied: Couplings<S>,
+    pub varied: CouplingEntries<S>,
     /// Derivatives of d_k and of gravity, body by body.
     pub diagonal: Vec<S>,
     pub weight: Vec<[S; 2]>,
     /// What rows ask of bodies.
-    pub gradient: Vec<Gradient<S>>,
+    pub gradient: Vec<RowGradient<S>>,
 }
 
 /// g of a row, where it has nothing else.
 fn gradient(row: &ConstraintEquation<Number>) -> Option<&[(usize, Complex<Number>)]> {
     match &row.measure {
-        Measure::Place(place) if place.bilinear.is_empty() && row.law.is_none() && row.aim.is_none() => {
+        RowMeasure::Place(place) if place.bilinear.is_empty() && row.law.is_none() && row.aim.is_none() => {
             Some(&place.linear)
         }
         _ => None,
     }
 }
 
-impl<S: Slots> Couplings<S> {
+impl<S: Slots> CouplingEntries<S> {
     /// Those beside the diagonal that are wanted.
     fn of(tree: &Tree<Number>, is_wanted: impl Fn(Number) -> bool) -> Self {
         let n = tree.coordinates;
@@ -70,7 +70,7 @@ impl<S: Slots> Couplings<S> {
             for column in (0..n).filter(|&column| column != row) {
                 let entry = tree.coupling[row.min(column) * n + row.max(column)].re;
                 if is_wanted(entry) {
-                    entries.push(Coupling { column, value: entry.value, slope: S::of(&entry.slope) });
+                    entries.push(CouplingEntry { column, value: entry.value, slope: S::of(&entry.slope) });
                 }
             }
             rows.push(entries.len());
@@ -86,7 +86,7 @@ impl<S: Slots> Couplings<S> {
 
     /// Those of a row.
     #[inline(always)]
-    pub fn row(&self, row: usize) -> &[Coupling<S>] {
+    pub fn row(&self, row: usize) -> &[CouplingEntry<S>] {
         &self.entries[self.rows[row]..self.rows[row + 1]]
     }
 
@@ -123,7 +123,7 @@ impl<S: Slots> Couplings<S> {
             let (mut p, mut q, mut s, mut t) = (S::ZERO, S::ZERO, S::ZERO, S::ZERO);
             let mut e = 0;
             while e < entries.len() {
-                let Coupling { column, slope, .. } = entries[e];
+                let CouplingEntry { column, slope, .. } = entries[e];
                 let (x, y) = (&curve_re[column * room + m..][..4], &curve_im[column * room + m..][..4]);
                 a = slope.mul_add(S::splat(x[0]), a);
                 b = slope.mul_add(S::splat(x[1]), b);
@@ -142,7 +142,7 @@ impl<S: Slots> Couplings<S> {
     }
 }
 
-impl<S: Slots> Known<S> {
+impl<S: Slots> TangentConstants<S> {
     /// Those of terms, where these have nothing else.
     pub fn of(terms: &Terms<Number>) -> Option<Self> {
         let (tree, structure) = (terms.tree, terms.structure);
@@ -152,7 +152,7 @@ impl<S: Slots> Known<S> {
         if is_forced || tree.off_axis || !tree.is_dense() || n != tree.angles || terms.partition.driven() {
             return None;
         }
-        let coupling = Couplings::of(tree, |entry| entry.value != 0.0);
+        let coupling = CouplingEntries::of(tree, |entry| entry.value != 0.0);
         let mut matrix = vec![0.0; n * n];
         for (k, row) in matrix.chunks_exact_mut(n.max(1)).enumerate() {
             coupling.row(k).iter().for_each(|entry| row[entry.column] = entry.value);
@@ -160,13 +160,13 @@ impl<S: Slots> Known<S> {
         let mut known = Self {
             coupling,
             matrix,
-            varied: Couplings::of(tree, |entry| entry != Number::constant(entry.value)),
+            varied: CouplingEntries::of(tree, |entry| entry != Number::constant(entry.value)),
             diagonal: tree.diagonal.iter().map(|number| S::of(&number.slope)).collect(),
             weight: tree.weight.iter().map(|w| [S::of(&w.re.slope), S::of(&w.im.slope)]).collect(),
             gradient: Vec::new(),
         };
         for (row, equation) in terms.constraints.iter().enumerate() {
-            known.gradient.extend(gradient(equation)?.iter().map(|&(body, g)| Gradient {
+            known.gradient.extend(gradient(equation)?.iter().map(|&(body, g)| RowGradient {
                 row,
                 body,
                 value: Complex::new(g.re.value, g.im.value),

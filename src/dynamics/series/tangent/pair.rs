@@ -1,6 +1,6 @@
 //! Two bodies without loops: an order of their derivatives in registers.
 
-use super::{Known, Tangent};
+use super::{Tangent, TangentConstants};
 use crate::arithmetic::lanes::wide::Slots;
 
 impl<S: Slots> Tangent<S> {
@@ -9,7 +9,7 @@ impl<S: Slots> Tangent<S> {
     pub fn advance_pair(&mut self, m: usize) {
         let ((bend_re, bend_im, left), (other_re, other_im, other_left)) =
             (self.products(0, m), self.products(1, m));
-        let (room, Known { matrix, diagonal, .. }) = (self.room, &self.known);
+        let (room, TangentConstants { matrix, diagonal, .. }) = (self.room, &self.known);
         let (mut re, mut im) = (self.rest[0][m], self.rest[1][m]);
         let (mut next_re, mut next_im) = (self.rest[0][room + m], self.rest[1][room + m]);
         let h = S::splat(matrix[1]);

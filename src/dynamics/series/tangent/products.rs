@@ -5,7 +5,7 @@ use crate::arithmetic::lanes::wide::Slots;
 
 /// Sums of an order on their way: of the components of z dphi, of dphi D, and of the two terms of z × dR.
 #[derive(Clone, Copy, Debug)]
-pub struct Sums<S> {
+pub struct TangentSums<S> {
     turn_re: S,
     turn_im: S,
     pull: S,
@@ -13,7 +13,7 @@ pub struct Sums<S> {
     cross_im: S,
 }
 
-impl<S: Slots> Sums<S> {
+impl<S: Slots> TangentSums<S> {
     /// Nothing yet.
     pub const ZERO: Self =
         Self { turn_re: S::ZERO, turn_im: S::ZERO, pull: S::ZERO, cross_re: S::ZERO, cross_im: S::ZERO };
@@ -52,7 +52,7 @@ impl<S: Slots> Tangent<S> {
 
     /// The sums of order m, an even number; those of the next are left for it.
     #[inline(always)]
-    fn two_orders(&mut self, k: usize, m: usize) -> Sums<S> {
+    fn two_orders(&mut self, k: usize, m: usize) -> TangentSums<S> {
         let last = self.place(k);
         // Power m+3-j of z and of D is at j.
         let from = last - 3 - m..last + 1;
@@ -61,7 +61,7 @@ impl<S: Slots> Tangent<S> {
         let first = k * self.room;
         let angle = &self.angle[first..][..m + 2];
         let (rest_re, rest_im) = (&self.rest[0][first..][..m], &self.rest[1][first..][..m]);
-        let (mut this, mut next) = (Sums::<S>::ZERO, Sums::<S>::ZERO);
+        let (mut this, mut next) = (TangentSums::<S>::ZERO, TangentSums::<S>::ZERO);
         let (mut z0, mut z1) = ((S::splat(re[0]), S::splat(im[0])), (S::splat(re[1]), S::splat(im[1])));
         let mut z2 = (S::splat(re[2]), S::splat(im[2]));
         let mut d2 = S::splat(along[2]);
@@ -93,7 +93,7 @@ impl<S: Slots> Tangent<S> {
 
     /// The sums of order m, an odd number.
     #[inline(always)]
-    fn completed(&self, k: usize, m: usize) -> Sums<S> {
+    fn completed(&self, k: usize, m: usize) -> TangentSums<S> {
         let (first, place) = (k * self.room, self.place(k) - 1);
         let z = (S::splat(self.z[0][place]), S::splat(self.z[1][place]));
         let mut sums = self.ahead[k];

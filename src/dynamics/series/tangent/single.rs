@@ -38,7 +38,7 @@ pub struct SinglePair {
 }
 
 /// What all orders have in common.
-struct Constants<L> {
+struct SingleConstants<L> {
     /// H off its diagonal, and its derivative.
     coupling: L,
     coupling_slope: L,
@@ -52,7 +52,7 @@ struct Constants<L> {
     left: L,
 }
 
-impl<L: Lanes> Constants<L> {
+impl<L: Lanes> SingleConstants<L> {
     /// Accelerations, less their sign, from the two terms of what is left of each equation.
     #[inline(always)]
     fn answer(&self, terms: L) -> L {
@@ -64,7 +64,7 @@ impl<L: Lanes> Constants<L> {
 
 /// Y and V of an order, as far as they are known.
 #[derive(Clone, Copy)]
-struct Sums<L> {
+struct SingleSums<L> {
     turn: L,
     pull: L,
 }
@@ -99,7 +99,7 @@ impl SinglePair {
 
     /// Order m of the motion, m > 0: the next power of its rates, that of z after it, and R_m.
     #[inline(always)]
-    fn extend<L: Lanes>(&mut self, constants: &Constants<L>, times: f64, m: usize) {
+    fn extend<L: Lanes>(&mut self, constants: &SingleConstants<L>, times: f64, m: usize) {
         let (mut turn, mut j) = (L::ZERO, 0);
         while j <= m {
             turn = L::of(self.omega[j]).mul_add(L::of(self.z[m + 1 - j]), turn);
@@ -136,7 +136,7 @@ impl SinglePair {
 
     /// The sums of order m, and those of the next one without what order m brings.
     #[inline(always)]
-    fn two_orders<L: Lanes>(&self, m: usize) -> [Sums<L>; 2] {
+    fn two_orders<L: Lanes>(&self, m: usize) -> [SingleSums<L>; 2] {
         let (mut this, mut next) = ([L::ZERO; 3], [L::ZERO; 3]);
         let (mut z, mut conjugate) = (L::of(self.z[m + 3]), L::of(self.conjugate[m + 1]));
         let (mut along, mut j) = (L::of(self.along[m + 1]), 0);
@@ -158,13 +158,13 @@ impl SinglePair {
         this[2] = angle.neg_mul_add(last, this[2]);
         next[0] = newer.mul_add(second, angle.mul_add(z, next[0]));
         next[2] = newer.neg_mul_add(last, angle.neg_mul_add(along, next[2]));
-        [this, next].map(|[turn, cross, pull]| Sums { turn, pull: cross.add(pull) })
+        [this, next].map(|[turn, cross, pull]| SingleSums { turn, pull: cross.add(pull) })
     }
 
     /// Adds what order m brings to the sums of the next one.
     #[inline(always)]
-    fn completed<L: Lanes>(&self, sums: Sums<L>, m: usize) -> Sums<L> {
-        Sums {
+    fn completed<L: Lanes>(&self, sums: SingleSums<L>, m: usize) -> SingleSums<L> {
+        SingleSums {
             turn: L::of(self.angle[m + 2]).mul_add(L::of(self.z[1]), sums.turn),
             pull: L::of(self.rest[m]).mul_add(L::of(self.conjugate[1]), sums.pull),
         }
@@ -174,7 +174,7 @@ impl SinglePair {
     #[inline(always)]
     fn take_motion<L: Lanes>(
         &mut self,
-        (values, constants, times): (&Series<f64>, &Constants<L>, &[f64]),
+        (values, constants, times): (&Series<f64>, &SingleConstants<L>, &[f64]),
         weight: [f64; 4],
         [first, order]: [usize; 2],
     ) {
@@ -209,8 +209,8 @@ impl SinglePair {
     #[inline(always)]
     fn advance<L: Lanes>(
         &mut self,
-        constants: &Constants<L>,
-        sums: Sums<L>,
+        constants: &SingleConstants<L>,
+        sums: SingleSums<L>,
         (m, times, fractions): (usize, &[f64], &[f64]),
     ) -> [f64; 2] {
         let times = L::splat(times[m]);
@@ -236,13 +236,13 @@ impl SinglePair {
 impl<S: Slots> Tangent<S> {
     /// The constants of a pair.
     #[inline(always)]
-    fn constants(&self) -> Constants<S::Half> {
+    fn constants(&self) -> SingleConstants<S::Half> {
         let (known, [z, other]) = (&self.known, [self.values.z[0], self.values.z[1]]);
         let slope = if let [entry, _] = known.varied.entries[..] { entry.slope.array()[0] } else { 0.0 };
         let [a, b, c, d] = [self.response[0], self.response[1], self.response[2], self.response[3]];
         let [first, second] = [0, 1].map(|k| known.weight[k].map(|part| part.array()[0]));
         let diagonal = [known.diagonal[0].array()[0], known.diagonal[1].array()[0]];
-        Constants {
+        SingleConstants {
             coupling: Arithmetic::splat(known.matrix[1]),
             coupling_slope: Arithmetic::splat(slope),
             response: [Lanes::of([a, a, d, d]), Lanes::of([b, b, c, c])],

@@ -3,12 +3,12 @@
 use super::*;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::lanes::Portable;
-use crate::arithmetic::lanes::wide::{EightLanes, Single, Task, Vectors, WideCode};
+use crate::arithmetic::lanes::wide::{EightLanes, Single, SlotTask, Vectors, WideCode};
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::series::slots::InSlots;
 use crate::dynamics::{Mechanism, Time};
 use crate::scene::Template;
-use crate::scene::exact::Watched;
+use crate::scene::exact::Watcher;
 use std::sync::Arc;
 
 /// Orders are found two at a time, so both kinds of a last one are looked at.
@@ -32,7 +32,7 @@ fn mechanism(
         (path, Number::unknown(value(path).expect("a value"), (lane + 8 - front) % 8))
     };
     let known: Vec<_> = numbers.iter().enumerate().map(seed).collect();
-    let (scene, _) = template.exact_with(&[], &known, Watched::Beside).expect("known numbers");
+    let (scene, _) = template.exact_with(&[], &known, Watcher::Beside).expect("known numbers");
     let start = structure.start(&plain);
     let varied = |k: usize, value: f64| {
         Number::new(
@@ -47,7 +47,7 @@ fn mechanism(
 }
 
 /// Powers of the rates both ways.
-struct Both<'a> {
+struct BothPowers<'a> {
     terms: Terms<'a, Number>,
     coordinates: Coordinates,
     begin: Begin<'a>,
@@ -58,14 +58,14 @@ struct Both<'a> {
     order: usize,
 }
 
-struct Expanded<'a, 'b, S: Slots>(
+struct BothExpanded<'a, 'b, S: Slots>(
     &'a mut Tangent<S>,
     &'a Terms<'b, Number>,
     Begin<'a>,
     Option<&'a MotionPowers>,
 );
 
-impl<S: Slots> Task for Expanded<'_, '_, S> {
+impl<S: Slots> SlotTask for BothExpanded<'_, '_, S> {
     type Output = ();
 
     #[inline(always)]
@@ -74,7 +74,7 @@ impl<S: Slots> Task for Expanded<'_, '_, S> {
     }
 }
 
-impl Both<'_> {
+impl BothPowers<'_> {
     /// The powers of the motion by themselves.
     fn powers(&self) -> MotionPowers {
         let plain = self.terms.structure.terms();
@@ -103,7 +103,7 @@ impl Both<'_> {
         let powers = self.is_known.then(|| self.powers());
         assert_eq!(tangent.fitting(powers.as_ref()).is_some(), self.is_known);
         tangent.expand_values(&self.terms, self.begin, powers.as_ref());
-        S::perform(Expanded(&mut tangent, &self.terms, self.begin, powers.as_ref()));
+        S::perform(BothExpanded(&mut tangent, &self.terms, self.begin, powers.as_ref()));
         let f = tangent.coordinates();
         let found = (0..(self.order + 1) * f).map(|i| {
             let (m, c) = (i / f, i % f);
@@ -126,7 +126,7 @@ impl Both<'_> {
     }
 }
 
-impl WideCode for Both<'_> {
+impl WideCode for BothPowers<'_> {
     type Output = Vec<Number>;
 
     fn run<W: EightLanes>(self) -> Vec<Number> {
@@ -150,7 +150,7 @@ fn derivatives_are_those_of_numbers_that_have_them() {
             let both = |front: usize, is_single: bool, is_known: bool| {
                 let (mechanism, phi, omega) = &all[front];
                 let (terms, begin) = (mechanism.terms(), (Time::default(), &phi[..], &rest[..], &omega[..]));
-                Both { terms, coordinates, begin, is_single, is_known, order }
+                BothPowers { terms, coordinates, begin, is_single, is_known, order }
             };
             let expected: Vec<_> = (0..8).map(|lane| both(lane, false, false).expected()).collect();
             for (is_single, is_known) in kinds {

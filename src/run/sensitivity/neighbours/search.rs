@@ -1,10 +1,10 @@
 //! The search for the distances at which mechanisms of neighbouring values tell what a number does.
 
 use super::{FINER, LEVELS, residuals};
-use crate::dynamics::contact::metric::Metric;
+use crate::dynamics::contact::metric::ContactMetric;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::run::saltation::Level;
+use crate::run::saltation::DistanceLevel;
 use crate::scene::{Template, Variable};
 use std::sync::Arc;
 
@@ -96,7 +96,7 @@ fn error(larger: &Attempt, smaller: &Attempt) -> f64 {
 
 /// What distances are looked for: for a number of a scene whose mechanism and start are these, for a run
 /// up to `until` \[s\].
-pub(super) struct Search<'a> {
+pub(super) struct DistanceSearch<'a> {
     pub template: &'a Template,
     pub number: (&'a Variable, f64),
     pub base: (&'a Arc<Mechanism>, &'a Motion),
@@ -105,7 +105,7 @@ pub(super) struct Search<'a> {
     pub in_units: bool,
 }
 
-impl Search<'_> {
+impl DistanceSearch<'_> {
     /// The attempt with the least estimated relative error, and that.
     pub fn best(&self) -> Result<(Attempt, f64), String> {
         let (mut tried, mut best, mut why): (Vec<Attempt>, Option<(f64, usize)>, _) =
@@ -143,9 +143,9 @@ impl Search<'_> {
     }
 
     /// Scenes at ever smaller changes than this one over the number, as far as there are such.
-    pub fn levels(&self, share: f64) -> Vec<Level<(f64, Candidate)>> {
+    pub fn levels(&self, share: f64) -> Vec<DistanceLevel<(f64, Candidate)>> {
         let shares = (1..LEVELS).map(|level| share * FINER.powi(level));
-        let level = |share: f64| Some(Level { far: 1.0 / share, list: self.scenes(share).ok()? });
+        let level = |share: f64| Some(DistanceLevel { far: 1.0 / share, list: self.scenes(share).ok()? });
         shares.map_while(level).collect()
     }
 
@@ -234,7 +234,7 @@ impl Search<'_> {
             return 0.0;
         }
         let (t, phi, omega) = self.state(state);
-        let metric = Metric::at(mechanism, t, &phi, &omega);
+        let metric = ContactMetric::at(mechanism, t, &phi, &omega);
         let accelerations = metric.map(|metric| metric.rates(&metric.unconstrained()));
         accelerations.unwrap_or_default().iter().fold(0.0, |most, a| most.max(a.abs()))
     }

@@ -10,7 +10,7 @@ use crate::run::inside::{Observer, ObserverAdapter, Step};
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use crate::stepping::StepError;
-use crate::stepping::taylor::batch::{BatchMember, Going, Passage};
+use crate::stepping::taylor::batch::{BatchMember, Going, TakenStep};
 use std::cell::RefCell;
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
@@ -56,7 +56,7 @@ impl ThroughImpacts {
         &mut self,
         member: &mut BatchMember,
         until: Time,
-        (watching, watch): (&mut Watching, &mut dyn FnMut(&Passage) -> Going),
+        (watching, watch): (&mut Watching, &mut dyn FnMut(&TakenStep) -> Going),
     ) -> Result<Going, StepError> {
         let Self { contact_driver, outcome, form, goes_on, work } = self;
         let mut motion = Motion::default();
@@ -71,7 +71,7 @@ impl ThroughImpacts {
         let spent = member.statistics.evaluations.saturating_sub(before.evaluations);
         contact_driver.driver.allow(member.statistics.max_evaluations.saturating_sub(spent));
         contact_driver.pause_at_impacts(until);
-        let mut shown = Shown { watch };
+        let mut shown = ShownSteps { watch };
         let mut adapter = ObserverAdapter { observer: &mut shown, has_enough: false };
         let gone = loop {
             let gone = contact_driver.go_watched(until, outcome, None, Some(&mut adapter), &mut || true);
@@ -99,11 +99,11 @@ impl ThroughImpacts {
 }
 
 /// Shows the steps of a run as those in lanes are shown.
-struct Shown<'a> {
-    watch: &'a mut dyn FnMut(&Passage) -> Going,
+struct ShownSteps<'a> {
+    watch: &'a mut dyn FnMut(&TakenStep) -> Going,
 }
 
-impl Observer for Shown<'_> {
+impl Observer for ShownSteps<'_> {
     fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
         let (begin, end) = (step.begin(), step.end());
         let [from, to] = [begin, end].map(|time| step.at(time).clone());
@@ -114,7 +114,7 @@ impl Observer for Shown<'_> {
         };
         let ends = |body: usize| [&from, &to].map(|motion| angle_and_rate(motion, &from, body));
         let motion = |after: f64, motion: &mut Motion| motion.clone_from(step.borrow_mut().at(begin + after));
-        match (self.watch)(&Passage::new(Time::from(begin), end - begin, &ends, &series, &motion)) {
+        match (self.watch)(&TakenStep::new(Time::from(begin), end - begin, &ends, &series, &motion)) {
             Going::Enough => ControlFlow::Break(()),
             Going::On => ControlFlow::Continue(()),
         }

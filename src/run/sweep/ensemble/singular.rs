@@ -6,7 +6,7 @@ use crate::dynamics::schur::NEAR;
 use crate::dynamics::{Motion, State, Time};
 use crate::run::build::{Problem, tangent_form};
 use crate::stabilization::Projected;
-use crate::stepping::taylor::batch::{Batch, BatchMember, Going, Passage, read};
+use crate::stepping::taylor::batch::{Batch, BatchMember, Going, TakenStep, read};
 use crate::stepping::{Integrator, StepError, Taylor};
 use std::cell::RefCell;
 use std::f64::consts::TAU;
@@ -35,7 +35,7 @@ impl PastSingular {
         &mut self,
         member: &mut BatchMember,
         until: Time,
-        watch: &mut dyn FnMut(&Passage) -> Going,
+        watch: &mut dyn FnMut(&TakenStep) -> Going,
     ) -> Result<Going, StepError> {
         let Self { problem, method, kernel } = self;
         let n = member.mechanism.coordinates();
@@ -66,7 +66,7 @@ impl PastSingular {
                 method.interpolate(&mut **problem, &from, from.time + after, inside);
                 read(mechanism, inside, motion);
             };
-            let passage = Passage::new(from.time, span, &ends, &series, &motion);
+            let passage = TakenStep::new(from.time, span, &ends, &series, &motion);
             if watch(&passage) == Going::Enough {
                 return Ok(Going::Enough);
             }

@@ -1,17 +1,17 @@
 //! A tangent flow made, at the start of a motion or from where an earlier one stopped.
 
 use super::beside;
-use super::gauss::{self, Gauss};
+use super::gauss::{self, TangentGauss};
 use super::ground::Ground;
 use super::start::{Dice, unit};
-use super::{INPUTS, Path, Tangent, VECTORS, WHOLE};
+use super::{INPUTS, Path, TangentFlow, VECTORS, WHOLE};
 use crate::dynamics::{Coordinates, Mechanism, Motion};
 use crate::run::build::tangent_form;
 use crate::run::saltation::set_by_events;
 use crate::run::trust::DistanceMetric;
 use std::sync::Arc;
 
-impl Tangent {
+impl TangentFlow {
     /// The flow from a motion of a mechanism with the contacts held there.
     ///
     /// # Errors
@@ -23,7 +23,7 @@ impl Tangent {
     /// The same with the whole matrix, and by the series, whatever that costs.
     ///
     /// # Errors
-    /// See [`Tangent::new`].
+    /// See [`TangentFlow::new`].
     pub fn whole(mechanism: &Arc<Mechanism>, motion: &Motion, until: f64) -> Result<Self, String> {
         Self::of(mechanism, motion, until, true)
     }
@@ -116,7 +116,7 @@ impl Tangent {
             coordinates,
             weights,
             series: Vec::new(),
-            gauss: Gauss::new(),
+            gauss: TangentGauss::new(),
             ground,
             set,
             parameters: Vec::new(),

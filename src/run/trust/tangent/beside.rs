@@ -27,7 +27,7 @@ const LOW_TOLERANCE: f64 = 1e-5;
 const NOISE: f64 = 1e-3;
 
 /// So many columns beside a motion.
-pub trait Beside: Send {
+pub trait ColumnsBeside: Send {
     /// Expands the motion through a state, and the columns from `first` on, that many as it has room for.
     fn expand(&mut self, mechanism: &Mechanism, state: &State, columns: &[Vec<f64>]);
 
@@ -61,16 +61,18 @@ pub fn room(
     coordinates: Coordinates,
     order: usize,
     mut columns: usize,
-) -> Vec<(usize, Box<dyn Beside>)> {
+) -> Vec<(usize, Box<dyn ColumnsBeside>)> {
     let mut groups = Vec::new();
     while columns > 0 {
         let count = columns.min(6);
         groups.push((
             count,
             match count {
-                1 | 2 => Box::new(Expanded::<2>::new(mechanism, coordinates, order)) as Box<dyn Beside>,
-                3 | 4 => Box::new(Expanded::<4>::new(mechanism, coordinates, order)),
-                _ => Box::new(Expanded::<6>::new(mechanism, coordinates, order)),
+                1 | 2 => {
+                    Box::new(ExpandedBlock::<2>::new(mechanism, coordinates, order)) as Box<dyn ColumnsBeside>
+                }
+                3 | 4 => Box::new(ExpandedBlock::<4>::new(mechanism, coordinates, order)),
+                _ => Box::new(ExpandedBlock::<6>::new(mechanism, coordinates, order)),
             },
         ));
         columns -= count;
@@ -79,7 +81,7 @@ pub fn room(
 }
 
 /// Room for `D` columns, of which some may be idle.
-struct Expanded<const D: usize> {
+struct ExpandedBlock<const D: usize> {
     count: usize,
     order: usize,
     /// Powers of the rates that are summed.
@@ -88,7 +90,7 @@ struct Expanded<const D: usize> {
     unknowns: [Vec<Dual<D>>; 3],
 }
 
-impl<const D: usize> Expanded<D> {
+impl<const D: usize> ExpandedBlock<D> {
     fn new(mechanism: &Mechanism, coordinates: Coordinates, order: usize) -> Self {
         let series = Series::new(mechanism, coordinates, order);
         let f = series.coordinates();
@@ -134,7 +136,7 @@ impl<const D: usize> Expanded<D> {
     }
 }
 
-impl<const D: usize> Beside for Expanded<D> {
+impl<const D: usize> ColumnsBeside for ExpandedBlock<D> {
     fn expand(&mut self, mechanism: &Mechanism, state: &State, columns: &[Vec<f64>]) {
         let f = self.series.coordinates();
         self.count = columns.len();

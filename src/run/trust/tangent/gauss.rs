@@ -39,7 +39,7 @@ pub fn is_slow(mechanism: &Mechanism) -> bool {
 }
 
 /// The method, with its scratch space.
-pub struct Gauss {
+pub struct TangentGauss {
     /// Where in a step the motion is asked for.
     pub nodes: Vec<f64>,
     weights: Vec<f64>,
@@ -50,7 +50,7 @@ pub struct Gauss {
     pub next: f64,
 }
 
-impl Gauss {
+impl TangentGauss {
     pub fn new() -> Self {
         let [nodes, weights, coupling] = collocation(STAGES);
         let entry = |k: usize| {
@@ -162,7 +162,7 @@ mod tests {
         let (rate, pull) = (2.0, [-4.0, 0.0].repeat(STAGES));
         let off = [0.8, 0.4].map(|h| {
             let mut columns = vec![vec![0.0; 2]; 2];
-            assert!(Gauss::new().step(1, h, rate, &pull, &mut columns));
+            assert!(TangentGauss::new().step(1, h, rate, &pull, &mut columns));
             let [x, v] = [columns[0][0], columns[0][1] / rate];
             assert!((x.hypot(v) - 1.0).abs() < 1e-15 && (columns[1][0] + columns[0][1] / rate).abs() < 1e-15);
             libm::atan2(-v, x) - 2.0 * h

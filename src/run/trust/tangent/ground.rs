@@ -9,7 +9,7 @@
 //! whose derivative this is on the constraints.
 
 use crate::arithmetic::{Complex, Dual, Scalar};
-use crate::dynamics::constraint::Posture;
+use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::{Kernel, dot};
 use crate::dynamics::{Mechanism, State};
 
@@ -106,7 +106,7 @@ impl Ground {
             self.omega[k] = Number::new(state.y[n + k], [column[n + k]]);
         }
         mechanism.tree.unit_vectors::<Number, 0>(&self.phi, &mut self.z);
-        let at = Posture { phi: &self.phi, z: &self.z, omega: &self.omega };
+        let at = ConstraintArguments { phi: &self.phi, z: &self.z, omega: &self.omega };
         for (row, multiplier) in mechanism.constraints.iter().zip(&mut self.kernel.multiplier) {
             self.gradient.fill(Number::ZERO);
             let here = row.linearise(state.time, at, &mut self.gradient);

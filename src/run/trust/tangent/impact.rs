@@ -1,13 +1,13 @@
 //! Small differences of the tangent flow through impacts, events and the transitions of dry friction: see
 //! [`saltation`](crate::run::saltation).
 
-use super::Tangent;
+use super::TangentFlow;
 use crate::dynamics::Coordinates;
 use crate::run::contact::Jump;
-use crate::run::saltation::{Column, Passage, cross, engage};
+use crate::run::saltation::{Delta, Discontinuity, cross, engage};
 use std::sync::Arc;
 
-impl Tangent {
+impl TangentFlow {
     /// Tells the constraints which of them have engaged on the way.
     pub(super) fn hold_engaged(&mut self) {
         if let Some(ground) = &mut self.ground {
@@ -15,7 +15,7 @@ impl Tangent {
         }
     }
 
-    /// Takes impacts, holds and releases on the way to [`Tangent::next`], in their order.
+    /// Takes impacts, holds and releases on the way to [`TangentFlow::next`], in their order.
     pub(in crate::run) fn jump(&mut self, jumps: &[Jump]) {
         for jumps in jumps.chunk_by(|one, other| one.before.time == other.before.time) {
             self.jump_at_once(jumps);
@@ -77,7 +77,7 @@ impl Tangent {
         let n = self.mechanism.coordinates();
         let moment = jumps.first().map(|jump| jump.before.time);
         let given: Vec<Vec<f64>> = all.iter().map(|column| column[2 * n..].to_vec()).collect();
-        let passage = Passage {
+        let passage = Discontinuity {
             mechanism: &self.mechanism,
             jumps,
             set: &self.set,
@@ -89,8 +89,8 @@ impl Tangent {
                 .filter(|(at, _)| Some(*at) == moment)
                 .map(|(_, late)| &late[..]),
         };
-        let mut columns: Vec<Column> = (all.iter_mut().zip(&given))
-            .map(|(column, given)| Column {
+        let mut columns: Vec<Delta> = (all.iter_mut().zip(&given))
+            .map(|(column, given)| Delta {
                 entries: &mut column[..2 * n],
                 neighbours: self.neighbours(given),
             })

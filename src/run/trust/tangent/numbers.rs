@@ -7,10 +7,10 @@
 //!
 //! A column has the differences of all parameters that events set behind its rates.
 
-use super::beside::{self, Beside};
-use super::{Path, Tangent};
+use super::beside::{self, ColumnsBeside};
+use super::{Path, TangentFlow};
 use crate::dynamics::{Coordinates, Mechanism, State};
-use crate::run::saltation::{Level, Levels, Weighted};
+use crate::run::saltation::{DistanceLevel, Levels, Weighted};
 use std::sync::Arc;
 
 /// Difference of a parameter over its size.
@@ -39,20 +39,20 @@ fn weighted(change: f64, half: f64, sides: [&Arc<Mechanism>; 2]) -> [Weighted; 2
 
 /// The one distance at which estimates have neighbours, where there are any.
 fn level(list: Vec<Weighted>) -> Levels {
-    if list.is_empty() { Levels::new() } else { vec![Level { far: 1.0 / DIFFERENCE, list }] }
+    if list.is_empty() { Levels::new() } else { vec![DistanceLevel { far: 1.0 / DIFFERENCE, list }] }
 }
 
 /// What a parameter does to the powers of the rates.
-pub(super) struct Parameter {
+pub(super) struct ParameterPowers {
     /// Its place among those that events set.
     place: usize,
     /// The mechanism at neighbouring values on both sides, and half the difference between these.
-    sides: [(Arc<Mechanism>, Box<dyn Beside>); 2],
+    sides: [(Arc<Mechanism>, Box<dyn ColumnsBeside>); 2],
     half: f64,
     powers: Vec<f64>,
 }
 
-impl Parameter {
+impl ParameterPowers {
     fn new(
         mechanism: &Mechanism,
         coordinates: Coordinates,
@@ -80,21 +80,21 @@ impl Parameter {
 }
 
 /// What parameters do at a state, for columns in their order.
-pub(super) struct Push<'a> {
-    parameters: &'a [Parameter],
+pub(super) struct ParameterEffects<'a> {
+    parameters: &'a [ParameterPowers],
     columns: Vec<&'a [f64]>,
 }
 
-impl<'a> Push<'a> {
+impl<'a> ParameterEffects<'a> {
     /// Of these parameters, at a state.
-    pub(super) fn at(parameters: &'a mut [Parameter], path: &'a Path, unknowns: usize) -> Self {
+    pub(super) fn at(parameters: &'a mut [ParameterPowers], path: &'a Path, unknowns: usize) -> Self {
         parameters.iter_mut().for_each(|parameter| parameter.expand(&path.state));
         let columns = path.columns.iter().chain(&path.inputs).map(|column| &column[unknowns..]).collect();
         Self { parameters, columns }
     }
 
     /// Adds it to the series of so many columns from `first` on.
-    pub(super) fn add(&self, first: usize, count: usize, series: &mut dyn Beside) {
+    pub(super) fn add(&self, first: usize, count: usize, series: &mut dyn ColumnsBeside) {
         for parameter in self.parameters {
             let own = &self.columns[first..first + count];
             let shares: Vec<f64> = own.iter().map(|column| column[parameter.place]).collect();
@@ -103,11 +103,11 @@ impl<'a> Push<'a> {
     }
 }
 
-impl Tangent {
+impl TangentFlow {
     /// The mechanisms with the parameters of a column whose parameters are so far from their values.
     pub(super) fn neighbours(&self, given: &[f64]) -> Levels {
         let acting = self.parameters.iter().filter(|parameter| given[parameter.place] != 0.0);
-        let of = |parameter: &Parameter| {
+        let of = |parameter: &ParameterPowers| {
             let [ahead, behind] = &parameter.sides;
             weighted(given[parameter.place], parameter.half, [&ahead.0, &behind.0])
         };
@@ -140,7 +140,7 @@ impl Tangent {
                 continue;
             }
             let parameter =
-                Parameter::new(&self.mechanism, self.coordinates, self.path.order, [place, number]);
+                ParameterPowers::new(&self.mechanism, self.coordinates, self.path.order, [place, number]);
             self.parameters.push(parameter.ok_or(NO_LAWS)?);
         }
         Ok(())

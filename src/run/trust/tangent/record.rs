@@ -1,11 +1,11 @@
 //! The size of the columns, and what is kept of it along the way.
 
-use super::{Path, Tangent};
+use super::{Path, TangentFlow};
 
 /// Times at which the growth is kept.
 const KEPT: usize = 256;
 
-impl Tangent {
+impl TangentFlow {
     /// Standard deviation of the largest coordinate that rounding has left \[rad\].
     pub fn rounding(&self) -> f64 {
         let (f, Path { covariance, columns, .. }) = (self.weights.len(), &self.path);

@@ -1,12 +1,12 @@
 //! What rounding of a series' steps leaves, carried along by the tangent flow.
 
-use super::{Path, ROUNDED, Tangent};
+use super::{Path, ROUNDED, TangentFlow};
 
 /// The same of mechanisms without a matrix, whose series keep no pairs; fitted on chains of five and eight
 /// bars.
 const COARSE: f64 = 8.0 * ROUNDED;
 
-impl Tangent {
+impl TangentFlow {
     /// The covariance after a step of `h` \[s\], in which the series took `taken` steps; the columns of the
     /// step's own matrix are in `seeds`.
     pub(super) fn round(&mut self, h: f64, taken: f64) {

@@ -1,9 +1,9 @@
 //! Where a tangent flow begins: its unit of rates, and directions to begin with.
 
-use super::{Tangent, beside};
+use super::{TangentFlow, beside};
 use crate::dynamics::Coordinates;
 
-impl Tangent {
+impl TangentFlow {
     /// About the fastest rate at the start \[rad/s\].
     pub(super) fn fastest(&mut self, until: f64) -> f64 {
         let f = self.weights.len();

@@ -1,18 +1,18 @@
 //! Scratch space of a step: what is summed, committed and judged by.
 
 use super::super::sums::sum_of;
-use super::super::tableau::{Tableau, lane};
+use super::super::tableau::{GaussTableau, lane};
 use super::super::{LARGEST_REST, LEAST_ANGLE};
-use super::Scratch;
+use super::GaussScratch;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{State, Time};
 
-impl Scratch {
+impl GaussScratch {
     /// Forms what depends on the step alone.
-    pub fn scale(&mut self, tableau: &Tableau, step: f64) {
+    pub fn scale(&mut self, tableau: &GaussTableau, step: f64) {
         let (s, d) = (tableau.nodes.len(), self.points.y.len());
         self.step = step;
         self.span = Octet::default();

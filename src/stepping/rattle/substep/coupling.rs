@@ -3,26 +3,26 @@
 //! Their formulas are no polynomials: the iterations on positions form C from pairs, because C in plain
 //! doubles, over h²/2, would be the rounding of positions as a force.
 
-use super::Work;
+use super::SubstepScratch;
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::Time;
 use crate::dynamics::natural::Natural;
-use crate::dynamics::natural::coupling::{Coupled, Whole};
+use crate::dynamics::natural::coupling::{CouplingTerms, NearestTurns};
 
 /// Scratch space for them.
 #[derive(Clone, Debug, Default)]
-pub struct Couplings {
+pub struct CouplingScratch {
     /// Angles at the beginning of the substep.
-    whole: Whole,
+    whole: NearestTurns,
     /// The time last asked about.
     t: Time,
     /// z0 + h v0 + push a (n).
     there: Vec<Complex<DoubleDouble>>,
-    pairs: Coupled<DoubleDouble>,
-    plain: Coupled<f64>,
+    pairs: CouplingTerms<DoubleDouble>,
+    plain: CouplingTerms<f64>,
 }
 
-impl Work {
+impl SubstepScratch {
     /// Takes over the angles at hand.
     pub(super) fn count_turns(&mut self, natural: &Natural) {
         if !natural.couplings().is_empty() {

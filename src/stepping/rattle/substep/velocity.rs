@@ -1,15 +1,15 @@
 //! The second half of a substep: positions settled, elements turned, rates put onto the constraints.
 
 use super::super::newton::project;
-use super::{Failure, KEPT, Work, plain, rows};
+use super::{KEPT, SubstepFailure, SubstepScratch, plain, rows};
 use crate::arithmetic::{Complex, Real};
-use crate::dynamics::constraint::Measure;
+use crate::dynamics::constraint::RowMeasure;
 use crate::dynamics::natural::{Natural, times, upper};
 use crate::dynamics::tree::size;
 use crate::dynamics::{schur, tree};
 use std::f64::consts::FRAC_PI_2;
 
-impl Work {
+impl SubstepScratch {
     /// One more iteration, with the constraints formed from pairs.  Sweeps in plain doubles leave lengths
     /// wrong by some 1e-22 with a preferred sign, and a length that is always too short is a steady loss of
     /// energy.
@@ -18,7 +18,7 @@ impl Work {
         &mut self,
         natural: &Natural,
         h: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SubstepFailure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let rows = rows::<N, GUIDED>(self.change.len());
         let (predicted, change) = (&self.predicted[..n], &mut self.change[..rows]);
@@ -36,7 +36,7 @@ impl Work {
         for (row, change) in change.iter().enumerate() {
             let is_kept = change.abs() <= KEPT * per_push * self.unit[row];
             if !is_kept {
-                return Err(Failure::NotConverged(row));
+                return Err(SubstepFailure::NotConverged(row));
             }
         }
         if GUIDED {
@@ -63,7 +63,7 @@ impl Work {
         &mut self,
         natural: &Natural,
         h: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SubstepFailure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let (z, predicted, here, turns) =
             (&mut self.z[..n], &self.predicted[..n], &mut self.here[..n], &mut self.turns[..bodies]);
@@ -72,7 +72,7 @@ impl Work {
             (z[k], here[k]) = (after, plain(after));
             let old = plain(before);
             if old.dot(here[k]) <= 0.0 {
-                return Err(Failure::TooFar(k));
+                return Err(SubstepFailure::TooFar(k));
             }
             if upper(before) != upper(after) {
                 turns[k] = turns[k].saturating_add(match (upper(after), old.cross(here[k]) > 0.0) {
@@ -90,9 +90,9 @@ impl Work {
                 let demand = &self.plain_demand[r];
                 // Whole turns that an angle is asked to make within a substep are seen by nobody.
                 let leaps =
-                    matches!(guide.measure, Measure::Angle { .. }) && (demand.rate * h).abs() >= FRAC_PI_2;
+                    matches!(guide.measure, RowMeasure::Angle { .. }) && (demand.rate * h).abs() >= FRAC_PI_2;
                 if leaps || guide.mismatch(demand, here).re <= 0.0 {
-                    return Err(Failure::TooFar(bodies + r));
+                    return Err(SubstepFailure::TooFar(bodies + r));
                 }
             }
         }
@@ -145,7 +145,7 @@ impl Work {
         &mut self,
         natural: &Natural,
         h: f64,
-    ) -> Result<(), Failure> {
+    ) -> Result<(), SubstepFailure> {
         let (n, bodies) = (size::<N>(self.z.len()), self.bodies::<N, GUIDED>());
         let rows = rows::<N, GUIDED>(self.change.len());
         project(n, bodies, rows, &self.here, &self.gradient, &self.minv_jt, &mut self.schur[..rows * rows]);

@@ -20,7 +20,7 @@
 
 use crate::arithmetic::Complex;
 use crate::arithmetic::eight::LANES;
-use crate::dynamics::constraint::Measure;
+use crate::dynamics::constraint::RowMeasure;
 use crate::dynamics::gap::turning;
 use crate::dynamics::impact::Contact;
 use crate::dynamics::series::lanes::SeriesInLanes;
@@ -113,7 +113,7 @@ impl Clearance {
         };
         let norm = |g: Complex<f64>| g.norm_squared().sqrt();
         let bend = |contact: &Contact| {
-            let Measure::Place(place) = &contact.row.measure else { return f64::INFINITY };
+            let RowMeasure::Place(place) = &contact.row.measure else { return f64::INFINITY };
             let law = contact.row.law.as_ref().map_or(0.0, |law| law.bounds(time.hi + length)[1]);
             let single = place.linear.iter().fold(law, |sum, &(k, g)| sum + norm(g) * element(k)[2]);
             let all = place.bilinear.iter().fold(single, |sum, &(j, k, h)| {

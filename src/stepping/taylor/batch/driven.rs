@@ -6,10 +6,12 @@
 //! (k+1) e_{k+1} = left(Σ v_j e_{k-j}),    (k+1) u_{k+1} = left(Σ v_j u_{k-j} - w u_k)
 //! ```
 
-use super::super::driven::Driven;
+use super::super::driven::DrivenKernel;
 use super::super::terms::over;
-use super::laws::{Laws, reduced};
-use super::{BatchMember, JUDGES, LaneClock, MOST, Team, added, flaw_of, load, moved, pair, store, unit};
+use super::laws::{LaneLaws, reduced};
+use super::{
+    BatchMember, JUDGES, LaneClock, LaneKernel, MOST, added, flaw_of, load, moved, pair, store, unit,
+};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
@@ -21,8 +23,8 @@ const FINE: usize = 12;
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
-pub(super) struct DrivenTeam {
-    laws: Laws,
+pub(super) struct DrivenLanes {
+    laws: LaneLaws,
     /// The body that is driven.
     driven: [usize; LANES],
     /// What an error of the unit vectors comes to in the work: a part, and a part times the free body's rate.
@@ -40,12 +42,12 @@ pub(super) struct DrivenTeam {
     before: [Octet; 2],
     /// What the driven body turns in the step \[rad\].
     swept: Octet,
-    powers: [Power; MOST + 1],
+    powers: [DrivenPower; MOST + 1],
 }
 
 /// Coefficients of one power: e, u and v.
 #[derive(Clone, Copy, Debug)]
-struct Power {
+struct DrivenPower {
     c: Octet,
     s: Octet,
     x: Octet,
@@ -72,7 +74,7 @@ macro_rules! older {
     }};
 }
 
-impl DrivenTeam {
+impl DrivenLanes {
     /// Order k: from the newest coefficients and what the others contribute to e and u, to the next ones.
     #[inline(always)]
     fn raise<W: EightLanes>(&mut self, k: usize, [c_older, s_older, x_older, y_older]: [W; 4]) {
@@ -96,7 +98,7 @@ impl DrivenTeam {
             (c_sum, s_sum) = (v.mul_add(load(&start.c), c_sum), v.mul_add(load(&start.s), s_sum));
             (x_sum, y_sum) = (v.mul_add(load(&start.x), x_sum), v.mul_add(load(&start.y), y_sum));
         }
-        self.powers[k + 1] = Power {
+        self.powers[k + 1] = DrivenPower {
             c: store(over(W::ZERO.sub(s_sum), k + 1)),
             s: store(over(c_sum, k + 1)),
             x: store(over(W::ZERO.sub(y_sum), k + 1)),
@@ -108,14 +110,14 @@ impl DrivenTeam {
 
 /// True for mechanisms of this kind.
 pub(super) fn fits(mechanism: &Mechanism) -> bool {
-    Driven::of(mechanism).is_some() && mechanism.contacts.is_empty()
+    DrivenKernel::of(mechanism).is_some() && mechanism.contacts.is_empty()
 }
 
-impl Team for DrivenTeam {
+impl LaneKernel for DrivenLanes {
     fn new(_: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         let zero = Octet::splat(0.0);
         Self {
-            laws: Laws::new(),
+            laws: LaneLaws::new(),
             driven: [0; LANES],
             share: [zero; 2],
             coupling: zero,
@@ -126,7 +128,7 @@ impl Team for DrivenTeam {
             between: [zero; 2],
             before: [zero; 2],
             swept: zero,
-            powers: [Power { c: zero, s: zero, x: zero, y: zero, v: zero }; MOST + 1],
+            powers: [DrivenPower { c: zero, s: zero, x: zero, y: zero, v: zero }; MOST + 1],
         }
     }
 
@@ -135,7 +137,7 @@ impl Team for DrivenTeam {
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
-        let Some(driven) = Driven::new(member.mechanism) else { return 0.0 };
+        let Some(driven) = DrivenKernel::new(member.mechanism) else { return 0.0 };
         self.driven[lane] = driven.body;
         (self.share[0].0[lane], self.share[1].0[lane]) = (driven.share[0], driven.share[1]);
         self.coupling.0[lane] = driven.coupling;
@@ -154,7 +156,7 @@ impl Team for DrivenTeam {
     }
 
     /// At rest, without a motor.
-    fn park(&mut self, lane: usize) {
+    fn set_idle(&mut self, lane: usize) {
         self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
         self.laws.take_in(lane, &Law::default());
     }
@@ -172,7 +174,7 @@ impl Team for DrivenTeam {
     fn expand<W: EightLanes>(&mut self, order: usize) {
         let ([c, s], [x, y]) =
             (unit::<W>(&self.high[0], &self.low[0]), unit::<W>(&self.between[0], &self.between[1]));
-        self.powers[0] = Power { c, s, x, y, v: self.high[1] };
+        self.powers[0] = DrivenPower { c, s, x, y, v: self.high[1] };
         // Two orders at a time share what they load; the first of all has nothing behind it.
         let mut k = 0;
         while k < order {
@@ -286,7 +288,7 @@ impl Team for DrivenTeam {
         }
     }
 
-    fn leave(&self, lane: usize, state: &mut State) {
+    fn write_state(&self, lane: usize, state: &mut State) {
         for i in 0..3 {
             (state.y[i], state.low[i]) = (self.high[i].0[lane], self.low[i].0[lane]);
         }

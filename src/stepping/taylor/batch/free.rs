@@ -2,8 +2,8 @@
 //! instead of bodies.
 
 use super::series::{expand, finish};
-use super::springs::Springs;
-use super::{BatchMember, JUDGES, LaneClock, MOST, SPRINGS, Team, flaw_of, load, store};
+use super::springs::LaneSprings;
+use super::{BatchMember, JUDGES, LaneClock, LaneKernel, MOST, SPRINGS, flaw_of, load, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
@@ -11,7 +11,7 @@ use crate::dynamics::{Mechanism, State};
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
-pub(super) struct FreeTeam<const N: usize, const SPRUNG: bool> {
+pub(super) struct FreeLanes<const N: usize, const SPRUNG: bool> {
     /// A \[kg·m²\], zero on the diagonal.
     pub coupling: [[Octet; N]; N],
     pub diagonal: [Octet; N],
@@ -24,13 +24,13 @@ pub(super) struct FreeTeam<const N: usize, const SPRUNG: bool> {
     pub low: [[Octet; N]; 2],
     /// Angles at the start of the step.
     before: [Octet; N],
-    pub powers: [Power<N>; MOST + 1],
-    pub springs: Springs<N>,
+    pub powers: [FreePower<N>; MOST + 1],
+    pub springs: LaneSprings<N>,
 }
 
 /// Coefficients of one power: cos, sin, v, and the two components of P.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Power<const N: usize> {
+pub(super) struct FreePower<const N: usize> {
     pub c: [Octet; N],
     pub s: [Octet; N],
     pub v: [Octet; N],
@@ -49,10 +49,10 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.contacts.is_empty()
 }
 
-impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
+impl<const N: usize, const SPRUNG: bool> LaneKernel for FreeLanes<N, SPRUNG> {
     fn new(like: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         let zero = [Octet::splat(0.0); N];
-        let power = Power { c: zero, s: zero, v: zero, px: zero, py: zero };
+        let power = FreePower { c: zero, s: zero, v: zero, px: zero, py: zero };
         Self {
             coupling: [zero; N],
             diagonal: [Octet::splat(1.0); N],
@@ -62,7 +62,7 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
             low: [zero; 2],
             before: zero,
             powers: [power; MOST + 1],
-            springs: Springs::new(like.mechanism.springs.len()),
+            springs: LaneSprings::new(like.mechanism.springs.len()),
         }
     }
 
@@ -97,13 +97,13 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
     }
 
     /// Bodies hanging at rest.
-    fn park(&mut self, lane: usize) {
+    fn set_idle(&mut self, lane: usize) {
         for part in [&mut self.high, &mut self.low] {
             for numbers in part.iter_mut().flatten() {
                 numbers.0[lane] = 0.0;
             }
         }
-        self.springs.park(lane);
+        self.springs.set_idle(lane);
     }
 
     #[inline(always)]
@@ -162,7 +162,7 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
         }
     }
 
-    fn leave(&self, lane: usize, state: &mut State) {
+    fn write_state(&self, lane: usize, state: &mut State) {
         for part in 0..2 {
             for i in 0..N {
                 state.y[part * N + i] = self.high[part][i].0[lane];
@@ -170,7 +170,7 @@ impl<const N: usize, const SPRUNG: bool> Team for FreeTeam<N, SPRUNG> {
             }
         }
         if SPRUNG {
-            self.springs.leave(lane, state);
+            self.springs.write_state(lane, state);
         }
     }
 

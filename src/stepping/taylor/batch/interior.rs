@@ -1,7 +1,7 @@
 //! Motions inside the step of a lane.
 
 use super::passage::coordinates;
-use super::{BatchMember, Team, read};
+use super::{BatchMember, LaneKernel, read};
 use crate::dynamics::{Motion, State, Time};
 
 /// Room for a state inside a step, and what the coordinates are there.
@@ -32,9 +32,9 @@ impl Interior {
     }
 
     /// Writes the motion of a trajectory `after` \[s\] from where its step begins, by its series.
-    pub fn look<T: Team>(
+    pub fn look<T: LaneKernel>(
         &mut self,
-        team: &T,
+        kernel: &T,
         member: &BatchMember,
         step: InLane,
         after: f64,
@@ -42,7 +42,7 @@ impl Interior {
     ) {
         if !self.is_known {
             self.state.clone_from(&member.state);
-            self.take_in(team, member, step);
+            self.take_in(kernel, member, step);
             self.is_known = true;
         }
         let Self { state, start, rates, ways, .. } = self;
@@ -50,7 +50,7 @@ impl Interior {
         state.turns.copy_from_slice(&member.state.turns);
         let f = start.len();
         if f == 0 {
-            team.inside(step.order, step.lane, after, member.mechanism, state);
+            kernel.inside(step.order, step.lane, after, member.mechanism, state);
         } else {
             let count = step.order + 1;
             for c in 0..f {
@@ -71,9 +71,9 @@ impl Interior {
     }
 
     /// Writes the motion at the end of a step that was made, as the integration has it.
-    pub fn end<T: Team>(
+    pub fn end<T: LaneKernel>(
         &mut self,
-        team: &T,
+        kernel: &T,
         member: &BatchMember,
         lane: usize,
         time: Time,
@@ -81,27 +81,32 @@ impl Interior {
     ) {
         let state = &mut self.state;
         state.clone_from(&member.state);
-        team.leave(lane, state);
+        kernel.write_state(lane, state);
         state.time = time;
         state.wrap();
         read(member.mechanism, state, motion);
     }
 
     /// Takes the polynomials of a step.
-    fn take_in<T: Team>(&mut self, team: &T, member: &BatchMember, InLane { order, lane, .. }: InLane) {
+    fn take_in<T: LaneKernel>(
+        &mut self,
+        kernel: &T,
+        member: &BatchMember,
+        InLane { order, lane, .. }: InLane,
+    ) {
         let Self { start, rates, ways, .. } = self;
         let f = coordinates(member.mechanism);
         start.clear();
         rates.resize((order + 1) * f, 0.0);
         ways.resize((order + 1) * f, 0.0);
         for c in 0..f {
-            let Some(place) = team.start_of(lane, c) else {
+            let Some(place) = kernel.start_of(lane, c) else {
                 start.clear();
                 return;
             };
             start.push(place);
             for k in 0..=order {
-                let power = team.power_of(lane, c, k);
+                let power = kernel.power_of(lane, c, k);
                 let at = c * (order + 1) + k;
                 (rates[at], ways[at]) = (power, power / (k + 1) as f64);
             }

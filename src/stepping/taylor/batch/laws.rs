@@ -17,14 +17,14 @@ const ZERO: Octet = Octet([0.0; LANES]);
 
 /// The law of each lane, and where it is.
 #[derive(Clone, Debug)]
-pub(super) struct Laws {
+pub(super) struct LaneLaws {
     /// Time \[s\] in two terms.
     time: [Octet; 2],
     start: Octet,
     pub rate: Octet,
     acceleration: Octet,
     /// As many as the lane with most of them had; those that others have not are zero.
-    sines: Vec<Sine>,
+    sines: Vec<LaneSine>,
     /// The angle \[rad\] in [-π, π], in two terms.
     pub angle: [Octet; 2],
     /// Powers of the rate, where they were asked for.
@@ -33,7 +33,7 @@ pub(super) struct Laws {
 
 /// One sine of each law, and cosine and sine of its argument.
 #[derive(Clone, Copy, Debug)]
-struct Sine {
+struct LaneSine {
     amplitude: Octet,
     frequency: Octet,
     phase: Octet,
@@ -41,7 +41,7 @@ struct Sine {
     sin: Octet,
 }
 
-impl Laws {
+impl LaneLaws {
     /// Laws that do nothing.
     pub fn new() -> Self {
         Self {
@@ -59,7 +59,7 @@ impl Laws {
     pub fn take_in(&mut self, lane: usize, law: &Law) {
         (self.start.0[lane], self.rate.0[lane]) = (law.start, law.rate);
         self.acceleration.0[lane] = law.acceleration;
-        let none = Sine { amplitude: ZERO, frequency: ZERO, phase: ZERO, cos: ZERO, sin: ZERO };
+        let none = LaneSine { amplitude: ZERO, frequency: ZERO, phase: ZERO, cos: ZERO, sin: ZERO };
         self.sines.resize(self.sines.len().max(law.sines.len()), none);
         for (i, sine) in self.sines.iter_mut().enumerate() {
             let [amplitude, frequency, phase] =

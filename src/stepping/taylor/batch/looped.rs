@@ -19,13 +19,13 @@ mod spring;
 mod turn;
 
 use self::matrices::Matrices;
-use self::spring::Spring;
-use super::{BatchMember, JUDGES, LaneClock, MOST, Team, added, flaw_of, load, store, unit};
+use self::spring::LaneSpringSeries;
+use super::{BatchMember, JUDGES, LaneClock, LaneKernel, MOST, added, flaw_of, load, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{Complex, angle};
-use crate::dynamics::force::action::Kind;
-use crate::dynamics::natural::Reduced;
+use crate::dynamics::force::action::Applied;
+use crate::dynamics::natural::ReducedMatrices;
 use crate::dynamics::series::lanes::are_equal;
 use crate::dynamics::{self, Mechanism, State};
 use std::f64::consts::{PI, TAU};
@@ -45,7 +45,7 @@ fn put(pair: &mut Pair, lane: usize, vector: Complex<f64>) {
 
 /// The mechanism, states and coefficients of the trajectories in the lanes.
 #[derive(Debug)]
-pub(super) struct LoopTeam {
+pub(super) struct LoopLanes {
     count: usize,
     /// What the lanes hold to begin with, and which hold other constants.
     like: Mechanism,
@@ -57,7 +57,7 @@ pub(super) struct LoopTeam {
     weight: Vec<Pair>,
     applied: Vec<Pair>,
     torque: Vec<Octet>,
-    springs: Vec<Spring>,
+    springs: Vec<LaneSpringSeries>,
     /// Leading parts of angles, rates and work (2n + 1), what they leave out, and both where the step began.
     high: Vec<Octet>,
     low: Vec<Octet>,
@@ -78,8 +78,8 @@ pub(super) struct LoopTeam {
 
 /// True for what [`looped`](super::super::looped) takes, but for what only the matrices tell.
 fn fits(mechanism: &Mechanism) -> bool {
-    let is_constant = |action: &dynamics::force::Action| {
-        action.law.is_none() && !matches!(action.kind, Kind::Force { follows: true, .. })
+    let is_constant = |action: &dynamics::force::AppliedAction| {
+        action.law.is_none() && !matches!(action.kind, Applied::Force { follows: true, .. })
     };
     super::trees::fits(mechanism)
         && mechanism.has_closed_loops()
@@ -90,12 +90,12 @@ fn fits(mechanism: &Mechanism) -> bool {
         && mechanism.actions.iter().all(is_constant)
 }
 
-impl Team for LoopTeam {
+impl LaneKernel for LoopLanes {
     fn new(first: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         let (like, reduced) = (first.mechanism, first.reduced());
         let n = like.bodies.len();
         let room = |size: usize| vec![ZERO; size];
-        let mut team = Self {
+        let mut kernel = Self {
             count: n,
             like: like.clone(),
             has_others: [false; LANES],
@@ -104,7 +104,7 @@ impl Team for LoopTeam {
             weight: vec![PAIR; n],
             applied: vec![PAIR; n],
             torque: room(n),
-            springs: like.springs.iter().map(Spring::new).collect(),
+            springs: like.springs.iter().map(LaneSpringSeries::new).collect(),
             high: room(2 * n + 1),
             low: room(2 * n + 1),
             before: [room(2 * n + 1), room(2 * n + 1)],
@@ -118,8 +118,8 @@ impl Team for LoopTeam {
             is_going: [false; LANES],
             is_leaving: [false; LANES],
         };
-        (0..LANES).for_each(|lane| team.put(lane, like, reduced));
-        team
+        (0..LANES).for_each(|lane| kernel.put(lane, like, reduced));
+        kernel
     }
 
     fn fits(member: &BatchMember, like: &BatchMember) -> bool {
@@ -138,7 +138,7 @@ impl Team for LoopTeam {
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, _order: usize) -> f64 {
-        self.park(lane);
+        self.set_idle(lane);
         let place = std::ptr::from_ref(member.mechanism).addr();
         if self.present[lane].replace(place) != Some(place) {
             let is_other = !are_equal(member.mechanism, &self.like);
@@ -155,7 +155,7 @@ impl Team for LoopTeam {
     }
 
     /// At rest.
-    fn park(&mut self, lane: usize) {
+    fn set_idle(&mut self, lane: usize) {
         self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
     }
 
@@ -269,7 +269,7 @@ impl Team for LoopTeam {
         }
     }
 
-    fn leave(&self, lane: usize, state: &mut State) {
+    fn write_state(&self, lane: usize, state: &mut State) {
         for (unknowns, numbers) in [(&mut state.y, &self.high), (&mut state.low, &self.low)] {
             for (unknown, number) in unknowns.iter_mut().zip(numbers) {
                 *unknown = number.0[lane];
@@ -292,15 +292,15 @@ impl Team for LoopTeam {
     }
 }
 
-impl LoopTeam {
+impl LoopLanes {
     /// Puts the constants of a mechanism into a lane.
-    fn put(&mut self, lane: usize, mechanism: &Mechanism, reduced: Option<&Reduced>) {
+    fn put(&mut self, lane: usize, mechanism: &Mechanism, reduced: Option<&ReducedMatrices>) {
         let n = self.count;
         let (mut applied, mut torque) = (vec![Complex::ZERO; n], vec![0.0; n]);
         for action in &mechanism.actions {
             match &action.kind {
-                Kind::Force { point, force, .. } => point.spread(*force, |k, force| applied[k] += force),
-                Kind::Torque { torque: value, base } => {
+                Applied::Force { point, force, .. } => point.spread(*force, |k, force| applied[k] += force),
+                Applied::Torque { torque: value, base } => {
                     torque[action.body] += value;
                     if let Some(base) = base {
                         torque[*base] -= value;

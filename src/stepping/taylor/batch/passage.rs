@@ -3,7 +3,7 @@
 use crate::dynamics::{Mechanism, Motion, State, Time};
 
 /// A step just taken, which can be looked at anywhere.
-pub struct Passage<'a> {
+pub struct TakenStep<'a> {
     /// Time at its start.
     pub from: Time,
     /// Its length \[s\].
@@ -13,9 +13,9 @@ pub struct Passage<'a> {
     motion: &'a dyn Fn(f64, &mut Motion),
 }
 
-impl<'a> Passage<'a> {
-    /// A step from a time on, so long \[s\], with what [`Passage::ends`], [`Passage::at`] and
-    /// [`Passage::motion`] tell of it.
+impl<'a> TakenStep<'a> {
+    /// A step from a time on, so long \[s\], with what [`TakenStep::ends`], [`TakenStep::at`] and
+    /// [`TakenStep::motion`] tell of it.
     pub(crate) fn new(
         from: Time,
         step: f64,
@@ -33,7 +33,7 @@ impl<'a> Passage<'a> {
     }
 
     /// The same at the start and at the end, as the integration has them: without a sum, and to rounding
-    /// those of [`Passage::at`].
+    /// those of [`TakenStep::at`].
     pub fn ends(&self, body: usize) -> [[f64; 2]; 2] {
         (self.ends)(body)
     }

@@ -1,7 +1,7 @@
-//! The series of all lanes of a team, and its sum.
+//! The series of all lanes of a kernel, and its sum.
 
 use super::super::terms::{add_to, over};
-use super::free::FreeTeam;
+use super::free::FreeLanes;
 use super::{load, store, unit};
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::EightLanes;
@@ -9,32 +9,32 @@ use crate::arithmetic::lanes::wide::EightLanes;
 /// Expands all lanes to an order.
 #[inline(always)]
 pub(super) fn expand<W: EightLanes, const N: usize, const SPRUNG: bool>(
-    team: &mut FreeTeam<N, SPRUNG>,
+    kernel: &mut FreeLanes<N, SPRUNG>,
     order: usize,
 ) {
     let mut f = [[W::ZERO; N]; 2];
     if SPRUNG {
-        team.springs.begin::<W>([&team.high[0], &team.low[0]], &mut team.powers[0]);
+        kernel.springs.begin::<W>([&kernel.high[0], &kernel.low[0]], &mut kernel.powers[0]);
     }
     for i in 0..N {
-        let power = &mut team.powers[0];
+        let power = &mut kernel.powers[0];
         if !SPRUNG {
-            [power.c[i], power.s[i]] = unit::<W>(&team.high[0][i], &team.low[0][i]);
+            [power.c[i], power.s[i]] = unit::<W>(&kernel.high[0][i], &kernel.low[0][i]);
         }
-        power.v[i] = team.high[1][i];
-        let (c, s, v) = (power.c[i], power.s[i], load::<W>(&team.high[1][i]));
+        power.v[i] = kernel.high[1][i];
+        let (c, s, v) = (power.c[i], power.s[i], load::<W>(&kernel.high[1][i]));
         (f[0][i], f[1][i]) = (v.mul(load(&c)), v.mul(load(&s)));
     }
-    invert::<W, N, SPRUNG>(team);
+    invert::<W, N, SPRUNG>(kernel);
     for k in 0..order {
-        raise(team, &mut f, k);
+        raise(kernel, &mut f, k);
     }
 }
 
 /// Order k: from e_k, v_k and f_k = v e to those of the next one.
 #[inline(always)]
 pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
-    team: &mut FreeTeam<N, SPRUNG>,
+    kernel: &mut FreeLanes<N, SPRUNG>,
     f: &mut [[W; N]; 2],
     k: usize,
 ) {
@@ -44,11 +44,11 @@ pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
     for i in 0..N {
         let s = over(f[0][i], k + 1);
         let c = zero.sub(over(f[1][i], k + 1));
-        (team.powers[k + 1].c[i], team.powers[k + 1].s[i]) = (store(c), store(s));
+        (kernel.powers[k + 1].c[i], kernel.powers[k + 1].s[i]) = (store(c), store(s));
     }
     let mut pull = [[zero; N]; 2];
     if SPRUNG {
-        pull = team.springs.pull::<W>(k, &team.powers[k + 1]);
+        pull = kernel.springs.pull::<W>(k, &kernel.powers[k + 1]);
     }
     // Eight sums at a time keep the multipliers busy, those of one body in two vectors or of two bodies in
     // one; the newest coefficients come last.
@@ -56,7 +56,7 @@ pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
     for first in (0..N).step_by(at_once) {
         let count = at_once.min(N - first);
         let mut sums = [[zero; 4]; 2];
-        let past = &team.powers[1..=k];
+        let past = &kernel.powers[1..=k];
         for (early, late) in past.iter().zip(past.iter().rev()) {
             for b in 0..count {
                 let (c, s, v) = (
@@ -73,75 +73,77 @@ pub(super) fn raise<W: EightLanes, const N: usize, const SPRUNG: bool>(
         for b in 0..count {
             let i = first + b;
             let [x, y, load_x, load_y] = sums[b];
-            let (start, next, this) = (&team.powers[0], &team.powers[k + 1], &team.powers[k]);
+            let (start, next, this) = (&kernel.powers[0], &kernel.powers[k + 1], &kernel.powers[k]);
             let v0 = load::<W>(&start.v[i]);
             (gx[i], gy[i]) = (v0.mul_add(load::<W>(&next.c[i]), x), v0.mul_add(load::<W>(&next.s[i]), y));
             let weights = load::<W>(&this.s[i]).neg_mul_add(
-                load::<W>(&team.weight[i][0]),
-                load::<W>(&this.c[i]).mul(load::<W>(&team.weight[i][1])),
+                load::<W>(&kernel.weight[i][0]),
+                load::<W>(&this.c[i]).mul(load::<W>(&kernel.weight[i][1])),
             );
             torque[i] = weights.sub(load_x.add(load_y));
         }
     }
     for i in 0..N {
-        let (ax, ay) =
-            (mass_terms::<W, N>(&team.coupling[i], &gx, i), mass_terms::<W, N>(&team.coupling[i], &gy, i));
-        let inner = load::<W>(&team.powers[0].c[i]).mul_add(ax, load::<W>(&team.powers[0].s[i]).mul(ay));
+        let (ax, ay) = (
+            mass_terms::<W, N>(&kernel.coupling[i], &gx, i),
+            mass_terms::<W, N>(&kernel.coupling[i], &gy, i),
+        );
+        let inner = load::<W>(&kernel.powers[0].c[i]).mul_add(ax, load::<W>(&kernel.powers[0].s[i]).mul(ay));
         torque[i] = order.neg_mul_add(inner, torque[i]);
         if SPRUNG {
-            let (c, s) = (load::<W>(&team.powers[0].c[i]), load::<W>(&team.powers[0].s[i]));
+            let (c, s) = (load::<W>(&kernel.powers[0].c[i]), load::<W>(&kernel.powers[0].s[i]));
             torque[i] = c.neg_mul_add(pull[0][i], s.neg_mul_add(pull[1][i], torque[i]));
         }
     }
-    let mut x = solve(team, &torque);
+    let mut x = solve(kernel, &torque);
     if k < 2 {
-        refine(team, &torque, &mut x);
+        refine(kernel, &torque, &mut x);
     }
     for i in 0..N {
         let v = over(x[i], k + 1);
-        team.powers[k + 1].v[i] = store(v);
+        kernel.powers[k + 1].v[i] = store(v);
         (f[0][i], f[1][i]) = (
-            v.mul_add(load::<W>(&team.powers[0].c[i]), gx[i]),
-            v.mul_add(load::<W>(&team.powers[0].s[i]), gy[i]),
+            v.mul_add(load::<W>(&kernel.powers[0].c[i]), gx[i]),
+            v.mul_add(load::<W>(&kernel.powers[0].s[i]), gy[i]),
         );
     }
     for i in 0..N {
         let (ax, ay) = (
-            mass_terms::<W, N>(&team.coupling[i], &f[0], i),
-            mass_terms::<W, N>(&team.coupling[i], &f[1], i),
+            mass_terms::<W, N>(&kernel.coupling[i], &f[0], i),
+            mass_terms::<W, N>(&kernel.coupling[i], &f[1], i),
         );
         let (mut px, mut py) = (ax.mul(order), ay.mul(order));
         if SPRUNG {
             (px, py) = (px.add(pull[0][i]), py.add(pull[1][i]));
         }
-        (team.powers[k + 1].px[i], team.powers[k + 1].py[i]) = (store(px), store(py));
+        (kernel.powers[k + 1].px[i], kernel.powers[k + 1].py[i]) = (store(px), store(py));
     }
 }
 
 /// One step of the residual, so that x is rounded, not merely computed.
 #[inline(always)]
 fn refine<W: EightLanes, const N: usize, const SPRUNG: bool>(
-    team: &FreeTeam<N, SPRUNG>,
+    kernel: &FreeLanes<N, SPRUNG>,
     torque: &[W; N],
     x: &mut [W; N],
 ) {
     let mut residual = *torque;
     for i in 0..N {
-        residual[i] = load::<W>(&team.diagonal[i]).neg_mul_add(x[i], residual[i]);
+        residual[i] = load::<W>(&kernel.diagonal[i]).neg_mul_add(x[i], residual[i]);
         for j in 0..N {
             if j != i {
                 let (ci, si, cj, sj) = (
-                    load::<W>(&team.powers[0].c[i]),
-                    load::<W>(&team.powers[0].s[i]),
-                    load::<W>(&team.powers[0].c[j]),
-                    load::<W>(&team.powers[0].s[j]),
+                    load::<W>(&kernel.powers[0].c[i]),
+                    load::<W>(&kernel.powers[0].s[i]),
+                    load::<W>(&kernel.powers[0].c[j]),
+                    load::<W>(&kernel.powers[0].s[j]),
                 );
-                let mass = load::<W>(&team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+                let mass = load::<W>(&kernel.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
                 residual[i] = mass.neg_mul_add(x[j], residual[i]);
             }
         }
     }
-    let correction = solve(team, &residual);
+    let correction = solve(kernel, &residual);
     for i in 0..N {
         x[i] = x[i].add(correction[i]);
     }
@@ -162,14 +164,14 @@ pub(super) fn mass_terms<W: EightLanes, const N: usize>(row: &[Octet; N], x: &[W
 /// M_0⁻¹ x.
 #[inline(always)]
 pub(super) fn solve<W: EightLanes, const N: usize, const SPRUNG: bool>(
-    team: &FreeTeam<N, SPRUNG>,
+    kernel: &FreeLanes<N, SPRUNG>,
     x: &[W; N],
 ) -> [W; N] {
     let mut solution = [W::ZERO; N];
     for i in 0..N {
-        let mut sum = load::<W>(&team.inverse[i][0]).mul(x[0]);
+        let mut sum = load::<W>(&kernel.inverse[i][0]).mul(x[0]);
         for j in 1..N {
-            sum = load::<W>(&team.inverse[i][j]).mul_add(x[j], sum);
+            sum = load::<W>(&kernel.inverse[i][j]).mul_add(x[j], sum);
         }
         solution[i] = sum;
     }
@@ -178,20 +180,20 @@ pub(super) fn solve<W: EightLanes, const N: usize, const SPRUNG: bool>(
 
 /// M_0⁻¹ by elimination without interchanges, M_0 being positive definite.
 #[inline(always)]
-pub(super) fn invert<W: EightLanes, const N: usize, const SPRUNG: bool>(team: &mut FreeTeam<N, SPRUNG>) {
+pub(super) fn invert<W: EightLanes, const N: usize, const SPRUNG: bool>(kernel: &mut FreeLanes<N, SPRUNG>) {
     let (zero, one) = (W::ZERO, W::ONE);
     let mut mass = [[zero; N]; N];
     for i in 0..N {
-        mass[i][i] = load::<W>(&team.diagonal[i]);
+        mass[i][i] = load::<W>(&kernel.diagonal[i]);
         for j in 0..N {
             if j != i {
                 let (ci, si, cj, sj) = (
-                    load::<W>(&team.powers[0].c[i]),
-                    load::<W>(&team.powers[0].s[i]),
-                    load::<W>(&team.powers[0].c[j]),
-                    load::<W>(&team.powers[0].s[j]),
+                    load::<W>(&kernel.powers[0].c[i]),
+                    load::<W>(&kernel.powers[0].s[i]),
+                    load::<W>(&kernel.powers[0].c[j]),
+                    load::<W>(&kernel.powers[0].s[j]),
                 );
-                mass[i][j] = load::<W>(&team.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
+                mass[i][j] = load::<W>(&kernel.coupling[i][j]).mul(ci.mul_add(cj, si.mul(sj)));
             }
         }
     }
@@ -213,7 +215,7 @@ pub(super) fn invert<W: EightLanes, const N: usize, const SPRUNG: bool>(team: &m
     }
     for i in 0..N {
         for j in 0..N {
-            team.inverse[i][j] = store(mass[i][j]);
+            kernel.inverse[i][j] = store(mass[i][j]);
         }
     }
 }
@@ -221,21 +223,21 @@ pub(super) fn invert<W: EightLanes, const N: usize, const SPRUNG: bool>(team: &m
 /// Every lane's state at the end of its step.
 #[inline(always)]
 pub(super) fn finish<W: EightLanes, const N: usize, const SPRUNG: bool>(
-    team: &mut FreeTeam<N, SPRUNG>,
+    kernel: &mut FreeLanes<N, SPRUNG>,
     order: usize,
     taken: &Octet,
 ) {
     let h = load::<W>(taken);
     let square = h.mul(h);
     if SPRUNG {
-        team.springs.finish(order, h);
+        kernel.springs.finish(order, h);
     }
     for i in 0..N {
         let (mut angles, mut rates) = ([W::ZERO; 2], [W::ZERO; 2]);
         // Even and odd powers apart, in registers.
         macro_rules! add {
             ($parity:literal, $k:expr) => {
-                let v = load::<W>(&team.powers[$k].v[i]);
+                let v = load::<W>(&kernel.powers[$k].v[i]);
                 angles[$parity] = angles[$parity].mul_add(square, over(v, $k + 1));
                 rates[$parity] = rates[$parity].mul_add(square, v);
             };
@@ -250,12 +252,12 @@ pub(super) fn finish<W: EightLanes, const N: usize, const SPRUNG: bool>(
             add!(1, k - 1);
             k -= 2;
         }
-        let angle = angles[0].mul_add(h, angles[1]).mul_add(h, load::<W>(&team.powers[0].v[i])).mul(h);
+        let angle = angles[0].mul_add(h, angles[1]).mul_add(h, load::<W>(&kernel.powers[0].v[i])).mul(h);
         let rate = rates[0].mul_add(h, rates[1]).mul(h);
-        for (part, increment, rest) in [(0, angle, load::<W>(&team.low[1][i]).mul(h)), (1, rate, W::ZERO)] {
+        for (part, increment, rest) in [(0, angle, load::<W>(&kernel.low[1][i]).mul(h)), (1, rate, W::ZERO)] {
             let sum =
-                add_to([load::<W>(&team.high[part][i]), load::<W>(&team.low[part][i])], increment, rest);
-            (team.high[part][i], team.low[part][i]) = (store(sum[0]), store(sum[1]));
+                add_to([load::<W>(&kernel.high[part][i]), load::<W>(&kernel.low[part][i])], increment, rest);
+            (kernel.high[part][i], kernel.low[part][i]) = (store(sum[0]), store(sum[1]));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::clock::{LaneClock, LaneStep};
 use super::interior::{InLane, Interior};
-use super::{Batch, BatchMember, BatchObserver, Going, Passage, Team};
+use super::{Batch, BatchMember, BatchObserver, Going, LaneKernel, TakenStep};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::{Motion, State, Time};
@@ -16,7 +16,7 @@ pub(super) struct LaneSlots<T> {
     /// Indices of the trajectories.
     members: [Option<usize>; LANES],
     pub(super) clock: LaneClock,
-    pub(super) team: Box<T>,
+    pub(super) kernel: Box<T>,
     /// True where events may end the motion.
     has_stops: [bool; LANES],
     /// True where one is in the step, which is not taken: the trajectory leaves.
@@ -25,13 +25,13 @@ pub(super) struct LaneSlots<T> {
     inside: RefCell<Interior>,
 }
 
-impl<T: Team> LaneSlots<T> {
+impl<T: LaneKernel> LaneSlots<T> {
     /// Empty lanes.
-    pub(super) fn new(team: T, batch: &Batch, until: Time) -> Self {
+    pub(super) fn new(kernel: T, batch: &Batch, until: Time) -> Self {
         Self {
             members: [None; LANES],
             clock: LaneClock::new(batch.tolerance, batch.order, until),
-            team: Box::new(team),
+            kernel: Box::new(kernel),
             has_stops: [false; LANES],
             is_leaving: [false; LANES],
             inside: RefCell::default(),
@@ -51,7 +51,7 @@ impl<T: Team> LaneSlots<T> {
             if self.members[lane].is_none() {
                 match next(fits, members, waiting, until) {
                     Some(index) => self.take_in(lane, batch, index, &members[index]),
-                    None => self.team.park(lane),
+                    None => self.kernel.set_idle(lane),
                 }
             }
         }
@@ -60,7 +60,7 @@ impl<T: Team> LaneSlots<T> {
     /// Puts a trajectory into a lane.
     fn take_in(&mut self, lane: usize, batch: &Batch, index: usize, member: &BatchMember) {
         self.members[lane] = Some(index);
-        let longest = self.team.take_in(lane, member, batch.order);
+        let longest = self.kernel.take_in(lane, member, batch.order);
         self.clock.start(lane, member.state.time, member.mechanism.units.time, longest);
         self.has_stops[lane] = member.mechanism.has_stops();
     }
@@ -79,15 +79,15 @@ impl<T: Team> LaneSlots<T> {
     /// Chooses the steps that the series just expanded allow.
     #[inline(always)]
     pub(super) fn choose_steps<W: EightLanes>(&mut self, order: usize, tolerance: f64) {
-        let Self { clock, team, .. } = self;
-        clock.want::<W>(order, &team.sizes::<W>(order), team.flaw::<W>(order));
+        let Self { clock, kernel, .. } = self;
+        clock.want::<W>(order, &kernel.sizes::<W>(order), kernel.flaw::<W>(order));
         for lane in 0..LANES {
             clock.taken.0[lane] = 0.0;
-            if team.is_leaving(lane) {
+            if kernel.is_leaving(lane) {
                 clock.wanted.0[lane] = f64::NAN;
             }
             if !clock.wanted.0[lane].is_nan() {
-                clock.wanted.0[lane] = team.allowed(&clock.step(lane), order, tolerance);
+                clock.wanted.0[lane] = kernel.allowed(&clock.step(lane), order, tolerance);
                 clock.taken.0[lane] = step_size::taken(clock.wanted.0[lane], clock.left.0[lane]);
             }
         }
@@ -100,7 +100,7 @@ impl<T: Team> LaneSlots<T> {
         members: &[BatchMember],
         observer: &mut dyn BatchObserver,
     ) {
-        let Self { clock, team, inside, .. } = self;
+        let Self { clock, kernel, inside, .. } = self;
         for lane in 0..LANES {
             self.is_leaving[lane] = false;
             let (from, step) = (clock.at(lane), clock.taken.0[lane]);
@@ -108,13 +108,14 @@ impl<T: Team> LaneSlots<T> {
                 continue;
             };
             let member = &members[index];
-            let series = |body: usize, after: f64| team.at(order, lane, body, after);
+            let series = |body: usize, after: f64| kernel.at(order, lane, body, after);
             let ends = |body: usize| [0.0, step].map(|after| series(body, after).into());
             inside.borrow_mut().forget();
             let motion = |after: f64, motion: &mut Motion| {
-                inside.borrow_mut().look::<T>(team, member, InLane { order, lane, from }, after, motion);
+                inside.borrow_mut().look::<T>(kernel, member, InLane { order, lane, from }, after, motion);
             };
-            self.is_leaving[lane] = observer.ahead(index, &Passage::new(from, step, &ends, &series, &motion));
+            self.is_leaving[lane] =
+                observer.ahead(index, &TakenStep::new(from, step, &ends, &series, &motion));
             if self.is_leaving[lane] {
                 clock.taken.0[lane] = 0.0;
             }
@@ -134,9 +135,9 @@ impl<T: Team> LaneSlots<T> {
         for lane in 0..LANES {
             let Some(index) = self.members[lane] else { continue };
             let (member, from) = (&mut members[index], self.clock.at(lane));
-            if self.is_leaving[lane] || self.team.is_leaving(lane) {
+            if self.is_leaving[lane] || self.kernel.is_leaving(lane) {
                 (member.has_left, member.state.time) = (true, from);
-                self.team.leave(lane, &mut member.state);
+                self.kernel.write_state(lane, &mut member.state);
                 continue;
             }
             let (mut time, step) = (from, self.clock.taken.0[lane]);
@@ -150,23 +151,23 @@ impl<T: Team> LaneSlots<T> {
                     member.statistics.evaluations += 1;
                 }
             }
-            let series = |body: usize, after: f64| self.team.at(order, lane, body, after);
-            let ends = |body: usize| self.team.ends(lane, body);
+            let series = |body: usize, after: f64| self.kernel.at(order, lane, body, after);
+            let ends = |body: usize| self.kernel.ends(lane, body);
             self.inside.get_mut().forget();
             let motion = |after: f64, motion: &mut Motion| {
                 let mut inside = self.inside.borrow_mut();
                 if after >= step {
-                    inside.end::<T>(&self.team, member, lane, time, motion);
+                    inside.end::<T>(&self.kernel, member, lane, time, motion);
                 } else {
-                    inside.look::<T>(&self.team, member, InLane { order, lane, from }, after, motion);
+                    inside.look::<T>(&self.kernel, member, InLane { order, lane, from }, after, motion);
                 }
             };
-            let passage = Passage::new(from, step, &ends, &series, &motion);
+            let passage = TakenStep::new(from, step, &ends, &series, &motion);
             let is_over =
                 member.stopped.is_some() || observer.step(index, &passage) == Going::Enough || time >= until;
-            self.team.wrap(lane, &mut member.state.turns);
+            self.kernel.wrap(lane, &mut member.state.turns);
             if is_over {
-                self.team.leave(lane, &mut member.state);
+                self.kernel.write_state(lane, &mut member.state);
                 member.state.time = time;
                 self.release(lane);
             }

@@ -3,7 +3,7 @@
 
 use super::super::terms::over;
 use super::super::wide::Wide;
-use super::free::Power as Motion;
+use super::free::FreePower;
 use super::{MOST, added, load, moved, pair, store};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
@@ -14,8 +14,8 @@ const ZERO: Octet = Octet([0.0; LANES]);
 
 /// The springs of all lanes, as many in each, and the work of their dampers.
 #[derive(Clone, Debug)]
-pub(super) struct Springs<const N: usize> {
-    all: Vec<Spring<N>>,
+pub(super) struct LaneSprings<const N: usize> {
+    all: Vec<LaneSpring<N>>,
     /// True where any of them has been damped.
     is_damped: bool,
     /// Cosine and sine of the bodies' angles, and what these leave out.
@@ -29,7 +29,7 @@ pub(super) struct Springs<const N: usize> {
 
 /// One spring of each lane.
 #[derive(Clone, Debug)]
-struct Spring<const N: usize> {
+struct LaneSpring<const N: usize> {
     root: [Octet; 2],
     /// gamma over the bodies \[m\].
     gamma: [[Octet; 2]; N],
@@ -40,12 +40,12 @@ struct Spring<const N: usize> {
     measured: Octet,
     /// 1/q_0.
     inverse: Octet,
-    powers: [Power; MOST + 1],
+    powers: [SpringPower; MOST + 1],
 }
 
 /// One power of D, q, h, a, s and κ.
 #[derive(Clone, Copy, Debug)]
-struct Power {
+struct SpringPower {
     x: Octet,
     y: Octet,
     square: Octet,
@@ -76,10 +76,10 @@ macro_rules! products {
     }};
 }
 
-impl<const N: usize> Springs<N> {
+impl<const N: usize> LaneSprings<N> {
     /// Room for so many springs in each lane.
     pub fn new(count: usize) -> Self {
-        let power = Power {
+        let power = SpringPower {
             x: ZERO,
             y: ZERO,
             square: ZERO,
@@ -88,7 +88,7 @@ impl<const N: usize> Springs<N> {
             reciprocal: ZERO,
             factor: ZERO,
         };
-        let spring = Spring {
+        let spring = LaneSpring {
             root: [ZERO; 2],
             gamma: [[ZERO; 2]; N],
             stiffness: ZERO,
@@ -128,14 +128,14 @@ impl<const N: usize> Springs<N> {
     }
 
     /// Writes the work of a lane into a state that has it.
-    pub fn leave(&self, lane: usize, state: &mut State) {
+    pub fn write_state(&self, lane: usize, state: &mut State) {
         if let (Some(work), Some(low)) = (state.y.get_mut(2 * N), state.low.get_mut(2 * N)) {
             (*work, *low) = (self.work[0].0[lane], self.work[1].0[lane]);
         }
     }
 
     /// No springs in a lane.
-    pub fn park(&mut self, lane: usize) {
+    pub fn set_idle(&mut self, lane: usize) {
         for spring in &mut self.all {
             for number in [&mut spring.stiffness, &mut spring.damping, &mut spring.measured] {
                 number.0[lane] = 0.0;
@@ -145,7 +145,7 @@ impl<const N: usize> Springs<N> {
 
     /// Power zero, and the unit vectors of the bodies.
     #[inline(always)]
-    pub fn begin<W: EightLanes>(&mut self, [high, low]: [&[Octet; N]; 2], motion: &mut Motion<N>) {
+    pub fn begin<W: EightLanes>(&mut self, [high, low]: [&[Octet; N]; 2], motion: &mut FreePower<N>) {
         for i in 0..N {
             let angle = [load::<W>(&high[i]), load::<W>(&low[i])];
             let ([sin, sin_low], [cos, cos_low]) = sincos::sin_cos_pair(angle);
@@ -181,7 +181,7 @@ impl<const N: usize> Springs<N> {
 
     /// What the forces of power m add to power m+1 of P, from that power of the bodies' unit vectors.
     #[inline(always)]
-    pub fn pull<W: EightLanes>(&mut self, m: usize, motion: &Motion<N>) -> [[W; N]; 2] {
+    pub fn pull<W: EightLanes>(&mut self, m: usize, motion: &FreePower<N>) -> [[W; N]; 2] {
         let (mut px, mut py) = ([W::ZERO; N], [W::ZERO; N]);
         let mut power = W::ZERO;
         for spring in &mut self.all {
@@ -236,10 +236,10 @@ impl<const N: usize> Springs<N> {
     }
 }
 
-impl<const N: usize> Spring<N> {
+impl<const N: usize> LaneSpring<N> {
     /// Power m >= 1 of the span, q and s, and power m-1 of a, from that power of the bodies' unit vectors.
     #[inline(always)]
-    fn raise<W: EightLanes>(&mut self, m: usize, motion: &Motion<N>, is_damped: bool) {
+    fn raise<W: EightLanes>(&mut self, m: usize, motion: &FreePower<N>, is_damped: bool) {
         let (mut x, mut y) = (W::ZERO, W::ZERO);
         for i in 0..N {
             let (c, s) = (load::<W>(&motion.c[i]), load::<W>(&motion.s[i]));

@@ -11,10 +11,10 @@
 //!
 //! The work is what changes the angular momentum of the driven body beside gravity; the energy is not asked.
 
-use super::super::driven::Driven;
+use super::super::driven::DrivenKernel;
 use super::super::terms::over;
-use super::laws::{Laws, RATES};
-use super::{BatchMember, JUDGES, LaneClock, MOST, Team, added, flaw_of, load, moved, store, unit};
+use super::laws::{LaneLaws, RATES};
+use super::{BatchMember, JUDGES, LaneClock, LaneKernel, MOST, added, flaw_of, load, moved, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{DoubleDouble, angle};
@@ -25,8 +25,8 @@ const ZERO: Octet = Octet([0.0; LANES]);
 
 /// Constants, states and coefficients of the trajectories in the lanes.
 #[derive(Clone, Debug)]
-pub(in crate::stepping::taylor) struct SwingingTeam {
-    laws: Laws,
+pub(in crate::stepping::taylor) struct SwingingLanes {
+    laws: LaneLaws,
     /// The body that is driven.
     driven: [usize; LANES],
     /// What an error of the unit vectors comes to in the work: a part, and a part times the free body's rate.
@@ -44,13 +44,13 @@ pub(in crate::stepping::taylor) struct SwingingTeam {
     before: Octet,
     /// What angle and rate of the driven body grow by in the step.
     moved: [Octet; 2],
-    given: [Given; RATES],
-    powers: [Power; MOST + 1],
+    given: [GivenPower; RATES],
+    powers: [SwingingPower; MOST + 1],
 }
 
 /// One power of the driven body: the unit vector, and its second derivative.
 #[derive(Clone, Copy, Debug)]
-struct Given {
+struct GivenPower {
     c: Octet,
     s: Octet,
     bx: Octet,
@@ -59,7 +59,7 @@ struct Given {
 
 /// One power of the free body: the unit vector and the rate; q, and its product with the rate.
 #[derive(Clone, Copy, Debug)]
-struct Power {
+struct SwingingPower {
     c: Octet,
     s: Octet,
     v: Octet,
@@ -67,10 +67,10 @@ struct Power {
     power: Octet,
 }
 
-impl SwingingTeam {
+impl SwingingLanes {
     /// Puts a lane's unknowns where a state is.
     #[inline(always)]
-    pub(in crate::stepping::taylor) fn stand(&mut self, lane: usize, state: &State) {
+    pub(in crate::stepping::taylor) fn set_state(&mut self, lane: usize, state: &State) {
         let unknowns = state.y.iter().zip(&state.low).zip(self.high.iter_mut().zip(&mut self.low));
         for ((&y, &rest), (high, low)) in unknowns {
             (high.0[lane], low.0[lane]) = (y, rest);
@@ -146,7 +146,7 @@ impl SwingingTeam {
 /// The law of a mechanism of this kind.
 pub(in crate::stepping::taylor) fn law_of(mechanism: &Mechanism) -> Option<&Law> {
     let fits = |law: &&Law| law.profile.is_none() && !law.is_steady() && mechanism.contacts.is_empty();
-    Driven::pattern(mechanism).map(|(_, law)| law).filter(fits)
+    DrivenKernel::pattern(mechanism).map(|(_, law)| law).filter(fits)
 }
 
 /// True for mechanisms of this kind.
@@ -154,10 +154,10 @@ pub(super) fn fits(mechanism: &Mechanism) -> bool {
     law_of(mechanism).is_some()
 }
 
-impl Team for SwingingTeam {
+impl LaneKernel for SwingingLanes {
     fn new(_: &BatchMember, _order: usize, _vectors: Vectors) -> Self {
         Self {
-            laws: Laws::new(),
+            laws: LaneLaws::new(),
             driven: [0; LANES],
             share: [ZERO; 2],
             coupling: ZERO,
@@ -168,8 +168,8 @@ impl Team for SwingingTeam {
             low: [ZERO; 3],
             before: ZERO,
             moved: [ZERO; 2],
-            given: [Given { c: ZERO, s: ZERO, bx: ZERO, by: ZERO }; RATES],
-            powers: [Power { c: ZERO, s: ZERO, v: ZERO, q: ZERO, power: ZERO }; MOST + 1],
+            given: [GivenPower { c: ZERO, s: ZERO, bx: ZERO, by: ZERO }; RATES],
+            powers: [SwingingPower { c: ZERO, s: ZERO, v: ZERO, q: ZERO, power: ZERO }; MOST + 1],
         }
     }
 
@@ -179,7 +179,9 @@ impl Team for SwingingTeam {
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
         let (mechanism, state) = (member.mechanism, &member.state);
-        let (Some((driven, law)), tree) = (Driven::pattern(mechanism), &mechanism.tree) else { return 0.0 };
+        let (Some((driven, law)), tree) = (DrivenKernel::pattern(mechanism), &mechanism.tree) else {
+            return 0.0;
+        };
         let (free, [fastest, bend]) = (1 - driven, law.bounds(state.time.hi));
         let (a, d, pull, weight) =
             (tree.coupling[1].re, tree.diagonal[free], tree.weight[free], tree.weight[driven]);
@@ -196,14 +198,14 @@ impl Team for SwingingTeam {
             let term = DoubleDouble::from(number) / DoubleDouble::from(d);
             (self.load[0][i].0[lane], self.load[1][i].0[lane]) = (term.hi, term.lo);
         }
-        self.stand(lane, state);
+        self.set_state(lane, state);
         let stiffness = pull.norm_squared().sqrt() + a.abs() * (fastest * fastest + bend);
         let frequency = law.sines.iter().fold(fastest, |most, sine| most.max(sine.frequency.abs()));
         order as f64 / 8.0 / (stiffness / d).sqrt().max(frequency)
     }
 
     /// At rest, without a motor.
-    fn park(&mut self, lane: usize) {
+    fn set_idle(&mut self, lane: usize) {
         self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
         self.laws.take_in(lane, &Law::default());
     }
@@ -219,7 +221,7 @@ impl Team for SwingingTeam {
     fn expand<W: EightLanes>(&mut self, order: usize) {
         self.drive::<W>(order);
         let [c, s] = unit::<W>(&self.high[0], &self.low[0]);
-        self.powers[0] = Power { c, s, v: self.high[1], q: ZERO, power: ZERO };
+        self.powers[0] = SwingingPower { c, s, v: self.high[1], q: ZERO, power: ZERO };
         for k in 0..order {
             self.raise::<W>(k);
         }
@@ -327,7 +329,7 @@ impl Team for SwingingTeam {
         }
     }
 
-    fn leave(&self, lane: usize, state: &mut State) {
+    fn write_state(&self, lane: usize, state: &mut State) {
         for i in 0..3 {
             (state.y[i], state.low[i]) = (self.high[i].0[lane], self.low[i].0[lane]);
         }

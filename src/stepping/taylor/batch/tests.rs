@@ -36,12 +36,12 @@ fn ends(vectors: Vectors) -> Vec<State> {
         .collect();
     let batch = Batch::new(Tolerance { relative: 1e-10, absolute: 1e-10 });
     let until = Time::from(3.0);
-    let mut watch = |member: usize, passage: &Passage| match passage.from.hi > 0.1 * member as f64 {
+    let mut watch = |member: usize, passage: &TakenStep| match passage.from.hi > 0.1 * member as f64 {
         true => Going::Enough,
         false => Going::On,
     };
-    let team = FreeTeam::<2, false>::new(&members[0], batch.order, vectors);
-    let lanes = LaneSlots::new(team, &batch, until);
+    let kernel = FreeLanes::<2, false>::new(&members[0], batch.order, vectors);
+    let lanes = LaneSlots::new(kernel, &batch, until);
     let (batch, fits, members_here) = (&batch, &[true; 21][..], &mut members);
     let observer = &mut StepsAlone(&mut watch);
     vectors.run(Integration { lanes, fits, batch, members: members_here, until, observer });

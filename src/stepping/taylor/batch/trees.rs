@@ -9,12 +9,12 @@
 use super::super::terms::over;
 use super::clearance::{self, Clearance, StepFrom};
 use super::formulas::{Begun, LONGEST, StepJudge};
-use super::{BatchMember, JUDGES, LaneClock, LaneStep, Team, added, flaw_of, load, moved, store};
+use super::{BatchMember, JUDGES, LaneClock, LaneKernel, LaneStep, added, flaw_of, load, moved, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::law::Law;
-use crate::dynamics::series::lanes::{Landing, SeriesInLanes, in_lanes};
+use crate::dynamics::series::lanes::{SeriesInLanes, StepEnds, in_lanes};
 use crate::dynamics::{Mechanism, State, Time};
 use std::f64::consts::{PI, TAU};
 
@@ -24,7 +24,7 @@ const ZERO: Octet = Octet([0.0; LANES]);
 
 /// The mechanism, states and coefficients of the trajectories in the lanes.
 #[derive(Debug)]
-pub(super) struct TreeTeam {
+pub(super) struct TreeLanes {
     mechanism: Mechanism,
     series: Box<dyn SeriesInLanes>,
     order: usize,
@@ -114,7 +114,7 @@ fn fastest_rate(mechanism: &Mechanism, t: f64) -> f64 {
     (mechanism.tree.fastest_rate(&mechanism.springs).powi(2) + squares).sqrt()
 }
 
-impl TreeTeam {
+impl TreeLanes {
     /// The coordinate that a body's angle is, where it is not driven.
     fn coordinate(&self, body: usize) -> Option<usize> {
         if self.kept.is_some() {
@@ -143,7 +143,7 @@ impl TreeTeam {
             self.is_going[lane] &= self.taken.0[lane] > 0.0;
         }
         self.keep(&self.is_going.map(|is_going| !is_going));
-        let landing = Landing {
+        let landing = StepEnds {
             high: &mut self.high,
             low: &mut self.low,
             is_going: self.is_going,
@@ -167,7 +167,7 @@ impl TreeTeam {
     }
 }
 
-impl Team for TreeTeam {
+impl LaneKernel for TreeLanes {
     fn new(first: &BatchMember, order: usize, vectors: Vectors) -> Self {
         let like = &*first.mechanism.without_redundant_rows();
         let is_kept = like.has_multipliers();
@@ -202,7 +202,7 @@ impl Team for TreeTeam {
     }
 
     fn take_in(&mut self, lane: usize, member: &BatchMember, order: usize) -> f64 {
-        self.park(lane);
+        self.set_idle(lane);
         let place = std::ptr::from_ref(member.mechanism).addr();
         if self.present[lane].replace(place) != Some(place) {
             self.series.take_in(lane, member.numbers());
@@ -227,7 +227,7 @@ impl Team for TreeTeam {
     }
 
     /// At rest.
-    fn park(&mut self, lane: usize) {
+    fn set_idle(&mut self, lane: usize) {
         self.high.iter_mut().chain(&mut self.low).for_each(|number| number.0[lane] = 0.0);
     }
 
@@ -375,7 +375,7 @@ impl Team for TreeTeam {
         }
     }
 
-    fn leave(&self, lane: usize, state: &mut State) {
+    fn write_state(&self, lane: usize, state: &mut State) {
         for (unknowns, numbers) in [(&mut state.y, &self.high), (&mut state.low, &self.low)] {
             for (unknown, number) in unknowns.iter_mut().zip(numbers) {
                 *unknown = number.0[lane];

@@ -1,4 +1,4 @@
-//! What all teams do with eight lanes.
+//! What all kernels do with eight lanes.
 
 use super::super::terms::add_to;
 use super::super::wide::Wide;

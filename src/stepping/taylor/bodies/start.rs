@@ -2,7 +2,7 @@
 
 use super::super::wide::Wide;
 use super::super::{direction, wide};
-use super::{Bodies, Column, apply};
+use super::{Bodies, MatrixColumn, apply};
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::lanes::row::{at, load, store};
 use crate::dynamics::State;
@@ -69,7 +69,7 @@ pub(super) fn unit<L: Lanes, const B: usize>(j: usize) -> [L; B] {
 /// The inverse of the positive definite matrix in its place, by Gauss–Jordan: column p turned into that of
 /// the unit matrix, p = 0, 1, ….
 #[inline(always)]
-pub(super) fn invert<L: Lanes, const B: usize>(columns: &mut [Column<B>]) {
+pub(super) fn invert<L: Lanes, const B: usize>(columns: &mut [MatrixColumn<B>]) {
     for p in 0..columns.len() {
         let unit = unit::<L, B>(p);
         let pivot = 1.0 / at(&columns[p].inverse, p);

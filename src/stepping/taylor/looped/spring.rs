@@ -17,41 +17,41 @@ const LENGTH: usize = MOST + 8;
 /// A spring and its series: D, |D|² with its powers' numbers, 1/|D|; `backwards` ones run from the end, so
 /// that products are of neighbours.
 #[derive(Clone, Debug)]
-pub struct Spring {
+pub struct LoopSpring {
     /// D.
     pub span: Point,
     stiffness: f64,
     free_length: f64,
-    x: Series,
-    y: Series,
+    x: SpringPowers,
+    y: SpringPowers,
     square: [f64; LENGTH],
     weighted: [f64; LENGTH],
-    inverse: Series,
+    inverse: SpringPowers,
 }
 
-impl Spring {
+impl LoopSpring {
     /// Of a spring of the mechanism, without its damper.
-    pub fn new(spring: &force::Spring) -> Self {
+    pub fn new(spring: &force::CompiledSpring) -> Self {
         Self {
             span: spring.span.clone(),
             stiffness: spring.stiffness,
             free_length: spring.free_length,
-            x: Series::ZERO,
-            y: Series::ZERO,
+            x: SpringPowers::ZERO,
+            y: SpringPowers::ZERO,
             square: [0.0; LENGTH],
             weighted: [0.0; LENGTH],
-            inverse: Series::ZERO,
+            inverse: SpringPowers::ZERO,
         }
     }
 }
 
 #[derive(Clone, Debug)]
-struct Series {
+struct SpringPowers {
     forwards: [f64; LENGTH],
     backwards: [f64; LENGTH],
 }
 
-impl Series {
+impl SpringPowers {
     const ZERO: Self = Self { forwards: [0.0; LENGTH], backwards: [0.0; LENGTH] };
 
     #[inline(always)]
@@ -63,7 +63,7 @@ impl Series {
 
 /// Σ_{j=0..m} a_j b_{m-j}.
 #[inline(always)]
-fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &Series, m: usize) -> f64 {
+fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &SpringPowers, m: usize) -> f64 {
     let mut sum = L::ZERO;
     let mut j = 0;
     while j <= m {
@@ -78,11 +78,11 @@ fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &Series, m: usize) -> f64 {
 
 /// Power m of a spring's force on its first end, from that of its span.
 #[inline(always)]
-pub fn pull<L: Lanes>(spring: &mut Spring, m: usize, d: Complex<f64>) -> Complex<f64> {
+pub fn pull<L: Lanes>(spring: &mut LoopSpring, m: usize, d: Complex<f64>) -> Complex<f64> {
     if spring.free_length == 0.0 {
         return d.times(-spring.stiffness);
     }
-    let Spring { x, y, square, weighted, inverse, .. } = spring;
+    let LoopSpring { x, y, square, weighted, inverse, .. } = spring;
     x.push(m, d.re);
     y.push(m, d.im);
     square[m] = convolve::<L>(&x.forwards, x, m) + convolve::<L>(&y.forwards, y, m);

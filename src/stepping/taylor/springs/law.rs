@@ -27,7 +27,7 @@ const ROOM: usize = 4 * BLOCKS;
 /// Powers of one series.
 #[derive(Clone, Debug)]
 #[repr(align(32))]
-struct Series {
+struct LawPowers {
     /// c_j, and j c_j.
     forward: [[f64; 4]; BLOCKS],
     weighted: [[f64; 4]; BLOCKS],
@@ -35,7 +35,7 @@ struct Series {
     backward: [f64; ROOM + 4],
 }
 
-impl Series {
+impl LawPowers {
     const NONE: Self =
         Self { forward: [[0.0; 4]; BLOCKS], weighted: [[0.0; 4]; BLOCKS], backward: [0.0; ROOM + 4] };
 
@@ -54,7 +54,7 @@ impl Series {
 
 /// Σ_{j=0..m} a_j b_{m-j}.
 #[inline(always)]
-fn product<L: Lanes>(a: &[[f64; 4]; BLOCKS], b: &Series, m: usize) -> f64 {
+fn product<L: Lanes>(a: &[[f64; 4]; BLOCKS], b: &LawPowers, m: usize) -> f64 {
     let (b, _) = b.backward[ROOM - 1 - m..].as_chunks::<4>();
     let mut sums = L::ZERO;
     for i in 0..=m / 4 {
@@ -68,20 +68,20 @@ fn product<L: Lanes>(a: &[[f64; 4]; BLOCKS], b: &Series, m: usize) -> f64 {
 #[derive(Clone, Debug)]
 pub struct LawSeries {
     law: SpanLaw,
-    length: Series,
-    rate: Series,
+    length: LawPowers,
+    rate: LawPowers,
     /// a and s.
-    strain: Series,
-    reciprocal: Series,
+    strain: LawPowers,
+    reciprocal: LawPowers,
     /// All results of the tape.
-    results: Vec<Series>,
+    results: Vec<LawPowers>,
 }
 
 impl LawSeries {
     /// Room for the series of a law, as far as time is not in it.
     pub fn new(law: &SpanLaw) -> Self {
-        let results = vec![Series::NONE; law.tape.len()];
-        let [length, rate, strain, reciprocal] = [Series::NONE; 4];
+        let results = vec![LawPowers::NONE; law.tape.len()];
+        let [length, rate, strain, reciprocal] = [LawPowers::NONE; 4];
         Self { law: law.clone(), length, rate, strain, reciprocal, results }
     }
 
@@ -95,7 +95,7 @@ impl LawSeries {
     pub fn begin(&mut self, length: f64, reciprocal: f64) {
         let Self { length: own, rate, strain, reciprocal: inverse, results, .. } = self;
         for series in [&mut *own, rate, strain, &mut *inverse].into_iter().chain(results) {
-            *series = Series::NONE;
+            *series = LawPowers::NONE;
         }
         own.put(0, length);
         inverse.put(0, reciprocal);
@@ -137,7 +137,12 @@ impl LawSeries {
 
 /// Finds power `m` of all results, from that of the inputs and from all powers before.
 #[inline(always)]
-fn advance<L: Lanes>(operations: &[Operation], results: &mut [Series], m: usize, input: impl Fn(u32) -> f64) {
+fn advance<L: Lanes>(
+    operations: &[Operation],
+    results: &mut [LawPowers],
+    m: usize,
+    input: impl Fn(u32) -> f64,
+) {
     let over = |x: f64| x / m as f64;
     for (i, operation) in operations.iter().enumerate() {
         let (before, rest) = results.split_at_mut(i);
@@ -145,7 +150,7 @@ fn advance<L: Lanes>(operations: &[Operation], results: &mut [Series], m: usize,
         let of = |slot: Slot| &before[slot as usize];
         let at = |slot: Slot| before[slot as usize].at(m);
         // Σ j a_j b_{m-j}.
-        let turned = |a: &Series, b: &Series| product::<L>(&a.weighted, b, m);
+        let turned = |a: &LawPowers, b: &LawPowers| product::<L>(&a.weighted, b, m);
         let power = match *operation {
             Operation::Input(number) => input(number),
             Operation::Constant(value) => {
@@ -216,7 +221,7 @@ mod tests {
         let [(tape, slots)] = Symbol::record(|| [vec![everything(Symbol::input(0), Symbol::input(1))]]);
         let inputs = |number: u32, m: usize| [1.3, 0.4][number as usize] / ((m * m + 1) as f64 * 1.5);
         let mut exact = TapeSeries::<DoubleDouble>::new(&tape, MOST);
-        let mut results = vec![Series::NONE; tape.len()];
+        let mut results = vec![LawPowers::NONE; tape.len()];
         for m in 0..=MOST {
             exact.advance(&tape, m, |number| DoubleDouble::from(inputs(number, m)));
             advance::<Portable>(tape.operations(), &mut results, m, |number| inputs(number, m));

@@ -6,7 +6,7 @@ use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::keeper::CLOSE;
-use crate::dynamics::natural::{Linear, Reduced};
+use crate::dynamics::natural::{LinearRow, ReducedMatrices};
 use crate::stepping::taylor::batch::{load, store};
 
 /// Sweeps onto the unit lengths after the first one, of lanes that are far off.
@@ -20,7 +20,7 @@ pub(super) struct Matrices {
     blocks: Vec<[Octet; 4]>,
     scale: Vec<Octet>,
     /// The linear rows: elements with their gradients, constant, and column of R.
-    rows: Vec<Row>,
+    rows: Vec<MatrixRow>,
     /// V, x and y (each n × n), and S⁻¹.
     v: [Vec<Octet>; 2],
     schur: Vec<Octet>,
@@ -35,7 +35,7 @@ pub(super) struct Matrices {
 }
 
 #[derive(Debug)]
-struct Row {
+struct MatrixRow {
     terms: Vec<(usize, Pair)>,
     constant: Octet,
     back: Vec<Pair>,
@@ -53,13 +53,13 @@ pub(super) fn is_regular(weakest: &Octet, lane: usize) -> bool {
 impl Matrices {
     /// Room for so many bodies with constants like these, which only mechanisms have that fit; `is_line`: of
     /// one degree of freedom.
-    pub(super) fn new(reduced: Option<&Reduced>, n: usize, is_line: bool) -> Self {
-        let row = |row: &Linear| Row {
+    pub(super) fn new(reduced: Option<&ReducedMatrices>, n: usize, is_line: bool) -> Self {
+        let row = |row: &LinearRow| MatrixRow {
             terms: row.place.linear.iter().map(|&(k, _)| (k, PAIR)).collect(),
             constant: ZERO,
             back: vec![PAIR; n],
         };
-        let rows: Vec<Row> = reduced.map_or_else(Vec::new, |it| it.rows.iter().map(row).collect());
+        let rows: Vec<MatrixRow> = reduced.map_or_else(Vec::new, |it| it.rows.iter().map(row).collect());
         let room = |size: usize| vec![ZERO; size];
         Self {
             count: n,
@@ -77,7 +77,7 @@ impl Matrices {
     }
 
     /// Puts the constants of a mechanism into a lane.
-    pub(super) fn take_in(&mut self, lane: usize, reduced: &Reduced) {
+    pub(super) fn take_in(&mut self, lane: usize, reduced: &ReducedMatrices) {
         let n = self.count;
         for (block, own) in self.blocks.iter_mut().zip(&reduced.inverse) {
             block.iter_mut().zip(own).for_each(|(entry, &own)| entry.0[lane] = own);

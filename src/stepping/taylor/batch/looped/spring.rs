@@ -12,7 +12,7 @@ use crate::stepping::taylor::batch::{load, store};
 
 /// A spring and its series: D, q with its powers' numbers, s.
 #[derive(Clone, Debug)]
-pub(super) struct Spring {
+pub(super) struct LaneSpringSeries {
     root: Pair,
     terms: Vec<(usize, Pair)>,
     stiffness: Octet,
@@ -25,9 +25,9 @@ pub(super) struct Spring {
     inverse: Vec<Octet>,
 }
 
-impl Spring {
+impl LaneSpringSeries {
     /// Room for a spring like this one.
-    pub(super) fn new(spring: &force::Spring) -> Self {
+    pub(super) fn new(spring: &force::CompiledSpring) -> Self {
         let room = || vec![ZERO; MOST + 1];
         Self {
             root: PAIR,
@@ -44,7 +44,7 @@ impl Spring {
     }
 
     /// Puts the constants of a spring into a lane.
-    pub(super) fn take_in(&mut self, lane: usize, spring: &force::Spring) {
+    pub(super) fn take_in(&mut self, lane: usize, spring: &force::CompiledSpring) {
         put(&mut self.root, lane, spring.span.root);
         let own = spring.span.terms.iter().map(|&(_, gamma)| gamma);
         self.terms.iter_mut().zip(own).for_each(|((_, gamma), own)| put(gamma, lane, own));
