@@ -1,4 +1,6 @@
 //! Exceptions: what the crate refuses, with the place and a hint; and interruption.
+//!
+//! Their module is the one that people import, by which pickles find them again.
 
 use driftless::dynamics::CompileError;
 use driftless::run::{RequestRefusal, RunError, SweepError};
@@ -7,11 +9,21 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 
-create_exception!(_core, DriftlessError, PyException, "Something driftless refused or could not do.");
-create_exception!(_core, SceneRefused, DriftlessError, "A scene that is none: see line, column, path, hint.");
-create_exception!(_core, RequestRefused, DriftlessError, "A request that makes no sense for the scene.");
+create_exception!(pydriftless, DriftlessError, PyException, "Something driftless refused or could not do.");
 create_exception!(
-    _core,
+    pydriftless,
+    SceneRefused,
+    DriftlessError,
+    "A scene that is none: see line, column, path, hint."
+);
+create_exception!(
+    pydriftless,
+    RequestRefused,
+    DriftlessError,
+    "A request that makes no sense for the scene."
+);
+create_exception!(
+    pydriftless,
     Interrupted,
     PyKeyboardInterrupt,
     "A run that was interrupted; `checkpoint` goes on with it."

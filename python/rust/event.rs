@@ -2,7 +2,7 @@
 
 use driftless::run::{Action, Direction, Event};
 use driftless::{Configuration, Mechanism, Motion, Site};
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -107,7 +107,14 @@ impl Event for PyEvent {
             t: at.time(),
             bodies: self.sites.iter().enumerate().map(body).collect(),
         };
-        let value = Python::attach(|py| self.function.bind(py).call1((moment,))?.extract::<f64>());
+        let value = Python::attach(|py| {
+            let value = self.function.bind(py).call1((moment,))?.extract::<f64>()?;
+            if value.is_nan() {
+                let (name, t) = (&self.name, at.time());
+                return Err(PyValueError::new_err(format!("the event {name} is not a number at t = {t} s")));
+            }
+            Ok(value)
+        });
         value.unwrap_or_else(|error| {
             // The run ends at its next look.
             self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);

@@ -23,22 +23,35 @@ pub fn asked(py: Python<'_>, options: &Bound<'_, PyDict>, trust: Level) -> PyRes
         if value.is_none() {
             continue;
         }
-        let word = || -> PyResult<String> { value.extract() };
+        let named = |kind: &str| {
+            let given = value.get_type().name().map_or_else(|_| "?".to_owned(), |name| name.to_string());
+            PyTypeError::new_err(format!("{name} is {kind}, not of type {given}"))
+        };
+        let word = || value.extract::<String>().map_err(|_| named("a word"));
+        let number = || value.extract::<f64>().map_err(|_| named("a number"));
+        let limit = || match number()? {
+            limit if limit >= 0.0 => Ok(limit),
+            limit => Err(refused(py, &format!("{name} = {limit}: a limit is a number from 0 up"))),
+        };
+        let count = || match number()? {
+            count if (1.0..=1e18).contains(&count) && count.fract() == 0.0 => Ok(count as u64),
+            count => Err(refused(py, &format!("{name} = {count}: it is a whole number from 1 to 1e18"))),
+        };
         match name.as_str() {
             "method" => request.method = Some(parsed(py, &name, &word()?)?),
             "stabilize" => request.stabilize = Some(parsed(py, &name, &word()?)?),
             "prefer" => request.prefer = Some(parsed(py, &name, &word()?)?),
             "trust" => *trust = parsed(py, &name, &word()?)?,
-            "step" => request.step = Some(value.extract()?),
-            "rtol" => request.rtol = Some(value.extract()?),
-            "atol" => request.atol = Some(value.extract()?),
-            "until" => request.until = Some(value.extract()?),
-            "every" => request.every = Some(value.extract()?),
-            "time_constant" => request.time_constant = Some(value.extract()?),
-            "extended" => request.extended = value.extract()?,
-            "max_evaluations" => request.max_evaluations = Some(value.extract::<f64>()? as u64),
-            "max_energy_drift" => limits.energy = Some(value.extract()?),
-            "max_constraint_drift" => limits.constraint = Some(value.extract()?),
+            "step" => request.step = Some(number()?),
+            "rtol" => request.rtol = Some(number()?),
+            "atol" => request.atol = Some(number()?),
+            "until" => request.until = Some(number()?),
+            "every" => request.every = Some(number()?),
+            "time_constant" => request.time_constant = Some(number()?),
+            "extended" => request.extended = value.extract().map_err(|_| named("True or False"))?,
+            "max_evaluations" => request.max_evaluations = Some(count()?),
+            "max_energy_drift" => limits.energy = Some(limit()?),
+            "max_constraint_drift" => limits.constraint = Some(limit()?),
             _ => return Err(PyTypeError::new_err(format!("there is no option `{name}`"))),
         }
     }

@@ -9,7 +9,9 @@ use driftless::report::result::record;
 use driftless::run::checkpoint::{opened, sealed};
 use driftless::run::methods::MethodId;
 use driftless::run::table::Shown;
-use driftless::run::{Event, Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock};
+use driftless::run::{
+    Event, Limits, Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock,
+};
 use driftless::stepping::interruption;
 use driftless::{Level, Outcome, Trajectory, chart};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
@@ -72,8 +74,9 @@ impl Observer for Watch<'_> {
         let row = &self.numbers[before..];
         let told = Python::attach(|py| {
             let answer = callback.bind(py).call1((sample.t, PyArray1::from_slice(py, row)))?;
-            // Nothing said is going on.
-            PyResult::Ok(answer.is_none() || answer.is_truthy()?)
+            // Only False ends it, numpy's as well.
+            let kind = answer.get_type().name()?;
+            PyResult::Ok(!(kind == "bool" || kind == "bool_") || answer.is_truthy()?)
         });
         match told {
             Ok(true) => ControlFlow::Continue(()),
@@ -303,6 +306,24 @@ impl Raw {
         self.outcome.ended_by.clone()
     }
 
+    /// Where it ended \[s\].
+    #[getter]
+    fn end(&self) -> f64 {
+        self.outcome.last.t
+    }
+
+    /// The same run by the same plan once more, with the motion between its rows.
+    fn again(&self, py: Python<'_>, described: Vec<Described>) -> PyResult<Raw> {
+        let mechanism = &self.scene.get().mechanism;
+        let failed = Failed::default();
+        let events = events(described, mechanism, &failed);
+        let start = mechanism.start(&self.scene.get().scene);
+        let run = Run::new(Arc::clone(mechanism), self.outcome.plan.clone(), Limits::default(), &start);
+        let run = run.map_err(|error| of_run(py, &error.into()))?;
+        let running = Running::new(run.with_events(events).timed(wall_clock));
+        carry(py, self.scene.clone_ref(py), running, Vec::new(), None, true, &failed)
+    }
+
     /// What `run.json` holds, but for the table's hash.
     fn report(&self) -> String {
         let scene = self.scene.get();
@@ -339,7 +360,7 @@ impl Raw {
             for (key, values) in [("phi", &record.phi), ("omega", &record.omega)] {
                 let of = PyDict::new(py);
                 for (name, value) in names.iter().zip(values) {
-                    of.set_item(name.strip_prefix("phi of ").unwrap_or(name), value)?;
+                    of.set_item(name, value)?;
                 }
                 dict.set_item(key, of)?;
             }
@@ -348,10 +369,18 @@ impl Raw {
         self.outcome.events.iter().map(dict).collect()
     }
 
-    /// Names of what [`Raw::at`] tells angles or positions of.
+    /// Names of what [`Raw::at`] tells angles or positions of: `phi of bar` is `bar`, `x of ball` is `ball.x`.
     fn coordinates(&self) -> Vec<String> {
         let mechanism = &self.scene.get().mechanism;
-        (0..mechanism.coordinates()).map(|k| mechanism.coordinate_name(k)).collect()
+        let name = |k| {
+            let name = mechanism.coordinate_name(k);
+            match name.split_once(" of ") {
+                Some(("phi", body)) => body.to_owned(),
+                Some((kind, body)) => format!("{body}.{kind}"),
+                None => name,
+            }
+        };
+        (0..mechanism.coordinates()).map(name).collect()
     }
 
     /// Names of the charts the run has.
@@ -376,7 +405,13 @@ impl Raw {
                 let chart = Chart::ALL.into_iter().find(|chart| chart.name() == name);
                 let kind = chart::Format::ALL.into_iter().find(|kind| kind.extension() == format);
                 let (Some(chart), Some(kind)) = (chart, kind) else {
-                    return Err(PyValueError::new_err(format!("there is no chart `{name}` as `{format}`")));
+                    let there = self.charts().join(", ");
+                    let kinds: Vec<_> = chart::Format::ALL.into_iter().map(|kind| kind.extension()).collect();
+                    return Err(PyValueError::new_err(format!(
+                        "there is no chart `{name}` as `{format}`; there are {there}, as {}, and the motion as \
+                        gif or apng",
+                        kinds.join(", ")
+                    )));
                 };
                 let drawn = draw(chart, &scene.scene, &scene.mechanism, &self.outcome);
                 drawn.and_then(|picture| picture.bytes(kind)).map_err(failed)?

@@ -14,7 +14,13 @@ use std::sync::{Mutex, PoisonError};
 #[pyclass(frozen, module = "pydriftless._core")]
 pub struct Stepper {
     shown: Shown,
-    running: Mutex<Option<Running>>,
+    stepping: Mutex<Stepping>,
+}
+
+/// A run under way, or why it stopped where that has not been told yet.
+enum Stepping {
+    Running(Box<Running>),
+    Over(Option<String>),
 }
 
 /// Begins a run that is stepped from outside.
@@ -27,7 +33,10 @@ pub fn stream(
 ) -> PyResult<Stepper> {
     let options = options.cloned().unwrap_or_else(|| PyDict::new(py));
     let running = begun(py, scene.get(), &options, Vec::new())?;
-    Ok(Stepper { shown: Shown::new(&scene.get().mechanism), running: Mutex::new(Some(running)) })
+    Ok(Stepper {
+        shown: Shown::new(&scene.get().mechanism),
+        stepping: Mutex::new(Stepping::Running(Box::new(running))),
+    })
 }
 
 #[pymethods]
@@ -39,8 +48,11 @@ impl Stepper {
     /// The next row; a stop before the horizon is an error after the last one.
     fn __next__<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let (row, stop) = py.detach(|| {
-            let mut lock = self.running.lock().unwrap_or_else(PoisonError::into_inner);
-            let Some(running) = &mut *lock else { return (Vec::new(), None) };
+            let mut lock = self.stepping.lock().unwrap_or_else(PoisonError::into_inner);
+            let running = match &mut *lock {
+                Stepping::Running(running) => running,
+                Stepping::Over(stop) => return (Vec::new(), stop.take()),
+            };
             let row = std::cell::RefCell::new(Vec::new());
             let mut see = |sample: &driftless::Sample| {
                 row.borrow_mut().clear();
@@ -48,14 +60,24 @@ impl Stepper {
                 Ok(())
             };
             let gone = running.go(&mut see, &mut || !row.borrow().is_empty());
-            let is_over = !matches!(gone, Ok(false));
-            let stop = if is_over { lock.take().and_then(|running| running.finish().stop) } else { None };
-            (row.into_inner(), stop)
+            let row = row.into_inner();
+            if matches!(gone, Ok(false)) {
+                return (row, None);
+            }
+            let Stepping::Running(running) = std::mem::replace(&mut *lock, Stepping::Over(None)) else {
+                return (row, None);
+            };
+            let mut stop = running.finish().stop.map(|stop| stop.to_string());
+            if !row.is_empty() {
+                // The row comes first; the next call tells why there is no other.
+                *lock = Stepping::Over(stop.take());
+            }
+            (row, stop)
         });
         py.check_signals()?;
         match stop {
-            Some(stop) if row.is_empty() => Err(refused(py, &stop.to_string())),
-            _ => Ok((!row.is_empty()).then(|| PyArray1::from_vec(py, row))),
+            Some(stop) => Err(refused(py, &stop)),
+            None => Ok((!row.is_empty()).then(|| PyArray1::from_vec(py, row))),
         }
     }
 }
