@@ -1,26 +1,34 @@
-"""Points of a sweep as files, written as they come, and gone on with after an interruption."""
+"""Points of a sweep as files, written as they come, and gone on with after an interruption.
+
+Beside a file that may be gone on with lies ``.progress``: a line that tells the sweep from others, then one for
+each part with what verifies it.  What does not agree with its line is computed again.
+"""
 
 from __future__ import annotations
 
 import csv
+import hashlib
+import io
 import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 
-def written(found: Callable[[int], Iterable[Any]], to: Any, mark: str | None) -> Any:
+def written(found: Callable[[Sequence[int]], Iterable[Any]], count: int, to: Any, mark: str | None) -> Any:
     """The parts as a file, one after the other; the numbers are not kept.
 
     Parameters
     ----------
     found : callable
-        The parts that follow so many.
+        The parts of these numbers, in their order.
+    count : int
+        How many parts there are, numbered from 1.
     to : path
         A ``.csv`` or ``.parquet`` file.
     mark : str, optional
@@ -31,110 +39,162 @@ def written(found: Callable[[int], Iterable[Any]], to: Any, mark: str | None) ->
     path = os.fspath(to)
     if not path.endswith((".csv", ".parquet")):
         raise ValueError(f"{path}: the file ends in .csv or .parquet")
-    state = _State(path, mark)
-    write = _Csv(path, state) if path.endswith(".csv") else _Parquet(path, state)
+    progress = _Progress(path, mark)
+    write = _Csv(path, progress) if path.endswith(".csv") else _Parquet(path, progress, count)
+    progress.begin()
     with write:
-        for part in found(state.parts):
-            if part is None:
-                continue
-            state.take(part)
-            write.part(part)
-            state.save()
-    state.remove()
-    heads = state.heads
+        missing = [number for number in range(1, count + 1) if number not in progress.parts]
+        for part, number in zip(found(missing), missing):
+            progress.add(number, part, write.part(number, part))
+    progress.remove()
+    parts = [progress.parts[number] for number in sorted(progress.parts)]
+    heads = parts[0]["heads"]
     sweep = Sweep(heads, np.empty((0, len(heads))), np.empty(0, np.int32), np.empty(0, np.uint8))
-    sweep.causes, sweep.report = dict(state.causes), json.loads(state.report)
+    sweep.causes = {index: cause for part in parts for index, cause in part["causes"]}
+    sweep.counts = np.sum([part["counts"] for part in parts], axis=0)
+    sweep.report = json.loads(parts[0]["report"])
     return sweep
 
 
-class _State:
-    """What of a sweep is in its file, kept beside it while it is written."""
+class _Progress:
+    """The parts that are in a file, and beside it while it is written, where it may be gone on with."""
 
     def __init__(self, path: str, mark: str | None) -> None:
         self._mark = mark
         self._path = Path(path + ".progress")
-        self.parts, self.size = 0, 0
-        self.heads: list[str] = []
-        self.causes: list[tuple[int, str]] = []
-        self.report = "{}"
+        self.parts: dict[int, dict[str, Any]] = {}
         if mark is None or not self._path.exists():
             return
-        known = json.loads(self._path.read_text(encoding="utf-8"))
-        if known.pop("mark") != mark:
-            raise ValueError(f"{path} was begun by another sweep: remove {self._path.name} to begin anew")
-        self.parts, self.size, self.heads, self.report = (known[key] for key in ("parts", "size", "heads", "report"))
-        self.causes = [(index, cause) for index, cause in known["causes"]]
-
-    def take(self, part: Any) -> None:
-        heads, _, _, _, causes, report = part
-        self.parts += 1
-        self.heads = self.heads or heads
-        self.report = report if self.report == "{}" else self.report
-        self.causes.extend(causes)
-
-    def save(self) -> None:
-        if self._mark is None:
+        lines = self._path.read_bytes().split(b"\n")
+        begun = _read(lines[0])
+        if "mark" not in begun:
             return
-        names = ("parts", "size", "heads", "causes", "report")
-        text = json.dumps({"mark": self._mark, **{name: getattr(self, name) for name in names}})
-        beside = self._path.with_suffix(".progress-new")
-        beside.write_text(text, encoding="utf-8")
-        os.replace(beside, self._path)
-
-    def remove(self) -> None:
-        self._path.unlink(missing_ok=True)
+        if begun["mark"] != mark:
+            raise ValueError(f"{path} was begun by another sweep: remove {self._path.name} to begin anew")
+        for part in map(_read, lines[1:]):
+            if part.keys() >= {"number", "heads", "counts", "causes", "report", "size", "sha256"}:
+                self.parts[int(part["number"])] = part
 
     @property
     def is_kept(self) -> bool:
         return self._mark is not None
 
+    def begin(self) -> None:
+        """Writes what holds of the parts; where nothing is to be kept, what another sweep left goes away."""
+        if self._mark is None:
+            self.remove()
+            return
+        lines = [{"mark": self._mark}, *self.parts.values()]
+        beside = self._path.with_suffix(".progress-new")
+        beside.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+        os.replace(beside, self._path)
+
+    def add(self, number: int, part: Any, proof: dict[str, Any]) -> None:
+        """Takes a part that is in its file."""
+        heads, _, _, status, causes, report = part
+        counts = np.bincount(status, minlength=4).tolist()
+        told = {"number": number, "heads": heads, "counts": counts, "causes": causes, **proof}
+        told["report"] = report if number == 1 else "{}"
+        self.parts[number] = told
+        if self._mark is not None:
+            with open(self._path, "a", encoding="utf-8") as file:
+                file.write(json.dumps(told) + "\n")
+                file.flush()
+                os.fsync(file.fileno())
+
+    def remove(self) -> None:
+        self._path.unlink(missing_ok=True)
+
+
+def _read(line: bytes) -> dict[str, Any]:
+    """A line of progress, or nothing where it is damaged."""
+    try:
+        found = json.loads(line)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
 
 class _Csv:
-    def __init__(self, path: str, state: _State) -> None:
-        self._path, self._state = path, state
+    """One file: its parts follow each other, so that all before the first that does not agree count."""
+
+    def __init__(self, path: str, progress: _Progress) -> None:
+        self._path, self._progress = path, progress
+        self._hash = hashlib.sha256()
+        self._size = 0
+        last = 0
+        while last + 1 in progress.parts:
+            last += 1
+        if last and not self._agrees(progress.parts[last]):
+            last, self._hash, self._size = 0, hashlib.sha256(), 0
+        progress.parts = {number: progress.parts[number] for number in range(1, last + 1)}
+
+    def _agrees(self, part: dict[str, Any]) -> bool:
+        try:
+            with open(self._path, "rb") as file:
+                while self._size < part["size"] and (content := file.read(min(1 << 20, part["size"] - self._size))):
+                    self._hash.update(content)
+                    self._size += len(content)
+        except FileNotFoundError:
+            return False
+        return self._size == part["size"] and self._hash.hexdigest() == part["sha256"]
 
     def __enter__(self) -> _Csv:
-        if self._state.parts:
+        if self._size:
             # What was written after the last part that counts is written again.
-            os.truncate(self._path, self._state.size)
-        self._file = open(self._path, "a" if self._state.parts else "w", newline="", encoding="utf-8")
-        self._writer = csv.writer(self._file, lineterminator="\n")
+            os.truncate(self._path, self._size)
+        self._file = open(self._path, "ab" if self._size else "wb")
         return self
 
-    def part(self, part: Any) -> None:
+    def part(self, number: int, part: Any) -> dict[str, Any]:
         from ._sweep import STATUS
 
         heads, rows, _, status, _, _ = part
-        if self._state.parts == 1:
-            self._writer.writerow([*heads, "status"])
-        for row, state in zip(rows.tolist(), status):
-            numbers = ("" if math.isnan(number) else repr(number) for number in row)
-            self._writer.writerow([*numbers, STATUS[state]])
-        if self._state.is_kept:
+        if number == 1:
+            self._write([[*heads, "status"]])
+        words = (["" if math.isnan(number) else repr(number) for number in row] for row in rows.tolist())
+        self._write([*row, STATUS[state]] for row, state in zip(words, status))
+        if self._progress.is_kept:
             self._file.flush()
             os.fsync(self._file.fileno())
-            self._state.size = self._file.tell()
+        return {"size": self._size, "sha256": self._hash.hexdigest()}
+
+    def _write(self, rows: Iterable[list[str]]) -> None:
+        text = io.StringIO()
+        csv.writer(text, lineterminator="\n").writerows(rows)
+        content = text.getvalue().encode()
+        self._file.write(content)
+        self._hash.update(content)
+        self._size += len(content)
 
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
 
 class _Parquet:
-    """One file; of a sweep that may be gone on with, a file for each part until all are there."""
+    """One file under its name when it is whole; a file for each part until then, where it may be gone on with."""
 
-    def __init__(self, path: str, state: _State) -> None:
-        self._path, self._state = path, state
+    def __init__(self, path: str, progress: _Progress, count: int) -> None:
+        self._path, self._progress, self._count = path, progress, count
         self._parts = Path(path + ".parts")
+        self._beside = path + ".new"
         self._writer: Any = None
+        progress.parts = {number: part for number, part in progress.parts.items() if self._agrees(number, part)}
+
+    def _agrees(self, number: int, part: dict[str, Any]) -> bool:
+        try:
+            return number <= self._count and _proof(self._place(number)).items() <= part.items()
+        except FileNotFoundError:
+            return False
 
     def __enter__(self) -> _Parquet:
-        if self._state.is_kept:
-            if not self._state.parts:
-                shutil.rmtree(self._parts, ignore_errors=True)
+        if not self._progress.parts:
+            shutil.rmtree(self._parts, ignore_errors=True)
+        if self._progress.is_kept:
             self._parts.mkdir(exist_ok=True)
         return self
 
-    def part(self, part: Any) -> None:
+    def part(self, number: int, part: Any) -> dict[str, Any]:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -143,10 +203,11 @@ class _Parquet:
         columns["flip_bar"] = pa.array(flips)
         columns["status"] = pa.array(status)
         table = pa.table(columns)
-        if self._state.is_kept:
-            pq.write_table(table, self._place(self._state.parts))
-        else:
+        if not self._progress.is_kept:
             self._append(table)
+            return {}
+        pq.write_table(table, self._place(number))
+        return _proof(self._place(number))
 
     def _place(self, number: int) -> Path:
         return self._parts / f"{number:06}.parquet"
@@ -155,16 +216,29 @@ class _Parquet:
         import pyarrow.parquet as pq
 
         if self._writer is None:
-            self._writer = pq.ParquetWriter(self._path, table.schema)
+            self._writer = pq.ParquetWriter(self._beside, table.schema)
         self._writer.write_table(table)
 
     def __exit__(self, kind: object, *_: object) -> None:
-        if kind is None and self._state.is_kept:
-            import pyarrow.parquet as pq
+        try:
+            if kind is None and self._progress.is_kept:
+                import pyarrow.parquet as pq
 
-            for number in range(1, self._state.parts + 1):
-                if self._place(number).exists():
+                for number in range(1, self._count + 1):
                     self._append(pq.read_table(self._place(number)))
-            shutil.rmtree(self._parts)
-        if self._writer is not None:
-            self._writer.close()
+        finally:
+            if self._writer is not None:
+                self._writer.close()
+        if kind is not None:
+            Path(self._beside).unlink(missing_ok=True)
+            return
+        os.replace(self._beside, self._path)
+        # The file is whole: from here on nothing beside it counts.
+        self._progress.remove()
+        shutil.rmtree(self._parts, ignore_errors=True)
+
+
+def _proof(path: Path) -> dict[str, Any]:
+    """What a file of a part is verified by."""
+    content = path.read_bytes()
+    return {"size": len(content), "sha256": hashlib.sha256(content).hexdigest()}

@@ -9,9 +9,12 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ._core import DriftlessError, RequestRefused, SceneRefused
 
-_TYPES = {".png": "image/png", ".svg": "image/svg+xml", ".gif": "image/gif"}
+#: Formats of pictures; that of which there is one counts as the picture, others beside it are extra.
+_FORMATS = ("png", "svg", "pdf", "gif")
 
 
 class Picture:
@@ -50,7 +53,8 @@ class Report(dict[str, Any]):
     Attributes
     ----------
     pictures : dict[str, Picture]
-        The charts the command drew, by their names.
+        The charts the command drew, by their names; one that is there in several formats also by its name
+        with the ending, as ``"mode1.gif"``.
     """
 
     pictures: dict[str, Picture]
@@ -69,6 +73,8 @@ def flags(options: dict[str, Any]) -> list[str]:
     """Options of the program from keyword arguments: ``max_evaluations=5`` is ``--max-evaluations 5``."""
     words: list[str] = []
     for name, value in options.items():
+        if isinstance(value, (np.generic, np.ndarray)):
+            value = value.tolist()
         if value is None or value is False:
             continue
         flag = "--" + name.replace("_", "-")
@@ -97,10 +103,14 @@ def command(name: str, arguments: list[str], text: str | None, writes: bool) -> 
         found = json.loads(done.stdout) if done.stdout.strip() else {}
         if done.returncode and set(found) <= {"error"}:
             raise _exception(done.returncode, found.get("error", {}), done.stderr)
-        pictures = {}
-        for path in sorted(Path(folder).rglob("*")):
-            if path.suffix in _TYPES:
-                pictures[path.stem] = Picture(path.read_bytes(), path.suffix[1:])
+        if writes:
+            # It is gone when this returns.
+            found.pop("folder", None)
+        pictures: dict[str, Picture] = {}
+        paths = [path for path in Path(folder).rglob("*") if path.suffix[1:] in _FORMATS]
+        for path in sorted(paths, key=lambda path: (path.stem, _FORMATS.index(path.suffix[1:]))):
+            name = path.name if path.stem in pictures else path.stem
+            pictures[name] = Picture(path.read_bytes(), path.suffix[1:])
         return Report(found, pictures=pictures)
 
 

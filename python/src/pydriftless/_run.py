@@ -26,11 +26,12 @@ class Columns(Mapping[str, np.ndarray]):
         self._columns = columns
 
     def __getattr__(self, name: str) -> np.ndarray:
-        columns: dict[str, np.ndarray] = self.__dict__["_columns"]
+        # Copies and pickles ask before there is anything.
+        columns: dict[str, np.ndarray] = self.__dict__.get("_columns", {})
         try:
             return columns[name]
         except KeyError:
-            raise AttributeError(f"there is no {name!r}; there are {', '.join(self._columns)}") from None
+            raise AttributeError(f"there is no {name!r}; there are {', '.join(columns)}") from None
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._columns[name]
@@ -72,11 +73,10 @@ class Run:
     """
 
     def __init__(
-        self, raw: _core.Raw, scene: Scene, options: dict[str, Any], described: list[Any] | None = None
+        self, raw: _core.Raw, scene: Scene, described: list[Any] | None = None
     ) -> None:
         self._raw = raw
         self._described = described or []
-        self._options = options
         self.scene = scene
         self.rows: np.ndarray = raw.rows
         heads = [head.partition(" [") for head in scene.columns]
@@ -85,15 +85,18 @@ class Run:
 
     @property
     def t(self) -> np.ndarray:
+        """Output times [s]."""
         times: np.ndarray = self.rows[:, 0]
         return times
 
     @property
     def success(self) -> bool:
+        """Whether it came to its horizon, or was ended by an event or the callback."""
         return self._raw.stop is None
 
     @property
     def message(self) -> str:
+        """How it ended."""
         if self._raw.stop is not None:
             return self._raw.stop
         by = {None: "the horizon was reached", "observer": "ended by the callback"}
@@ -101,6 +104,7 @@ class Run:
 
     @cached_property
     def report(self) -> dict[str, Any]:
+        """What ``run.json`` of the program holds."""
         report: dict[str, Any] = json.loads(self._raw.report())
         return report
 
@@ -150,8 +154,10 @@ class Run:
             floats positions and velocities as well, by ``"ball.x"`` and ``"ball.y"``.
         """
         times = np.asarray(t, dtype=float)
-        numbers = self._dense.at(np.atleast_1d(times).ravel())
-        names = [_coordinate(name) for name in self._raw.coordinates()]
+        if (times > self._raw.end).any():
+            raise ValueError(f"t = {times.max()} s lies outside of the run, 0 to {self._raw.end} s")
+        names = self._raw.coordinates()
+        numbers = self._dense.at(times.ravel()).reshape(times.size, 2 * len(names))
         shaped = [numbers[:, k].reshape(times.shape)[()] for k in range(numbers.shape[1])]
         return SimpleNamespace(
             phi=dict(zip(names, shaped[: len(names)])), omega=dict(zip(names, shaped[len(names) :]))
@@ -163,7 +169,7 @@ class Run:
             self._raw.at(np.empty(0))
             return self._raw
         except ValueError:
-            return _core.run(self.scene._core, None, True, self._described, **{**self._options, "trust": "off"})
+            return self._raw.again(self._described)
 
     @property
     def charts(self) -> list[str]:
@@ -234,7 +240,7 @@ class Event:
     name : str
         Its name in ``run.events``.
     function : callable
-        A smooth function of a moment, whose zero is the event: ``lambda at: at.phi("bar2") - 1``.  A moment
+        A smooth function of a moment, never NaN, whose zero is the event: ``lambda at: at.phi("bar2") - 1``.  A moment
         has ``t``, ``phi(body)``, ``omega(body)``, ``position(body, point)`` and ``velocity(body, point)``.
     direction : int
         1 for zeros that are passed upwards, -1 downwards, 0 for both.
@@ -250,12 +256,6 @@ class Event:
     def described(self) -> tuple[str, Callable[[_core.Moment], float], int, bool]:
         """As the native part takes it."""
         return self.name, self.function, self.direction, self.stop
-
-
-def _coordinate(name: str) -> str:
-    """``phi of bar`` is ``bar``, ``x of ball`` is ``ball.x``."""
-    kind, _, body = name.partition(" of ")
-    return body if kind == "phi" else f"{body}.{kind}"
 
 
 def resume(
@@ -277,4 +277,4 @@ def resume(
     content = checkpoint if isinstance(checkpoint, bytes) else Path(checkpoint).read_bytes()
     described = [event.described() for event in events]
     raw = _core.resume(content, callback, described)
-    return Run(raw, Scene(*raw.scene.parts()), {}, described)
+    return Run(raw, Scene(*raw.scene.parts()), described)

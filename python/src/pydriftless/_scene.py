@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._force import with_part
+from ._force import plain, with_part
 from ._progress import progress_bar
 from ._report import Report, command, flags
 from ._run import Event, Run
@@ -45,11 +45,15 @@ class Scene:
         self, text: str, source: str = "<text>", set: Sequence[str] = (), outputs: Sequence[str] = ()
     ) -> None:
         self._core = _core.Scene(text, source, list(set), list(outputs))
+        found = _with_tables(text, source)
+        if found != text:
+            # Files that it names are found from any working directory, and by whatever is made of it.
+            self._core = _core.Scene(found, source, list(set), list(outputs))
 
     @classmethod
     def from_dict(cls, scene: Mapping[str, Any], source: str = "<dict>") -> Scene:
         """A scene from a dict of the same form as a file."""
-        return cls(json.dumps(scene), source)
+        return cls(json.dumps(scene, default=plain), source)
 
     @property
     def name(self) -> str:
@@ -177,7 +181,7 @@ class Scene:
         dense : bool
             Keep the motion between the rows for ``run(t)``; without it ``run(t)`` integrates once more.
         callback : callable
-            Called with the time and the row at every row; ``False`` ends the run.
+            Called with the time and the row at every row; ``False``, and nothing else, ends the run.
         events : sequence of Event
             Events beside those of the scene.
         progress : bool
@@ -217,14 +221,14 @@ class Scene:
             bar_format="{l_bar}{bar}| {n:.4g}/{total:.4g} s [{elapsed}]",
         )
         if bar is None:
-            return Run(_core.run(self._core, callback, dense, described, **options), self, options, described)
+            return Run(_core.run(self._core, callback, dense, described, **options), self, described)
 
         def tell(t: float, row: np.ndarray) -> Any:
             bar.update(t - bar.n)
             return callback(t, row) if callback is not None else None
 
         with bar:
-            return Run(_core.run(self._core, tell, dense, described, **options), self, options, described)
+            return Run(_core.run(self._core, tell, dense, described, **options), self, described)
 
     def stream(self, **options: Any) -> Iterator[np.ndarray]:
         """The rows of a run as an iterator, integrated as they are asked for.
@@ -312,7 +316,8 @@ class Scene:
 
     def _command(self, name: str, options: dict[str, Any], writes: bool) -> Report:
         text, source, before, outputs = self._core.parts()
-        is_file = Path(source).is_file()
+        # The scene as it was loaded: the file may be another one by now.
+        is_file = _as_loaded(source) == text
         arguments = [source if is_file else "-", *(f"--set={value}" for value in before), *flags(options)]
         if name in ("inspect", "kinematics"):
             arguments += [f"--output={output}" for output in outputs]
@@ -323,6 +328,34 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"<Scene {self.name!r}: {self.description}>" if self.description else f"<Scene {self.name!r}>"
+
+
+def _with_tables(text: str, source: str) -> str:
+    """A scene's text with the whole paths of the files its tables come from."""
+    if '"tables"' not in text:
+        return text
+    try:
+        tables = json.loads(text)["tables"].values()
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return text
+    named = [table.get("file") if isinstance(table, dict) else table for table in tables]
+    files = {name for name in named if isinstance(name, str)}
+    begin = text.index('"tables"')
+    before, after = text[:begin], text[begin:]
+    for file in files:
+        if not os.path.isabs(file):
+            whole = os.path.abspath(os.path.join(os.path.dirname(source), file))
+            for ascii in (True, False):
+                after = after.replace(json.dumps(file, ensure_ascii=ascii), json.dumps(whole))
+    return before + after
+
+
+def _as_loaded(source: str) -> str | None:
+    """What loading a file gives now, if it is one."""
+    try:
+        return _with_tables(Path(source).read_text(encoding="utf-8"), source)
+    except (OSError, ValueError):
+        return None
 
 
 def load(path: str | os.PathLike[str], set: Mapping[str, Any] | None = None) -> Scene:
@@ -349,6 +382,4 @@ def _word(value: Any) -> str:
     """A value as the program's ``--set`` takes it."""
     if isinstance(value, str):
         return value
-    if isinstance(value, np.generic):
-        value = value.item()
-    return json.dumps(value.tolist() if isinstance(value, np.ndarray) else value)
+    return json.dumps(value, default=plain)

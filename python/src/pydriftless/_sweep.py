@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,8 @@ class Sweep:
         0 done, 1 stopped, 2 refused, 3 skipped.
     causes : dict
         Why points stopped or were refused, by their number.
+    counts : numpy.ndarray
+        How many points are done, stopped, refused and skipped, also of those that went to a file.
     grid : tuple of int or None
         Numbers of values, where the points are a whole grid.
     report : dict
@@ -52,13 +55,14 @@ class Sweep:
         self.flip_bar = flip_bar
         self.status = status
         self.causes: dict[int, str] = {}
+        self.counts: np.ndarray = np.bincount(status, minlength=len(STATUS))
         self.grid: tuple[int, ...] | None = None
         self.report: dict[str, Any] = {}
 
     @property
     def success(self) -> bool:
         """Whether every point came to its end."""
-        return bool((self.status == 0).all())
+        return not self.counts[1:].any()
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -100,9 +104,9 @@ class Sweep:
         return xr.Dataset(variables, coords=coordinates)
 
     def __repr__(self) -> str:
-        counts = np.bincount(self.status, minlength=len(STATUS)) if len(self.status) else [0] * len(STATUS)
-        told = ", ".join(f"{count} {word}" for count, word in zip(counts, STATUS) if count)
-        return f"<Sweep of {len(self)} points: {told or 'none kept'}>"
+        told = ", ".join(f"{count} {word}" for count, word in zip(self.counts, STATUS) if count)
+        kept = "" if len(self) == self.counts.sum() else " (in a file)"
+        return f"<Sweep of {self.counts.sum()} points{kept}: {told or 'none'}>"
 
 
 def swept(
@@ -122,29 +126,39 @@ def swept(
 ) -> Sweep:
     """See :meth:`Scene.sweep`."""
     axes, listed = _points(vary)
-    total = len(listed[1]) if listed else int(np.prod([axis[3] for axis in axes], dtype=object))
+    total = len(listed[1]) if listed else math.prod(axis[3] for axis in axes)
+    if total == 0 and to is None:
+        raise ValueError("there are no points: the arrays are empty")
+    threads = min(_whole("threads", threads, 0, 1024), max(total, 1))
+    chunk = _whole("chunk", chunk, 1)
+    parts = None if parts is None else _whole("parts", parts, 1)
+    if shard is not None:
+        if not isinstance(shard, Sequence) or len(shard) != 2:
+            raise ValueError(f"shard = {shard!r}: it is (I, N), part I of N")
+        of = _whole("the second of shard", shard[1], 1)
+        shard = _whole("the first of shard", shard[0], 1, of), of
     plan = {"axes": axes, "listed": listed, "to_flip": to_flip, "threads": threads, "options": options}
     count = 1
     if shard is None and client is not None:
-        count = max(1, min(parts or 4 * _workers(client), total))
+        count = max(1, min(parts or 4 * _workers(client), max(total, 1)))
     elif shard is None and to is not None:
-        count = -(-total // chunk)
+        count = max(1, -(-total // chunk))
 
-    def found(after: int) -> Iterable[Any]:
-        """The parts that follow so many."""
+    def found(numbers: Sequence[int]) -> Iterable[Any]:
+        """The parts of these numbers, from 1 to `count`."""
         if shard is not None:
-            return (_part(scene, *_share(plan, shard)) for _ in range(after, 1))
+            return (_part(scene, *_share(plan, shard)) for _ in numbers)
         if client is not None:
-            return _submitted(scene, plan, client, range(after + 1, count + 1), count, total, progress)
+            return _submitted(scene, plan, client, numbers, count, total, progress)
         if to is not None:
-            return (_part(scene, *_share(plan, (number, count))) for number in range(after + 1, count + 1))
+            return (_part(scene, *_share(plan, (number, count))) for number in numbers)
         return [_part(scene, plan, None, 0, progress_bar(progress, total, unit=" points"))]
 
     if to is not None:
         mark = _fingerprint(scene, plan, count, shard) if resume else None
-        sweep = written(found, to, mark)
+        sweep = written(found, count, to, mark)
     else:
-        sweep = _joined(list(found(0)))
+        sweep = _joined(list(found(range(1, count + 1))))
     if shard is None and not listed and to is None:
         sweep.grid = tuple(axis[3] for axis in axes)
     return sweep
@@ -154,17 +168,46 @@ def _points(vary: Mapping[str, Any]) -> tuple[list[tuple[str, float, float, int]
     """The axes of a grid, or the names and values of a list."""
     if not vary:
         raise ValueError("nothing is varied")
-    if all(isinstance(value, tuple) for value in vary.values()):
-        axes = []
-        for name, value in vary.items():
-            if len(value) != 3:
-                raise ValueError(f"{name}: a range is (from, to, count), not {value!r}")
-            axes.append((name, float(value[0]), float(value[1]), int(value[2])))
-        return axes, None
-    arrays = [np.asarray(value, dtype=float) for value in vary.values()]
+    ranges = [name for name, value in vary.items() if isinstance(value, tuple)]
+    if len(ranges) == len(vary):
+        return [_range(name, value) for name, value in vary.items()], None
+    if ranges:
+        raise ValueError(
+            f"{ranges[0]}: a tuple is a range of a grid, where every name has one; beside arrays write "
+            "numpy.linspace(from, to, count), or a list"
+        )
+    try:
+        arrays = [np.asarray(value, dtype=float) for value in vary.values()]
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"a list of points has an array of numbers for each name: {error}") from None
     if any(array.ndim != 1 or len(array) != len(arrays[0]) for array in arrays):
         raise ValueError("a list of points has one array of one length for each name; a range is a tuple")
     return [], (list(vary), np.column_stack(arrays))
+
+
+def _range(name: str, value: tuple[Any, ...]) -> tuple[str, float, float, int]:
+    """A range of a grid."""
+    try:
+        first, last, count = value
+        first, last = float(first), float(last)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: a range is (from, to, count), not {value!r}") from None
+    if not (math.isfinite(first) and math.isfinite(last)):
+        raise ValueError(f"{name}: a range is (from, to, count) with finite ends, not {value!r}")
+    return name, first, last, _whole(f"the count of {name}", count, 1)
+
+
+def _whole(name: str, value: Any, least: int, most: int | None = None) -> int:
+    """A whole number within bounds, of Python or numpy."""
+    try:
+        number = int(value)
+        is_whole = number == value
+    except (TypeError, ValueError, OverflowError):
+        number, is_whole = 0, False
+    if not is_whole or number < least or (most is not None and number > most):
+        bounds = f"from {least} up" if most is None else f"from {least} to {most}"
+        raise ValueError(f"{name} is a whole number {bounds}, not {value!r}")
+    return number
 
 
 def _share(plan: dict[str, Any], shard: tuple[int, int] | None) -> tuple[dict[str, Any], Any, int]:
@@ -180,7 +223,7 @@ def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, fir
     """What :func:`_share` gave, wherever it runs."""
     listed = plan["listed"]
     if listed is not None and len(listed[1]) == 0:
-        return None
+        return _empty(scene, plan)
     update = (lambda points: bar.update(points - bar.n)) if bar is not None else None
     heads, rows, flips, status, causes, report = _core.sweep(
         scene._core, plan["axes"], listed, plan["to_flip"], plan["threads"], shard, update, **plan["options"]
@@ -190,8 +233,23 @@ def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, fir
     return heads, rows, flips, status, [(first + index, cause) for index, cause in causes], report
 
 
+def _empty(scene: Scene, plan: dict[str, Any]) -> Any:
+    """A part without points: its columns are those of any point."""
+    names, options = plan["listed"][0], {**plan["options"], "max_evaluations": 1}
+    heads, rows, flips, status, _, _ = _core.sweep(
+        scene._core, [], (names, np.ones((1, len(names)))), plan["to_flip"], 1, None, None, **options
+    )
+    return heads, rows[:0], flips[:0], status[:0], [], "{}"
+
+
 def _submitted(
-    scene: Scene, plan: dict[str, Any], client: Any, numbers: range, count: int, total: int, progress: bool
+    scene: Scene,
+    plan: dict[str, Any],
+    client: Any,
+    numbers: Sequence[int],
+    count: int,
+    total: int,
+    progress: bool,
 ) -> Iterator[Any]:
     """Parts by a client, in the order of the points."""
     plan = {**plan, "threads": plan["threads"] or 1}
@@ -209,9 +267,17 @@ def _fingerprint(scene: Scene, plan: dict[str, Any], count: int, shard: Any) -> 
     """What a file must have been written by to be gone on with."""
     listed = plan["listed"]
     points = None if listed is None else (listed[0], hashlib.sha256(listed[1].tobytes()).hexdigest())
-    settings = {name: value for name, value in plan["options"].items() if value is not None}
-    text = repr((scene._core.parts(), plan["axes"], points, plan["to_flip"], settings, count, shard, _core.__version__))
+    settings = {name: _plain(value) for name, value in plan["options"].items() if value is not None}
+    text, _, *changed = scene._core.parts()
+    version = (_core.__version__, "progress by parts")
+    text = repr((text, changed, plan["axes"], points, bool(plan["to_flip"]), settings, count, shard, version))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """A setting as one of Python, whose text is one and the same for equal numbers."""
+    value = value.item() if isinstance(value, (np.generic, np.ndarray)) and np.ndim(value) == 0 else value
+    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
 def _workers(client: Any) -> int:
@@ -223,7 +289,6 @@ def _workers(client: Any) -> int:
 
 
 def _joined(found: list[Any]) -> Sweep:
-    found = [part for part in found if part is not None]
     heads = found[0][0]
     columns = zip(*(part[1:4] for part in found))
     rows, flips, status = (parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in columns)

@@ -9,12 +9,19 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 #: Text beyond which a part that is used more than once becomes a signal, and any part does.
 _SHORT, _LONG = 24, 1500
+
+#: Nesting beyond which a part becomes a signal; the format allows 64 levels.
+_DEEP = 40
+
+_EQUAL = (
+    "a force is traced once, so it cannot tell whether numbers are equal: use pydriftless.where with < or >="
+)
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
@@ -67,6 +74,14 @@ class Symbol:
     def __abs__(self) -> Symbol:
         return _call("abs", self)
 
+    def __eq__(self, other: object) -> Any:
+        raise TypeError(_EQUAL)
+
+    def __ne__(self, other: object) -> Any:
+        raise TypeError(_EQUAL)
+
+    __hash__ = object.__hash__
+
     def __lt__(self, other: Any) -> Condition:
         return Condition(self, "<", other)
 
@@ -85,7 +100,13 @@ class Symbol:
     def __float__(self) -> float:
         raise TypeError("a force is traced once, so it has no numbers: use numpy's functions instead of math's")
 
-    def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
+    def __array_ufunc__(
+        self,
+        function: np.ufunc,
+        method: Literal["__call__", "reduce", "reduceat", "accumulate", "outer", "at"],
+        *inputs: Any,
+        **options: Any,
+    ) -> Any:
         make = _UFUNCS.get(function.__name__)
         if make is None or method != "__call__" or options:
             raise TypeError(f"a force cannot use numpy.{function.__name__}; there are {', '.join(sorted(_UFUNCS))}")
@@ -198,6 +219,7 @@ class _Writer:
         self.prefix = prefix
         self.signals: dict[str, str] = {}
         self._known: dict[int, str] = {}
+        self._depths: dict[int, int] = {}
 
     def text(self, symbol: Symbol) -> str:
         """Its text, with what it is made of written first."""
@@ -212,12 +234,14 @@ class _Writer:
                 waiting.extend((part, False) for part in inner)
                 continue
             text = "".join(part if isinstance(part, str) else self._known[id(part)] for part in one.parts)
+            depth = 1 + max((self._depths[id(part)] for part in inner), default=0)
             is_name = text.startswith("(1*")
-            if self.prefix and (len(text) > _LONG or one.uses > 1 and len(text) > _SHORT and not is_name):
+            is_large = len(text) > _LONG or depth > _DEEP
+            if self.prefix and (is_large or one.uses > 1 and len(text) > _SHORT and not is_name):
                 name = f"{self.prefix}_{len(self.signals) + 1}"
                 self.signals[name] = text
-                text = name
-            self._known[id(one)] = text
+                text, depth = name, 0
+            self._known[id(one)], self._depths[id(one)] = text, depth
         return self._known[id(symbol)]
 
 
@@ -238,7 +262,8 @@ def written(values: list[Any], prefix: str) -> tuple[list[str], dict[str, str]]:
     symbols = [_of(value) for value in values]
     _count(symbols)
     writer = _Writer(prefix)
-    texts = [writer.text(symbol) for symbol in symbols]
+    # The factor leaves the unit open: a sine is a pure number, and a number alone no formula.
+    texts = [f"1*{writer.text(symbol)}" for symbol in symbols]
     return texts, writer.signals
 
 
@@ -288,7 +313,8 @@ class State:
         return self._named(f"{self._body(body)}.sin")
 
     def _point(self, body: str, point: tuple[float, float]) -> str:
-        place = {"body": self._body(body), "point": [float(point[0]), float(point[1])]}
+        x, y = point
+        place = {"body": self._body(body), "point": [float(x), float(y)]}
         for known in self.points:
             if {"body": known["body"], "point": known["point"]} == place:
                 return str(known["name"])
