@@ -52,6 +52,8 @@ struct Watch<'a> {
     numbers: Vec<f64>,
     recorder: Option<Recorder>,
     callback: Option<&'a Py<PyAny>>,
+    /// Where it is enough \[s\].
+    end: f64,
     failed: Option<PyErr>,
 }
 
@@ -70,6 +72,9 @@ impl Observer for Watch<'_> {
     fn sample(&mut self, sample: &Sample) -> ControlFlow<()> {
         let before = self.numbers.len();
         self.shown.append(sample, &mut self.numbers);
+        if sample.t >= self.end {
+            return ControlFlow::Break(());
+        }
         let Some(callback) = self.callback else { return ControlFlow::Continue(()) };
         let row = &self.numbers[before..];
         let told = Python::attach(|py| {
@@ -104,7 +109,7 @@ pub fn run(
     let failed = Failed::default();
     let events = events(described, &scene.get().mechanism, &failed);
     let running = begun(py, scene.get(), &options, events)?;
-    carry(py, scene, running, Vec::new(), callback.as_ref(), dense, &failed)
+    carry(py, scene, running, Vec::new(), callback.as_ref(), dense.then_some(f64::INFINITY), &failed)
 }
 
 /// Plans a run and begins it.
@@ -162,22 +167,22 @@ pub fn resume(
         let events = events(described, &scene.mechanism, &failure);
         running.with_events(events).map_err(|error| failed(error.to_string()))?
     };
-    carry(py, Py::new(py, scene)?, running, saved.numbers, callback.as_ref(), false, &failure)
+    carry(py, Py::new(py, scene)?, running, saved.numbers, callback.as_ref(), None, &failure)
 }
 
-/// Takes a run to its end.
+/// Takes a run to its end; where its motion is kept, at most to a time.
 fn carry(
     py: Python<'_>,
     scene: Py<Scene>,
     mut running: Running,
     numbers: Vec<f64>,
     callback: Option<&Py<PyAny>>,
-    dense: bool,
+    dense: Option<f64>,
     failed: &Failed,
 ) -> PyResult<Raw> {
     let shown = Shown::new(&scene.get().mechanism);
-    let recorder = dense.then(Recorder::default);
-    let mut watch = Watch { shown, numbers, recorder, callback, failed: None };
+    let (recorder, end) = (dense.map(|_| Recorder::default()), dense.unwrap_or(f64::INFINITY));
+    let mut watch = Watch { shown, numbers, recorder, callback, end, failed: None };
     // The windows of these are integrated in one call each, which cannot pause.
     let is_windowed = matches!(running.plan().method, MethodId::Dopri5 | MethodId::Dop853);
     loop {
@@ -321,7 +326,7 @@ impl Raw {
         let run = Run::new(Arc::clone(mechanism), self.outcome.plan.clone(), Limits::default(), &start);
         let run = run.map_err(|error| of_run(py, &error.into()))?;
         let running = Running::new(run.with_events(events).timed(wall_clock));
-        carry(py, self.scene.clone_ref(py), running, Vec::new(), None, true, &failed)
+        carry(py, self.scene.clone_ref(py), running, Vec::new(), None, Some(self.outcome.last.t), &failed)
     }
 
     /// What `run.json` holds, but for the table's hash.

@@ -97,8 +97,59 @@ def test_long_functions_become_signals(free):
         (lambda at: float("nan") * at.t, "number nan"),
         (lambda at: at.phi("bar3"), "there are bar1, bar2"),
         (lambda at: at.phi("bar1") if at.t else 0.0, "cannot ask for a value"),
+        (lambda at: at.phi("bar1") if at.t == 0 else 0.0, "where with <"),
+        (lambda at: dl.where(at.t != 0, at.phi("bar1"), 0.0), "where with <"),
     ],
 )
 def test_what_cannot_be_traced_says_so(free, torque, said):
     with pytest.raises((TypeError, ValueError, KeyError), match=said):
         free.with_torque("torque", "bar1", torque)
+
+
+def twice(factor):
+    def function(at):
+        angle = np.sin(1.2345 * at.phi("bar1") + 0.321 * at.omega("bar1") + factor * at.t)
+        return 0.01 * (angle * angle + angle * at.position("bar1", (0.1 * factor, 0))[0])
+
+    return function
+
+
+def test_signals_and_points_of_a_force_take_no_name_of_the_scene(free):
+    scene = free.to_dict()
+    scene["signals"] = {"x_1": "3*t"}
+    scene["points"] = [{"name": "x_p1", "body": "bar2", "point": [0.1, 0]}]
+    scene["torques"] = [{"name": "base", "body": "bar1", "torque": "0.01*(x_1 + 1*x_p1.x)"}]
+    taken = dl.Scene.from_dict(scene)
+
+    def both(scene, first, second):
+        pushed = scene.with_torque(first, "bar1", twice(1.0))
+        return pushed.with_force(second, dl.on("bar1", 0.6, 0), lambda at: (twice(2.0)(at), 0 * at.t))
+
+    named = both(taken, "x", "x").run(until=1, trust="off")
+    told_apart = both(taken, "y", "z").run(until=1, trust="off")
+    assert np.array_equal(named.rows, told_apart.rows)
+    assert both(taken, "x", "x").to_dict()["signals"]["x_1"] == "3*t"
+
+
+def test_numbers_have_no_units(free):
+    for torque in (lambda at: 0.25, lambda at: 0.1 * np.sin(at.phi("bar1")), lambda at: dl.where(at.t > 0.5, 0.1, 0.2)):
+        assert free.with_torque("torque", "bar1", torque).run(until=0.1, trust="off").success
+    fixed = free.with_force("force", dl.on("bar1", 0.6, 0), lambda at: (1.0, 0)).to_dict()["forces"]
+    assert fixed[0]["force"] == [1.0, 0.0]
+
+
+def test_sums_of_many_terms_are_not_too_deep(free):
+    scene = free.with_torque("sum", "bar1", lambda at: sum(1e-4 * at.phi("bar1") * k for k in range(100)))
+    assert scene.run(until=0.1, trust="off").success
+
+
+def test_places_of_numpy(free):
+    placed = free.with_force("push", dl.on("bar1", np.float32(0.5), np.int64(0)), lambda at: (at.t, 0))
+    assert placed.to_dict()["forces"][0]["point"] == [0.5, 0.0]
+
+
+def test_numpy_takes_symbols_by_its_declarations():
+    import inspect
+
+    names = list(inspect.signature(dl.Symbol.__array_ufunc__).parameters)
+    assert names == ["self", "ufunc", "method", "inputs", "kwargs"]

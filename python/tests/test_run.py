@@ -1,5 +1,7 @@
 """Runs: the program's numbers bit for bit, SciPy's habits, interruption."""
 
+import copy
+import json
 import math
 import os
 import pickle
@@ -289,3 +291,162 @@ def test_the_program_comes_along(program, tmp_path, scenes):
     assert code == 0 and out.split() == ["driftless", dl.__version__]
     assert program("run", "nothing.json")[0] == 6
     assert program("run", scenes / "free.json", "--rtol", "x")[0] == 2
+
+
+def test_a_stream_tells_why_it_stopped(free):
+    for option in ({"max_evaluations": 100}, {"max_energy_drift": 1e-16, "method": "dp8"}):
+        stopped = free.run(until=20, trust="off", **option)
+        rows = []
+        with pytest.raises(dl.RequestRefused) as refused:
+            for row in free.stream(until=20, **option):
+                rows.append(row)
+        assert str(refused.value).split(";")[0] in stopped.message
+        assert np.array_equal(np.array(rows), stopped.rows)
+
+
+@pytest.mark.parametrize("dense", [True, False])
+def test_a_run_that_was_ended_says_nothing_beyond(free, dense):
+    ended = free.run(until=2, every=0.1, dense=dense, trust="off", callback=lambda t, row: t < 0.45)
+    assert ended(0.5).phi["bar1"] == pytest.approx(ended["bar1.phi"][-1], abs=1e-12)
+    with pytest.raises(ValueError, match="outside of the run, 0 to 0.5 s"):
+        ended(0.6)
+    assert ended([]).phi["bar1"].shape == (0,)
+
+
+def test_a_resumed_run_is_asked_by_its_own_method(free):
+    options = {"method": "rattle2", "step": 0.1, "every": 0.1, "until": 3, "trust": "off"}
+    stopping = 0
+
+    def stop(t, row):
+        nonlocal stopping
+        stopping += 1
+        if stopping == 5:
+            signal.raise_signal(signal.SIGINT)
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt) as interrupted:
+            free.run(callback=stop, **options)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if not isinstance(interrupted.value, dl.Interrupted):
+        pytest.skip("the callback itself was interrupted")
+    resumed, whole = dl.resume(interrupted.value.checkpoint), free.run(**options)
+    assert resumed(2.5).phi == whole(2.5).phi
+    assert resumed(2.5).phi["bar1"] == pytest.approx(whole["bar1.phi"][25], abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["max_energy_drift", "max_constraint_drift", "max_evaluations"])
+def test_limits_are_numbers_from_0_up(free, name):
+    for limit in (-1.0, float("nan")):
+        with pytest.raises(dl.RequestRefused, match=name):
+            free.run(until=0.1, **{name: limit})
+    with pytest.raises(TypeError, match=f"{name} is a number, not of type str"):
+        free.run(until=0.1, **{name: "5"})
+
+
+def test_exceptions_pickle(free):
+    with pytest.raises(dl.SceneRefused) as refused:
+        free.with_({"bar1.mass": -2.0})
+    again = pickle.loads(pickle.dumps(refused.value))
+    assert type(again) is dl.SceneRefused and vars(again) == vars(refused.value) and again.hint and again.path
+    with pytest.raises(dl.RequestRefused) as refused:
+        free.run(method="gauss6", rtol=1e-9)
+    assert pickle.loads(pickle.dumps(refused.value)).hint == refused.value.hint
+    stop = dl.Interrupted("interrupted")
+    stop.checkpoint = b"checkpoint"
+    assert pickle.loads(pickle.dumps(stop)).checkpoint == b"checkpoint"
+
+
+def test_columns_are_copied_and_pickle(free):
+    columns = free.run(until=0.1, trust="off")["bar2"]
+    for again in (copy.copy(columns), copy.deepcopy(columns), pickle.loads(pickle.dumps(columns))):
+        assert np.array_equal(again.phi, columns.phi)
+    with pytest.raises(AttributeError, match="there are phi"):
+        columns.mass
+
+
+def test_commands_run_the_scene_as_it_was_loaded(tmp_path, free):
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(free.to_dict()))
+    loaded = dl.load(path)
+    path.write_text(json.dumps({**free.to_dict(), "name": "changed"}))
+    assert loaded.check()["scene"] == "free"
+
+
+def test_tables_are_found_from_anywhere(tmp_path, free, monkeypatch):
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "gust.csv").write_text("0,0\n1,2.5\n3,0\n")
+    scene = free.to_dict()
+    scene["tables"] = {"gust": "gust.csv"}
+    scene["torques"] = [{"name": "wind", "body": "bar1", "torque": "0.1*gust(t/1 s)"}]
+    (tmp_path / "scenes" / "scene.json").write_text(json.dumps(scene))
+    monkeypatch.chdir(tmp_path)
+    loaded = dl.load("scenes/scene.json")
+    rows = loaded.run(until=0.2, trust="off").rows
+    pickled = pickle.dumps(loaded)
+    forced = loaded.with_torque("none", "bar1", lambda at: 0 * at.t)
+    monkeypatch.chdir("/")
+    for again in (loaded.with_({"bar1.omega": 0}), pickle.loads(pickled), forced.with_({"bar1.omega": 0})):
+        assert np.array_equal(again.run(until=0.2, trust="off").rows, rows)
+    assert forced.check()["scene"] == "free"
+
+
+def test_numbers_of_numpy_are_numbers(free):
+    built = (
+        dl.Builder("pendulum", gravity=np.array([0, -9.81]))
+        .bar("bar", mass=np.int64(1), centre=np.array([0.5, 0]), inertia=np.float32(0.125), length=1)
+        .hinge("A", dl.ground(0, 0), dl.on("bar", np.int64(0), np.float32(0)))
+        .start("bar", phi=np.float64(0.3), omega=np.int32(0))
+        .build(until=np.float32(2), every=0.1)
+    )
+    assert built.to_dict()["bars"][0]["inertia"] == 0.125
+    assert free.inspect(at=np.float64(0.5)) == free.inspect(at=0.5)
+
+
+def test_pictures_of_every_format_are_kept(free):
+    found = free.modes(starts=0, gif=True, chart_format=["png", "svg"])
+    kinds = {name: picture.format for name, picture in found.pictures.items()}
+    assert "folder" not in found
+    assert kinds["mode1"] == "png" and kinds["mode1.svg"] == "svg" and kinds["mode1.gif"] == "gif"
+
+
+def test_events_name_what_the_run_names(scenes):
+    ball = dl.load(scenes / "sliding_ball.json")
+    run = ball.run(until=0.2, trust="off", events=[dl.Event("half", lambda at: at.t - 0.1)])
+    assert list(run.events[0]["phi"]) == list(run(0.1).phi) and "ball.x" in run.events[0]["phi"]
+
+
+def test_only_false_ends_a_run(free):
+    for answer in (0, "", [], None, np.True_):
+        assert free.run(until=0.1, trust="off", callback=lambda t, row: answer).t[-1] == 0.1
+    for answer in (False, np.False_):
+        assert "callback" in free.run(until=0.1, trust="off", callback=lambda t, row: answer).message
+
+
+def test_an_event_is_a_number(free):
+    with pytest.raises(ValueError, match="event lost is not a number"):
+        free.run(until=1, events=[dl.Event("lost", lambda at: float("nan"))])
+
+
+def test_wrong_words_name_what_there_is(free):
+    with pytest.raises(TypeError, match="method is a word, not of type int"):
+        free.run(method=5)
+    run = free.run(until=0.1, trust="off")
+    with pytest.raises(ValueError, match="there are mechanism, angles.* as png, svg"):
+        run.chart("flowers")
+    with pytest.raises(ValueError, match="gif or apng"):
+        run.chart("angles", "jpg")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_the_program_is_interrupted_without_a_traceback(tmp_path, scenes):
+    words = ["-m", "pydriftless", "run", scenes / "free.json", "--until=1e6", "--every=1e3", "--quiet", "--out", tmp_path]
+    # Whoever started the tests may have them ignore it.
+    code = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_DFL); os.execv(sys.executable, sys.argv[1:])"
+    child = subprocess.Popen([sys.executable, "-c", code, sys.executable, *map(str, words)], stderr=subprocess.PIPE, text=True)
+    while child.poll() is None and not list(tmp_path.rglob("checkpoint")):
+        time.sleep(0.01)
+    child.send_signal(signal.SIGINT)
+    _, said = child.communicate(timeout=60)
+    assert child.returncode == 130 and "Traceback" not in said and "driftless resume" in said

@@ -136,10 +136,137 @@ def test_a_file_that_was_begun_is_gone_on_with(free, tmp_path, monkeypatch, endi
     with pytest.raises(ValueError, match="another sweep"):
         free.sweep(GRID, until=1, to=begun, chunk=7, resume=True)
     free.sweep(GRID, until=2, to=begun, chunk=7, resume=True)
-    if ending == "csv":
-        assert begun.read_bytes() == whole.read_bytes()
-    else:
-        import pyarrow.parquet as pq
-
-        assert pq.read_table(begun).equals(pq.read_table(whole))
+    assert begun.read_bytes() == whole.read_bytes()
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([whole.name, begun.name])
+
+
+SMALL = {"bar1.phi": (-3, 3, 4), "bar2.phi": (0, 1, 3)}
+
+
+@pytest.fixture
+def cut(free, monkeypatch):
+    """Begins a sweep of four parts, and ends it after some of them."""
+    from pydriftless import _sweep
+
+    def begin(to, parts, until=0.5, resume=True):
+        with monkeypatch.context() as patch:
+            left, real = iter(range(parts)), _sweep._part
+
+            def failing(*arguments):
+                if next(left, None) is None:
+                    raise KeyboardInterrupt
+                return real(*arguments)
+
+            patch.setattr(_sweep, "_part", failing)
+            with pytest.raises(KeyboardInterrupt):
+                free.sweep(SMALL, until=until, to=to, chunk=3, resume=resume)
+
+    return begin
+
+
+def damage(path):
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2 :] = b"X" * (len(content) - len(content) // 2)
+    path.write_bytes(content)
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda path: path.unlink(),
+        lambda path: path.write_bytes(path.read_bytes()[:200]),
+        damage,
+        lambda path: damage(path.with_name("begun.csv.progress")),
+        lambda path: path.with_name("begun.csv.progress").write_text("{"),
+    ],
+)
+def test_a_table_that_was_begun_and_changed_is_in_the_end_whole(free, tmp_path, cut, harm):
+    free.sweep(SMALL, until=0.5, to=tmp_path / "whole.csv", chunk=3)
+    begun = tmp_path / "begun.csv"
+    cut(begun, 2)
+    harm(begun)
+    free.sweep(SMALL, until=np.float32(0.5), to=begun, chunk=3, resume=True)
+    assert begun.read_bytes() == (tmp_path / "whole.csv").read_bytes() and len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    "harm",
+    [
+        lambda parts: damage(parts / "000002.parquet"),
+        lambda parts: (parts / "000001.parquet").unlink(),
+        lambda parts: [part.unlink() for part in parts.iterdir()],
+        lambda parts: damage(parts.with_name("begun.parquet.progress")),
+    ],
+)
+def test_parts_that_were_lost_are_computed_again(free, tmp_path, cut, harm):
+    pytest.importorskip("pyarrow")
+    free.sweep(SMALL, until=0.5, to=tmp_path / "whole.parquet", chunk=3)
+    begun = tmp_path / "begun.parquet"
+    cut(begun, 3)
+    harm(tmp_path / "begun.parquet.parts")
+    assert free.sweep(SMALL, until=0.5, to=begun, chunk=3, resume=True).counts.sum() == 12
+    assert begun.read_bytes() == (tmp_path / "whole.parquet").read_bytes() and len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_parquet_is_whole_or_not_there(free, tmp_path, cut, monkeypatch):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    from pydriftless import _files
+
+    cut(tmp_path / "cut.parquet", 2, resume=False)
+    assert not list(tmp_path.iterdir())
+    path = tmp_path / "points.parquet"
+    seen = []
+    monkeypatch.setattr(_files.shutil, "rmtree", lambda *_, **__: seen.append(path.exists()))
+    free.sweep(SMALL, until=0.5, to=path, chunk=3, resume=True)
+    assert seen[-1] and parquet.read_metadata(path).num_rows == 12
+
+
+def test_a_sweep_anew_leaves_nothing_to_go_on_with(free, tmp_path, cut):
+    free.sweep(SMALL, until=0.5, to=tmp_path / "whole.csv", chunk=3)
+    mixed = tmp_path / "mixed.csv"
+    cut(mixed, 2)
+    cut(mixed, 3, until=0.2, resume=False)
+    free.sweep(SMALL, until=0.5, to=mixed, chunk=3, resume=True)
+    assert mixed.read_bytes() == (tmp_path / "whole.csv").read_bytes()
+
+
+def test_files_tell_of_refused_points(free, tmp_path):
+    sweep = free.sweep({"bar1.length": (-0.5, 0.5, 3)}, until=0.1, to=tmp_path / "points.csv", chunk=2)
+    assert not sweep.success and list(sweep.counts) == [1, 0, 2, 0] and "2 refused" in repr(sweep)
+
+
+@pytest.mark.parametrize(
+    "vary, options, said",
+    [
+        ({"bar1.phi": (-3, 3, 64), "bar2.phi": np.zeros(3)}, {}, "numpy.linspace"),
+        ({"bar1.phi": np.array([])}, {}, "no points"),
+        ({"bar1.phi": (0, 1, 2.5)}, {}, "count of bar1.phi is a whole number"),
+        ({"bar1.phi": (0, 1, 0)}, {}, "from 1 up"),
+        ({"bar1.phi": (0, float("inf"), 3)}, {}, "finite ends"),
+        ({"bar1.phi": (0, "pi", 3)}, {}, "a range is"),
+        ({"bar1.phi": (0, 1)}, {}, "a range is"),
+        ({"bar1.phi": ["a", "b"]}, {}, "array of numbers"),
+        (SMALL, {"shard": (0, 4)}, "first of shard"),
+        (SMALL, {"shard": (5, 4)}, "from 1 to 4"),
+        (SMALL, {"shard": (1, 0)}, "second of shard"),
+        (SMALL, {"shard": 3}, "part I of N"),
+        (SMALL, {"chunk": 0, "to": "points.csv"}, "chunk is a whole number from 1 up"),
+        (SMALL, {"chunk": 2.5, "to": "points.csv"}, "chunk"),
+        (SMALL, {"parts": 0}, "parts"),
+        (SMALL, {"threads": -1}, "from 0 to 1024"),
+        (SMALL, {"threads": 1025}, "from 0 to 1024"),
+    ],
+)
+def test_what_is_no_sweep_is_refused(free, vary, options, said):
+    with pytest.raises(ValueError, match=said):
+        free.sweep(vary, until=0.1, **options)
+
+
+def test_a_share_of_nothing_has_columns_alone(free, tmp_path):
+    path = tmp_path / "points.csv"
+    free.sweep({"bar1.phi": []}, until=0.1, to=path)
+    header, rows = table(path)
+    assert header[0] == "start.bar1.phi [rad]" and rows == []
+    empty = free.sweep({"bar1.phi": [0.1, 0.2]}, until=0.1, shard=(1, 9))
+    assert empty.rows.shape == (0, len(header) - 1) and empty.success
+    assert len(free.sweep({"bar1.phi": [0.1, 0.2]}, until=0.1, threads=1024)) == 2

@@ -137,7 +137,7 @@ class _Csv:
                     self._size += len(content)
         except FileNotFoundError:
             return False
-        return self._size == part["size"] and self._hash.hexdigest() == part["sha256"]
+        return bool(self._size == part["size"]) and self._hash.hexdigest() == part["sha256"]
 
     def __enter__(self) -> _Csv:
         if self._size:

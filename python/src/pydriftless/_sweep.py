@@ -156,7 +156,7 @@ def swept(
 
     if to is not None:
         mark = _fingerprint(scene, plan, count, shard) if resume else None
-        sweep = written(found, count, to, mark)
+        sweep: Sweep = written(found, count, to, mark)
     else:
         sweep = _joined(list(found(range(1, count + 1))))
     if shard is None and not listed and to is None:

@@ -102,14 +102,15 @@ class Symbol:
 
     def __array_ufunc__(
         self,
-        function: np.ufunc,
+        ufunc: np.ufunc,
         method: Literal["__call__", "reduce", "reduceat", "accumulate", "outer", "at"],
         *inputs: Any,
-        **options: Any,
+        **kwargs: Any,
     ) -> Any:
-        make = _UFUNCS.get(function.__name__)
-        if make is None or method != "__call__" or options:
-            raise TypeError(f"a force cannot use numpy.{function.__name__}; there are {', '.join(sorted(_UFUNCS))}")
+        # Names and types are those that numpy's declarations ask for.
+        make = _UFUNCS.get(ufunc.__name__)
+        if make is None or method != "__call__" or kwargs:
+            raise TypeError(f"a force cannot use numpy.{ufunc.__name__}; there are {', '.join(sorted(_UFUNCS))}")
         return make(*inputs)
 
     def __array_function__(self, function: Any, types: Any, arguments: Any, options: Any) -> Any:
