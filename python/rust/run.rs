@@ -323,7 +323,9 @@ impl Raw {
         let failed = Failed::default();
         let events = events(described, mechanism, &failed);
         let start = mechanism.start(&self.scene.get().scene);
-        let run = Run::new(Arc::clone(mechanism), self.outcome.plan.clone(), Limits::default(), &start);
+        // It was within its limits up to its end.
+        let limits = Limits { energy: Some(f64::INFINITY), constraint: Some(f64::INFINITY) };
+        let run = Run::new(Arc::clone(mechanism), self.outcome.plan.clone(), limits, &start);
         let run = run.map_err(|error| of_run(py, &error.into()))?;
         let running = Running::new(run.with_events(events).timed(wall_clock));
         carry(py, self.scene.clone_ref(py), running, Vec::new(), None, Some(self.outcome.last.t), &failed)

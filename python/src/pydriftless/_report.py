@@ -16,6 +16,8 @@ from ._core import DriftlessError, RequestRefused, SceneRefused
 #: Formats of pictures; that of which there is one counts as the picture, others beside it are extra.
 _FORMATS = ("png", "svg", "pdf", "gif")
 
+_PROGRAM = ("-m", "pydriftless")
+
 
 class Picture:
     """A chart as the content of a file; notebooks show it.
@@ -96,7 +98,7 @@ def command(name: str, arguments: list[str], text: str | None, writes: bool) -> 
         As its exit code says: 3, 2, another.
     """
     with tempfile.TemporaryDirectory() as folder:
-        words = [sys.executable, "-m", "pydriftless", name, *arguments, "--json"]
+        words = [sys.executable, *_PROGRAM, name, *arguments, "--json"]
         if writes:
             words += ["--out", folder]
         done = subprocess.run(words, input=text, capture_output=True, text=True, encoding="utf-8", check=False)

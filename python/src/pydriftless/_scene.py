@@ -268,14 +268,14 @@ class Scene:
             Write the rows to a ``.csv`` or ``.parquet`` file, ``chunk`` points at a time, instead of keeping
             them.
         threads : int
-            Threads; 0 for all processors.
+            Threads, at most 1024; 0 for all processors.
         to_flip : bool
             End each point when a bar first turns over.
         shard : (int, int)
             Part I of N alone.
         resume : bool
             With ``to``: keep what is needed to go on after an interruption beside the file, and go on where it
-            is there.
+            is there.  What of it is missing or has changed is computed again.
         **options
             Those of :meth:`run`; ``trust`` is ``"off"`` by default.
         """
