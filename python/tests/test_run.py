@@ -319,6 +319,21 @@ def test_motion_of_a_run_within_wide_limits(free):
     assert run.success and run(1.5).phi["bar1"] == pytest.approx(run["bar1.phi"][15], abs=1e-12)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_a_resumed_run_is_asked_by_its_own_method(free):
+    options = {"method": "dp8", "rtol": 1e-3, "every": 1.0, "trust": "off"}
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        main = threading.get_ident()
+        threading.Timer(0.03, lambda: signal.pthread_kill(main, signal.SIGINT)).start()
+        with pytest.raises(dl.Interrupted) as interrupted:
+            free.run(until=1e5, max_energy_drift=1e9, **options)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    resumed = dl.resume(interrupted.value.checkpoint, callback=lambda t, row: False)
+    assert resumed(0.7).phi == free.run(until=1, **options)(0.7).phi
+
+
 @pytest.mark.parametrize("name", ["max_energy_drift", "max_constraint_drift", "max_evaluations"])
 def test_limits_are_numbers_from_0_up(free, name):
     for limit in (-1.0, float("nan")):
@@ -391,8 +406,12 @@ def test_pictures_of_every_format_are_kept(free, monkeypatch):
     from pydriftless import _report
 
     # Drawing every mode takes seconds: here a program writes what is read.
-    words = "for name in ('mode1.gif', 'mode1.svg', 'mode1.png', 'mode2.pdf'): open(folder + '/' + name, 'wb').write(b'x')"
-    code = f"import sys; folder = sys.argv[-1]; {words}; print('{{\"scene\": \"free\", \"folder\": \"there\"}}')"
+    code = """if True:
+        import pathlib, sys
+        for name in ("mode1.gif", "mode1.svg", "mode1.png", "mode2.pdf"):
+            pathlib.Path(sys.argv[-1], name).write_bytes(b"picture")
+        print('{"scene": "free", "folder": "there"}')
+    """
     monkeypatch.setattr(_report, "_PROGRAM", ["-c", code])
     found = free.modes(gif=True, chart_format=["png", "svg"])
     kinds = {name: picture.format for name, picture in found.pictures.items()}
