@@ -469,3 +469,54 @@ fn switches_cost_no_order() {
     println!("not landed: order {:.2}", -slope(&errors));
     assert!(-slope(&errors) < 2.5, "{errors:?}");
 }
+
+/// The root of a square with a little added nearly has a corner where it turns: the powers of a step that
+/// begins well before it do not tell of it.
+#[test]
+fn drag_by_nearly_a_speed_slows_down_on_both_ways() {
+    let text = r#"{"name": "drag", "gravity": [0, -9.81],
+        "bars": [{"name": "bar", "mass": 2, "centre": [0.4, 0], "inertia": 0.3, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "points": [{"name": "p", "body": "bar", "point": [0.9, 0]}],
+        "signals": {"speed": "sqrt((1*p.vx)^2 + (1*p.vy)^2 + 1e-12)"},
+        "forces": [{"name": "drag", "body": "bar", "point": [0.9, 0], "force": ["-0.4*speed*p.vx", "-0.4*speed*p.vy"]}],
+        "start": {"bar": {"phi": 0.3, "omega": 0.7}}, "until": 3, "every": 1}"#;
+    let by_hand = |_: f64, y: &[f64; 2]| {
+        let speed = (0.81 * y[1] * y[1] + 1e-12).sqrt();
+        [y[1], (-2.0 * 9.81 * 0.4 * y[0].cos() - 0.4 * 0.81 * speed * y[1]) / (0.3 + 2.0 * 0.16)]
+    };
+    let [phi, omega] = rk4([0.3, 0.7], 3.0, 100_000, by_hand);
+    for (tolerance, close) in [(1e-9, 1e-6), (1e-13, 1e-9)] {
+        for method in [MethodId::Taylor, MethodId::Dp8] {
+            let outcome = run(&scene(text), &adaptive(method, tolerance));
+            let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
+            println!("{method:?} {tolerance:e}: {off:?}");
+            assert!(off[0].abs().max(off[1].abs()) < close, "{method:?} {tolerance:e}: {off:?}");
+        }
+    }
+}
+
+/// Where an angle jumps from π to -π the torque of a spring that follows it changes sign.
+#[test]
+fn a_torque_by_an_angle_jumps_where_it_is_cut() {
+    let spring =
+        r#""torques": [{"name": "spring", "body": "bar", "torque": "-2*atan2(sin(bar.phi), cos(bar.phi))"}]"#;
+    let text = rotor([0.0, 5.0], 7.0, spring);
+    // A quarter of an oscillation cut off at π, backwards from there on, and so on with every turn.
+    let rate = (2.0 / INERTIA).sqrt();
+    let half = (PI * rate / 5.0).asin() / rate;
+    let (turns, left) = ((7.0 / (2.0 * half)).floor(), 7.0 % (2.0 * half));
+    let inside = |t: f64| [5.0 / rate * (rate * t).sin(), 5.0 * (rate * t).cos()];
+    let [phi, omega] = if left < half {
+        inside(left)
+    } else {
+        let [phi, omega] = inside(2.0 * half - left);
+        [TAU - phi, omega]
+    };
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        let outcome = run(&scene(&text), &adaptive(method, 1e-12));
+        let off = [outcome.last.phi[0] - phi - TAU * turns, outcome.last.omega[0] - omega];
+        println!("{method:?}: {off:?} {:?}", outcome.statistics);
+        assert!(off[0].abs().max(off[1].abs()) < 1e-7, "{method:?}: {off:?}");
+    }
+}

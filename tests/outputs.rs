@@ -761,3 +761,58 @@ fn roots_that_end_at_a_corner_have_their_means() {
         }
     }
 }
+
+#[test]
+fn roots_of_what_rounding_leaves_have_their_means() {
+    let scene_until = |until: f64, output: &str| {
+        scene(&format!(
+            r#"{{"name": "ball", "gravity": [0, -9.81],
+            "bars": [{{"name": "b", "mass": 1.5, "centre": [0, 0], "inertia": 0.05, "length": 0.4}}],
+            "walls": [{{"name": "W", "body": "b", "point": [0, 0],
+                "line": {{"through": [0, 0], "normal": [0, 1]}}, "restitution": 0.5}}],
+            "start": {{"b": {{"phi": 0.2, "omega": 0, "origin": [0, 0.5], "velocity": [0, 0]}}}},
+            "outputs": {{"root": "{output}"}}, "until": {until}, "every": 0.1}}"#
+        ))
+    };
+    // The integral of the root over a flight of T seconds is √(g/2) π T²/8, over the fall of F seconds the
+    // same with (2 F)²/2, and flights last F, F/2, …
+    let (unit, fall) = (f64::sqrt(0.5 * 9.81) * PI, f64::sqrt(2.0 * 0.5 / 9.81));
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        for output in ["sqrt(abs(W.gap/(1 m)))", "sqrt(max(0, W.gap/(1 m)))"] {
+            let outcome = run(&scene_until(1.6, output), &adaptive(method, 1e-10));
+            let one = found(&outcome.extremes, "root");
+            let mean = unit * fall * fall * 5.0 / 12.0 / 1.6;
+            println!("{method:?} {output}: {} {mean} {:?}", one.mean, one.min);
+            assert!((one.mean - mean).abs() < 1e-6, "{method:?} {output}: {} {mean}", one.mean);
+        }
+        // Up to the top of the first flight; at the impact the gap may be -1e-16.
+        let outcome = run(&scene_until(1.5 * fall, "sqrt(W.gap/(1 m))"), &adaptive(method, 1e-10));
+        let (one, mean) = (found(&outcome.extremes, "root"), unit * fall * 5.0 / 16.0 / 1.5);
+        println!("{method:?}: {} {mean} {:?}", one.mean, one.min);
+        assert!((one.mean - mean).abs() < 1e-6 && one.min[0] < 1e-5, "{method:?}: {one:?} {mean}");
+    }
+}
+
+#[test]
+fn conditions_of_conditions_take_what_sticks_as_at_rest() {
+    let text = r#"{"name": "stuck", "gravity": [0, -9.81],
+        "bars": [{"name": "w", "mass": 3, "centre": [0, 0], "inertia": 0.1, "length": 0.2},
+            {"name": "p", "mass": 0.7, "centre": [0.4, 0], "inertia": 0.03, "length": 0.8}],
+        "hinges": [{"name": "P", "between": [{"body": "w", "point": [0, 0]}, {"body": "p", "point": [0, 0]}]}],
+        "sliders": [{"name": "R", "point": {"body": "w", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0.2]},
+            "friction": {"kinetic": 0.3, "static": 0.8}}],
+        "start": {"w": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [1, 0.2]},
+            "p": {"phi": -1, "omega": 0}},
+        "outputs": {"nested": "if(sign(w.vx) < 0, 1, w.x/(1 m))", "slides": "if(w.vx > 0, 1, 0)",
+            "way": "if(w.vx > 0, w.x/(1 m), 0)"}, "until": 2, "every": 0.01}"#;
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        let outcome = run(&scene(text), &adaptive(method, 1e-10));
+        let [nested, slides, way] =
+            ["nested", "slides", "way"].map(|name| found(&outcome.extremes, name).mean);
+        // It sticks from 0.2176 s on.
+        println!("{method:?}: {nested} {slides} {way}");
+        assert!((slides - 0.108_8).abs() < 1e-4, "{method:?}: {slides}");
+        assert!((nested - (1.0 - slides + way)).abs() < 1e-9, "{method:?}: {nested} {slides} {way}");
+    }
+}

@@ -19,6 +19,8 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
 
+type Table = DigitsTable<Stream>;
+
 /// Files of such a run.
 const FILES: &[&str] = &[TRAJECTORY, RECORD, EVENTS];
 /// Attempts at a proof; each takes the growth that the one before has met.
@@ -181,7 +183,7 @@ impl<'a> DigitsTask<'a> {
         )
     }
 
-    fn begin(&self, folder: &Folder, precisions: &[Precision]) -> Result<DigitsTable<Stream>, Failure> {
+    fn begin(&self, folder: &Folder, precisions: &[Precision]) -> Result<Table, Failure> {
         let stream = folder.begin(TRAJECTORY)?;
         DigitsTable::new(self.layout(precisions), stream)
             .map_err(|error| folder.failed(TRAJECTORY, error).into())
@@ -191,7 +193,7 @@ impl<'a> DigitsTask<'a> {
     fn finish(
         mut self,
         mut pair: DigitsPair,
-        mut table: DigitsTable<Stream>,
+        mut table: Table,
         mut summary: report::Summary,
         mut folder: Folder,
         mut checkpoints: Checkpoints,
@@ -245,7 +247,7 @@ impl<'a> DigitsTask<'a> {
     fn integrate(
         &self,
         pair: &mut DigitsPair,
-        table: &mut DigitsTable<Stream>,
+        table: &mut Table,
         summary: &mut report::Summary,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
@@ -281,9 +283,9 @@ impl<'a> DigitsTask<'a> {
     fn rows(
         &self,
         pair: &mut DigitsPair,
-        table: &mut DigitsTable<Stream>,
+        table: &mut Table,
         summary: &mut report::Summary,
-        mut between: impl FnMut(&DigitsPair, &mut DigitsTable<Stream>, &report::Summary) -> Result<(), Failure>,
+        mut between: impl FnMut(&DigitsPair, &mut Table, &report::Summary) -> Result<(), Failure>,
     ) -> Result<bool, EarlyEnd> {
         loop {
             let (rows, stop) = match pair.go(&interrupt::is_asked) {
@@ -328,7 +330,7 @@ impl<'a> DigitsTask<'a> {
     fn save(
         &self,
         pair: &DigitsPair,
-        table: &mut DigitsTable<Stream>,
+        table: &mut Table,
         summary: &report::Summary,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
@@ -358,7 +360,7 @@ impl<'a> DigitsTask<'a> {
     fn publish(
         &self,
         pair: &DigitsPair,
-        table: DigitsTable<Stream>,
+        table: Table,
         summary: report::Summary,
         folder: &mut Folder,
         mut checkpoints: Checkpoints,

@@ -161,12 +161,14 @@ impl Outputs {
         });
     }
 
-    /// The branches that hold at a moment.
-    pub fn branches(&self, at: &Moment, scratch: &mut OutputScratch) -> Vec<bool> {
-        let mut found = Vec::new();
+    /// The branches that hold at a moment, where these conditions are zero, whatever rounding makes of them.
+    pub fn branches(&self, at: &Moment, scratch: &mut OutputScratch, zeros: &[bool]) -> Vec<bool> {
+        let (mut zeros, mut found) = (zeros, Vec::new());
         self.visit(at, scratch, &mut Vec::new(), |formula, sources| {
-            found.extend(formula.modes(sources));
-            formula.value(sources)
+            let own = formula.modes_beside_zeros(sources, next(&mut zeros, formula));
+            let value = formula.evaluate(sources, &own);
+            found.extend(own);
+            value
         });
         found
     }

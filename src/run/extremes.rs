@@ -9,7 +9,7 @@
 mod parts;
 
 use super::inside::{Inside, StepWatcher};
-use super::magnitude::{changes, last_digits};
+use super::magnitude::changes;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch, Outputs};
@@ -263,7 +263,7 @@ impl ExtremesDetector {
         }
         let degrees = if self.memory.is_short { &FIRST[..] } else { &FIRST[1..] };
         let rounding = self.memory.rounding.clone();
-        let at = |share: f64, row: &mut Vec<f64>| self.values(inside.roughly_at(begin + share * span), row);
+        let at = |share: f64, row: &mut Vec<f64>| self.known(inside.roughly_at(begin + share * span), row);
         let is_known = |k: usize, curve: &Chebyshev, _: Option<&Chebyshev>| {
             curve.tail() <= (PASSED * curve.most()).max(rounding[k])
         };
@@ -285,13 +285,6 @@ impl ExtremesDetector {
         true
     }
 
-    /// Looks for what is rounding where no interpolant resolves the outputs; true where there is much more
-    /// than was known.
-    fn has_more_rounding(&mut self, inside: &mut dyn Inside, t: Time) -> bool {
-        let found = last_digits(inside.at(t), |motion| self.values_at(motion));
-        has_grown(&mut self.memory.rounding, &found)
-    }
-
     /// Takes the outputs at the end of a run, where a jump has made the event that ends it happen: no step
     /// follows.
     pub fn end(&mut self, motion: &Motion) {
@@ -304,13 +297,16 @@ impl ExtremesDetector {
 
     fn look(&mut self, inside: &mut dyn Inside, begin: Time, span: f64, depth: u32) {
         let rounding = self.memory.rounding.clone();
-        let at = |share: f64, row: &mut Vec<f64>| self.values(inside.at(begin + share * span), row);
+        let at = |share: f64, row: &mut Vec<f64>| self.known(inside.at(begin + share * span), row);
         let is_enough = |k: usize, curve: &Chebyshev, lower: Option<&Chebyshev>| {
             let (tail, size) = (curve.tail(), curve.most());
             let is_noise = lower.is_some_and(|lower| tail > FALLS * lower.tail());
             tail <= (RESOLVED * size).max(rounding[k]) || tail <= NOISE * size && is_noise
         };
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
+        if depth == 0 && self.look_inwards(inside, begin, span, &values) {
+            return;
+        }
         if !is_resolved && depth <= DOUBTS && self.has_more_rounding(inside, begin + 0.5 * span) {
             return self.look(inside, begin, span, depth);
         }

@@ -55,6 +55,18 @@ impl Step<'_> {
         self.0.at(Time::from(time))
     }
 
+    /// Its beginning, and its length \[s\].
+    pub(super) fn span(&self) -> (Time, f64) {
+        let (begin, end) = self.0.span();
+        (begin, (end - begin).hi)
+    }
+
+    /// The motion at a time with the digits beyond a double: in doubles the time of a short step late in a
+    /// run has lost so many that the motion at it is no polynomial.
+    pub(super) fn at_time(&mut self, time: Time) -> &Motion {
+        self.0.at(time)
+    }
+
     /// Writes the powers of the motion about its beginning, where the method has them.
     pub(super) fn powers(&self, powers: &mut MotionPowers) -> bool {
         self.0.powers(powers)

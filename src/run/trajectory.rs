@@ -3,13 +3,18 @@
 use super::inside::{Observer, Step};
 use super::running::Outcome;
 use super::sample::Sample;
-use crate::dynamics::Motion;
+use crate::dynamics::{Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated};
 use std::ops::ControlFlow;
 
 /// Degrees of the interpolants, and what their last coefficients may be over their largest value.
 const DEGREES: [usize; 3] = [8, 16, 24];
 const RESOLVED: f64 = 1e-14;
+/// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the
+/// degree are what the dense output of an explicit pair is off beside the steps that take its place where it
+/// is not exact enough: neither a higher degree nor halves have less.
+const NOISE: f64 = 1e-4;
+const FALLS: f64 = 0.3;
 /// Halvings of a step that no interpolant resolves.
 const HALVINGS: u32 = 4;
 
@@ -57,20 +62,21 @@ impl Recorder {
         Trajectory { outcome, pieces: self.pieces }
     }
 
-    fn record(&mut self, step: &mut Step, begin: f64, end: f64, depth: u32) {
-        let at = |share: f64, row: &mut Vec<f64>| row.extend(values(step.at(begin + share * (end - begin))));
+    fn record(&mut self, step: &mut Step, begin: Time, span: f64, depth: u32) {
+        let at = |share: f64, row: &mut Vec<f64>| row.extend(values(step.at_time(begin + share * span)));
         let Interpolants { curves, is_resolved, .. } = interpolated(&DEGREES, at, is_enough);
         if depth < HALVINGS && !is_resolved {
-            let middle = 0.5 * (begin + end);
-            self.record(step, begin, middle, depth + 1);
-            return self.record(step, middle, end, depth + 1);
+            self.record(step, begin, 0.5 * span, depth + 1);
+            return self.record(step, begin + 0.5 * span, 0.5 * span, depth + 1);
         }
-        self.pieces.push(Piece { begin, end, curves });
+        self.pieces.push(Piece { begin: begin.hi, end: (begin + span).hi, curves });
     }
 }
 
-fn is_enough(_: usize, curve: &Chebyshev, _: Option<&Chebyshev>) -> bool {
-    curve.tail() <= RESOLVED * curve.most() || !curve.most().is_finite()
+fn is_enough(_: usize, curve: &Chebyshev, lower: Option<&Chebyshev>) -> bool {
+    let (tail, most) = (curve.tail(), curve.most());
+    let is_noise = lower.is_some_and(|lower| tail > FALLS * lower.tail());
+    tail <= RESOLVED * most || tail <= NOISE * most && is_noise || !most.is_finite()
 }
 
 /// Winding angles and positions, then rates.
@@ -83,9 +89,9 @@ fn values(motion: &Motion) -> Vec<f64> {
 
 impl Observer for Recorder {
     fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
-        let (begin, end) = (step.begin(), step.end());
-        if end > begin {
-            self.record(step, begin, end, 0);
+        let (begin, span) = step.span();
+        if span > 0.0 {
+            self.record(step, begin, span, 0);
         }
         ControlFlow::Continue(())
     }

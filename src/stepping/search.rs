@@ -7,10 +7,10 @@
 //! else                            both halves, the earlier one first
 //! ```
 //!
-//! An event function is a [`Curve`]: a power series ([`PowerSeries`]), a function of a motion whose unknowns are
-//! polynomials (`event`, and whatever else watches a motion), or a Chebyshev interpolant ([`interpolated`])
-//! where nothing bounds it.  Where all that is left of a part is rounding, there is nothing to be told apart,
-//! and signs at the ends decide.
+//! An event function is a [`Curve`]: a power series ([`PowerSeries`]), a function of a motion whose unknowns
+//! are polynomials (`event`, and whatever else watches a motion), or a Chebyshev interpolant
+//! ([`interpolated`]) where nothing bounds it.  Where all that is left of a part is rounding, there is
+//! nothing to be told apart, and signs at the ends decide.
 //!
 //! Two zeros as close together as 1e-9 of the step are found.  Source: R. E. Moore, *Methods and Applications
 //! of Interval Analysis* (1979), chapter 5, for exclusion by bounds; Newton's method inside a bracket after

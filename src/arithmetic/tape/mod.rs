@@ -171,10 +171,15 @@ impl Tape {
         self.operations.len()
     }
 
-    /// True where it has exponentials, hyperbolic tangents or quotients by what is no constant.
+    /// True where its powers at one time may say nothing of what it is a little later: of exponentials,
+    /// hyperbolic tangents and quotients by what is no constant, which may be flat, of roots, which nearly
+    /// have a corner where their argument is nearly zero, and of angles, which jump by 2π.
     pub fn may_be_flat(&self) -> bool {
         self.operations.iter().any(|operation| match *operation {
-            Operation::Exponential(_) | Operation::HyperbolicTangent(_) => true,
+            Operation::Exponential(_)
+            | Operation::HyperbolicTangent(_)
+            | Operation::Root(_)
+            | Operation::Angle(..) => true,
             Operation::Divide(_, by) => !matches!(self.operations[by as usize], Operation::Constant(_)),
             _ => false,
         })

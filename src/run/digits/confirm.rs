@@ -1,10 +1,10 @@
 //! Whether a step of the series agrees with the equations inside it.
 //!
-//! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step begins
-//! and change within it, as `tanh(100*x)` does: the powers that would say so are not among those carried.  At
-//! a few times inside the step the motion is therefore expanded anew to its first powers, and their
-//! acceleration compared with that of the series; the step is shortened until they agree.  What rises and is
-//! flat again between these times is not seen.
+//! Laws with exponentials, hyperbolic tangents, quotients, roots or angles may be flat to the last digit
+//! where a step begins and change within it, as `tanh(100*x)` does: the powers that would say so are not
+//! among those carried.  At a few times inside the step the motion is therefore expanded anew to its first
+//! powers, and their acceleration compared with that of the series; the step is shortened until they agree.
+//! What rises and is flat again between these times is not seen.
 
 use super::motion::DigitsMotion;
 use crate::arithmetic::Scalar;
@@ -19,7 +19,8 @@ const SHARES: [f64; 4] = [0.234375, 0.515625, 0.796875, 1.0];
 const POWERS: usize = 2;
 /// log2 of the part of a step's tolerance that the accelerations may be off by, over the step and its order.
 const ALLOWED: f64 = 6.0;
-/// Shortenings at most; each by a third.
+/// Shortenings at most, each by a third, beside one for every bit of the tolerance: so many lead up to a jump
+/// of an angle.
 const MOST: usize = 60;
 
 /// A series of few powers.
@@ -37,7 +38,7 @@ impl<const W: usize> Probe<W> {
 /// Of a step of so many seconds as much as the equations confirm.
 pub fn confirmed<const W: usize>(motion: &mut DigitsMotion<W>, mut step: f64) -> f64 {
     let Some(mut probe) = motion.probe.take() else { return step };
-    for _ in 0..MOST {
+    for _ in 0..MOST + (-motion.precision.tolerance()).max(0.0) as usize {
         if !step.is_finite() || SHARES.iter().all(|share| agrees(motion, &mut probe, step, share * step)) {
             break;
         }

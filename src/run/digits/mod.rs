@@ -1,8 +1,8 @@
 //! Runs in many digits: positions to as many digits as asked for, and up to any horizon with proof.
 //!
 //! [`Precision`] says what a number of digits asks of numbers and series; a [`LongRun`] takes a scene whose
-//! numbers are read as written from row to row; [`DigitsPair`] runs two side by side and tells to how many digits
-//! they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
+//! numbers are read as written from row to row; [`DigitsPair`] runs two side by side and tells to how many
+//! digits they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
 mod acting;
 mod branches;

@@ -148,8 +148,8 @@ impl DigitsPair {
         &self.runs
     }
 
-    /// Rows that all runs have up to the stop which [`DigitsPair::go`] has told of, that of their last states among
-    /// them.
+    /// Rows that all runs have up to the stop which [`DigitsPair::go`] has told of, that of their last states
+    /// among them.
     pub fn up_to_stop(&mut self) -> Vec<(ShownRow, Option<f64>)> {
         std::mem::take(&mut self.stopped)
     }

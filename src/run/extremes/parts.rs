@@ -20,7 +20,7 @@ const UNRESOLVED: usize = 32;
 const LATER: f64 = 1e-6;
 /// Shares of a part by which its ends are moved inwards, until all outputs are finite there: beyond a change
 /// a root may have no value.
-const INWARDS: [f64; 5] = [0.0, 1e-11, 1e-9, 1e-7, 1e-5];
+const INWARDS: [f64; 7] = [0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5];
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: it has no zero.
 const CERTAIN: f64 = 1e-3;
 /// What a condition must be over what its interpolant may be off by for its sign to be known, and the share
@@ -40,6 +40,9 @@ struct PendingStep {
     begin: Time,
     span: f64,
     parts: Vec<(f64, f64, u32)>,
+    /// The share at which the branches of the present part are taken, and the conditions that are zero in it.
+    first: f64,
+    zeros: Vec<bool>,
     /// Changes left of conditions that no interpolant resolves.
     unresolved: usize,
 }
@@ -75,25 +78,32 @@ impl ExtremesDetector {
 
     /// Looks at a step, part by part.
     pub(super) fn look_at_parts(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) {
-        let mut ahead = PendingStep { begin, span, parts: vec![(0.0, 1.0, 0)], unresolved: UNRESOLVED };
+        let (parts, zeros) = (vec![(0.0, 1.0, 0)], vec![false; self.condition_count()]);
+        let mut ahead = PendingStep { begin, span, parts, first: 0.0, zeros, unresolved: UNRESOLVED };
         let mut from = if span > 0.0 { 0.0 } else { 1.0 };
         for _ in 0..PARTS {
             if from >= 1.0 || ahead.unresolved == 0 {
                 break;
             }
-            let first = f64::min(from + LATER, 1.0);
-            self.branches = self.with_outputs(inside.at(ahead.time(first)), |outputs, moment, scratch| {
-                outputs.branches(moment, scratch)
-            });
+            ahead.first = f64::min(from + LATER, 1.0);
+            ahead.zeros.fill(false);
+            self.take_branches(inside, &ahead);
             if self.memory.still.is_empty() {
                 self.memory.still = self.rounding_of_conditions(inside.at(begin));
             }
-            let to = self.change(inside, &mut ahead, first);
+            let to = self.change(inside, &mut ahead);
             self.look_at_part(inside, &ahead, [from, to]);
             from = to;
         }
         self.branches.clear();
         self.look_at(inside, ahead.time(from), (1.0 - from) * span);
+    }
+
+    /// Takes the branches of the present part.
+    fn take_branches(&mut self, inside: &mut dyn Inside, ahead: &PendingStep) {
+        let motion = inside.at(ahead.time(ahead.first));
+        self.branches = self
+            .with_outputs(motion, |outputs, moment, scratch| outputs.branches(moment, scratch, &ahead.zeros));
     }
 
     /// Looks at a part, up to as near its ends as all outputs are finite.
@@ -109,6 +119,36 @@ impl ExtremesDetector {
         self.look_at(inside, ahead.time(from), (to - from) * ahead.span);
     }
 
+    /// Looks at a step of outputs that have no value at its ends and do inside, as a root at an impact may;
+    /// false where they are not such.
+    pub(super) fn look_inwards(
+        &mut self,
+        inside: &mut dyn Inside,
+        begin: Time,
+        span: f64,
+        values: &[Vec<f64>],
+    ) -> bool {
+        let is_blind = |values: &Vec<f64>| {
+            let [first, .., last] = &values[..] else { return false };
+            !(first + last).is_finite() && values[values.len() / 2].is_finite()
+        };
+        if !self.branches.is_empty() || !values.iter().any(is_blind) {
+            return false;
+        }
+        let mut finite = |by: f64| {
+            let ends = [by * span, span - by * span];
+            let mut count = |after: f64| {
+                let values = self.values_at(inside.at(begin + after));
+                values.iter().filter(|value| value.is_finite()).count()
+            };
+            ends.into_iter().map(&mut count).min()
+        };
+        let most = finite(0.5);
+        let Some(by) = INWARDS[1..].iter().copied().find(|&by| finite(by) >= most) else { return false };
+        self.look(inside, begin + by * span, span - 2.0 * by * span, 1);
+        true
+    }
+
     /// The outputs at the end and at the beginning of a part, where it is on given branches, on those that
     /// hold there.
     pub(super) fn true_ends(
@@ -121,6 +161,32 @@ impl ExtremesDetector {
         let ends = [begin + span, begin].map(|time| self.values_at(inside.at(time)));
         self.branches = branches;
         Some(ends)
+    }
+
+    /// Appends the outputs at a motion; on the branches that hold there where they have no value on those
+    /// given, beyond which rounding has led: roots of what is nothing but rounding.
+    pub(super) fn known(&mut self, motion: &Motion, values: &mut Vec<f64>) {
+        let begin = values.len();
+        self.values(motion, values);
+        if !self.branches.is_empty() && values[begin..].iter().any(|value| !value.is_finite()) {
+            let branches = std::mem::take(&mut self.branches);
+            let here = self.values_at(motion);
+            self.branches = branches;
+            let pairs = values[begin..].iter_mut().zip(here);
+            pairs.filter(|(value, _)| !value.is_finite()).for_each(|(value, here)| *value = here);
+        }
+    }
+
+    /// Looks for what is rounding where no interpolant resolves the outputs; true where there is much more
+    /// than was known.
+    pub(super) fn has_more_rounding(&mut self, inside: &mut dyn Inside, t: Time) -> bool {
+        let at = |motion: &Motion| {
+            let mut values = Vec::new();
+            self.known(motion, &mut values);
+            values
+        };
+        let found = last_digits(inside.at(t), at);
+        has_grown(&mut self.memory.rounding, &found)
     }
 
     fn conditions(&mut self, motion: &Motion) -> Vec<f64> {
@@ -143,10 +209,10 @@ impl ExtremesDetector {
         has_grown(&mut self.memory.still, &found)
     }
 
-    /// The share of a step, from `first` on, at which a condition changes sign first; 1 where none does.
-    fn change(&mut self, inside: &mut dyn Inside, ahead: &mut PendingStep, first: f64) -> f64 {
+    /// The share of a step, in the present part, at which a condition changes sign first; 1 where none does.
+    fn change(&mut self, inside: &mut dyn Inside, ahead: &mut PendingStep) -> f64 {
         while let Some((low, high, depth)) = ahead.parts.pop() {
-            let low = low.max(first);
+            let low = low.max(ahead.first);
             if low >= high {
                 continue;
             }
@@ -201,7 +267,9 @@ impl ExtremesDetector {
         }
         let is_zero = |k: usize| curves[k].most() <= still[k];
         if (0..curves.len()).any(|k| is_zero(k) && self.branches[k]) {
-            (0..curves.len()).filter(|&k| is_zero(k)).for_each(|k| self.branches[k] = false);
+            // What depends on them is to be on the branches of zeros as well.
+            (0..curves.len()).filter(|&k| is_zero(k)).for_each(|k| ahead.zeros[k] = true);
+            self.take_branches(inside, ahead);
             return PartZeros::Still;
         }
         let (mut earliest, mut is_blind) = (None::<(f64, bool)>, false);

@@ -148,8 +148,8 @@ impl TangentFlow {
         self.path.lost.as_deref()
     }
 
-    /// Takes the motion at [`TangentFlow::next`], to which `steps` steps in doubles have led so far (none where
-    /// their rounding does not count).
+    /// Takes the motion at [`TangentFlow::next`], to which `steps` steps in doubles have led so far (none
+    /// where their rounding does not count).
     pub fn take(&mut self, motion: &Motion, steps: u64) {
         if self.path.is_plain && !self.take_node(motion) {
             return;

@@ -91,19 +91,31 @@ impl<S: crate::arithmetic::Real> Branches<S> for ByOrder {
     }
 }
 
-/// The same, noted.
-pub(super) struct Noted(pub Vec<bool>);
+/// The same, noted; conditions among the zeros are zero, whatever rounding makes of them.
+pub(super) struct Noted<'a> {
+    pub found: Vec<bool>,
+    pub zeros: &'a [bool],
+}
 
-impl Branches<f64> for Noted {
+impl Noted<'_> {
+    fn note(&mut self, condition: usize, is_positive: bool) -> bool {
+        self.found[condition] = is_positive && !self.zeros.get(condition).is_some_and(|&is_zero| is_zero);
+        self.found[condition]
+    }
+}
+
+impl Branches<f64> for Noted<'_> {
     fn is_positive(&mut self, condition: usize, value: f64) -> bool {
-        self.0[condition] = value > 0.0;
-        self.0[condition]
+        self.note(condition, value > 0.0)
     }
 
     fn piece(&mut self, first: usize, knots: &Knots, x: f64, knot: impl Fn(usize) -> f64) -> usize {
         let piece = BySign.piece(first, knots, x, knot);
-        (0..knots.bits()).for_each(|j| self.0[first + j] = Knots::bit(piece, j));
-        piece
+        let bits = first..first + knots.bits();
+        bits.clone().for_each(|bit| {
+            self.note(bit, Knots::bit(piece, bit - first));
+        });
+        knots.piece(&self.found[bits])
     }
 }
 

@@ -212,9 +212,14 @@ impl Formula {
 
     /// The branches that hold at these values, by the signs of the conditions there.
     pub fn modes(&self, values: &[f64]) -> Vec<bool> {
-        let mut noted = Noted(vec![false; self.conditions.len()]);
+        self.modes_beside_zeros(values, &[])
+    }
+
+    /// The same where these conditions are zero, whatever rounding makes of them.
+    pub fn modes_beside_zeros(&self, values: &[f64], zeros: &[bool]) -> Vec<bool> {
+        let mut noted = Noted { found: vec![false; self.conditions.len()], zeros };
         self.run(values, &mut noted);
-        noted.0
+        noted.found
     }
 
     /// The values of its conditions on the same branches.

@@ -2,8 +2,9 @@
 //!
 //! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step begins
 //! and change within it: the powers that would say so are lost in rounding, and the step wanted is longer
-//! than the circle in which the series converges.  The accelerations of the series are therefore compared
-//! with those of the equations at a few times inside the step, which is shortened until they agree.
+//! than the circle in which the series converges.  Roots nearly have corners where their argument is nearly
+//! zero, and angles jump, which no power tells of either.  The accelerations of the series are therefore
+//! compared with those of the equations at a few times inside the step, which is shortened until they agree.
 //! (Griewank & Walther,
 //! *Evaluating Derivatives*, 2nd ed. (2008), section 13.2, on the defect of a Taylor polynomial.)
 
@@ -17,8 +18,8 @@ const SHARES: [f64; 4] = [0.23, 0.52, 0.79, 1.0];
 const ROUNDING: f64 = 1e-9;
 /// Differences in accelerations that a step's tolerance stands for, over the step.
 const ALLOWED: f64 = 1e3;
-/// Shortenings at most; each by a third.
-const MOST: usize = 40;
+/// Shortenings at most; each by a third.  So many lead up to a jump as near as rounding lets them.
+const MOST: usize = 80;
 
 /// Accelerations by the series, and by the equations at the place the series comes to \[rad/s², m/s²\].
 pub(super) type Accelerations = [Vec<f64>; 2];
