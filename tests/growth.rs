@@ -285,6 +285,35 @@ fn a_pendulums_differences_grow_with_its_period() {
     );
 }
 
+/// Beside a bar that is level and at rest a difference in angle has neither a rate nor an acceleration, for the
+/// torque of its weight is at its largest.
+#[test]
+fn differences_beside_a_level_bar_at_rest_are_known() {
+    let level = |phi: f64| {
+        text(&format!(
+            r#"{{"name": "level", "gravity": [0, -9.81],
+            "bars": [{{"name": "a", "length": 1, "mass": 1, "centre": [0.5, 0], "inertia": 0.1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}}],
+            "torques": [{{"name": "x", "body": "a", "torque": "-0.3*a.omega"}}],
+            "start": {{"a": {{"phi": {phi}, "omega": 0}}}}, "until": 2, "every": 1}}"#
+        ))
+    };
+    let scene = level(0.0);
+    let mechanism = compile(&scene);
+    let plan = Plan::new(&scene, &mechanism, &request(2.0, 2.0)).expect("a plan");
+    let found = flow(&mechanism, &plan, &mechanism.start(&scene), &[2.0]).expect("a flow");
+    assert_eq!(found.moments[0].columns[0], [1.0, 0.0]);
+    let [ahead, behind] = [1e-4, -1e-4].map(|phi| {
+        let scene = level(phi);
+        let end = motions(&scene, &mechanism, &mechanism.start(&scene), 2.0, 1).expect("a run").pop();
+        end.map(|end| [end.phi[0].hi, end.omega[0].hi]).expect("a row")
+    });
+    for (k, column) in found.moments[1].columns[0].iter().enumerate() {
+        let difference = (ahead[k] - behind[k]) / 2e-4;
+        assert!((column - difference).abs() < 1e-5 * (1.0 + difference.abs()), "{k}: {column} {difference}");
+    }
+}
+
 /// A ball that falls from y with v0 and rebounds: v1² = v0² + 2 g y, t1 = (v0 + v1)/g, and after it y = e v1
 /// (t - t1) - g (t - t1)²/2.
 #[test]

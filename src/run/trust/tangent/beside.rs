@@ -114,6 +114,10 @@ impl<const D: usize> ExpandedBlock<D> {
         let mut least = f64::INFINITY;
         for j in 0..self.count {
             let first = [0, 1].map(|m| libm::log2(self.size(m, j, weights)));
+            // Where a difference in angles has neither a rate nor an acceleration, as beside bars that are
+            // level and at rest, it is the measure itself.
+            let is_still = first == [f64::NEG_INFINITY; 2];
+            let own = if is_still { libm::log2(self.size_of(&self.unknowns[0], j, weights)) } else { 0.0 };
             for k in last + 1 - JUDGES..=last {
                 let size = self.size(k, j, weights);
                 if !size.is_finite() {
@@ -121,7 +125,10 @@ impl<const D: usize> ExpandedBlock<D> {
                 }
                 if size > 0.0 {
                     let size = libm::log2(size);
-                    least = least.min(((first[0] - size) / k as f64).max((first[1] - size) / (k - 1) as f64));
+                    least = least.min(match is_still {
+                        true => (own - size) / (k + 1) as f64,
+                        false => ((first[0] - size) / k as f64).max((first[1] - size) / (k - 1) as f64),
+                    });
                 }
             }
         }
@@ -130,8 +137,12 @@ impl<const D: usize> ExpandedBlock<D> {
 
     /// Size of power `m` in column `j`.
     fn size(&self, m: usize, j: usize, weights: &[f64]) -> f64 {
-        let squares =
-            self.power(m).iter().zip(weights).map(|(rate, weight)| (rate.slope[j] * weight).powi(2));
+        self.size_of(self.power(m), j, weights)
+    }
+
+    /// Size of column `j` of these coordinates, or of powers of their rates.
+    fn size_of(&self, values: &[Dual<D>], j: usize, weights: &[f64]) -> f64 {
+        let squares = values.iter().zip(weights).map(|(value, weight)| (value.slope[j] * weight).powi(2));
         squares.sum::<f64>().sqrt()
     }
 }
