@@ -15,7 +15,7 @@
 //! let vary: Vec<Vary> = vec!["bar1.phi=1..3:5".parse()?, "bar2.phi=-pi..pi:4".parse()?];
 //! let plan = Sweep::new(&template, vary, &Request { until: Some(2.0), ..Request::default() })?;
 //! let mut flips = Vec::new();
-//! let totals = sweep(&plan, 2, &mut |point: &driftless::run::Point| {
+//! let totals = sweep(&plan, 2, &mut |point: &driftless::run::SweepPoint| {
 //!     flips.extend(point.flip);
 //!     Ok(())
 //! })?;
