@@ -19,7 +19,8 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
 
-type Table = DigitsTable<Stream>;
+/// The trajectory under way.
+type TableFile = DigitsTable<Stream>;
 
 /// Files of such a run.
 const FILES: &[&str] = &[TRAJECTORY, RECORD, EVENTS];
@@ -183,7 +184,7 @@ impl<'a> DigitsTask<'a> {
         )
     }
 
-    fn begin(&self, folder: &Folder, precisions: &[Precision]) -> Result<Table, Failure> {
+    fn begin(&self, folder: &Folder, precisions: &[Precision]) -> Result<TableFile, Failure> {
         let stream = folder.begin(TRAJECTORY)?;
         DigitsTable::new(self.layout(precisions), stream)
             .map_err(|error| folder.failed(TRAJECTORY, error).into())
@@ -193,7 +194,7 @@ impl<'a> DigitsTask<'a> {
     fn finish(
         mut self,
         mut pair: DigitsPair,
-        mut table: Table,
+        mut table: TableFile,
         mut summary: report::Summary,
         mut folder: Folder,
         mut checkpoints: Checkpoints,
@@ -247,7 +248,7 @@ impl<'a> DigitsTask<'a> {
     fn integrate(
         &self,
         pair: &mut DigitsPair,
-        table: &mut Table,
+        table: &mut TableFile,
         summary: &mut report::Summary,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
@@ -283,9 +284,9 @@ impl<'a> DigitsTask<'a> {
     fn rows(
         &self,
         pair: &mut DigitsPair,
-        table: &mut Table,
+        table: &mut TableFile,
         summary: &mut report::Summary,
-        mut between: impl FnMut(&DigitsPair, &mut Table, &report::Summary) -> Result<(), Failure>,
+        mut between: impl FnMut(&DigitsPair, &mut TableFile, &report::Summary) -> Result<(), Failure>,
     ) -> Result<bool, EarlyEnd> {
         loop {
             let (rows, stop) = match pair.go(&interrupt::is_asked) {
@@ -330,7 +331,7 @@ impl<'a> DigitsTask<'a> {
     fn save(
         &self,
         pair: &DigitsPair,
-        table: &mut Table,
+        table: &mut TableFile,
         summary: &report::Summary,
         folder: &Folder,
         checkpoints: &mut Checkpoints,
@@ -360,7 +361,7 @@ impl<'a> DigitsTask<'a> {
     fn publish(
         &self,
         pair: &DigitsPair,
-        table: Table,
+        table: TableFile,
         summary: report::Summary,
         folder: &mut Folder,
         mut checkpoints: Checkpoints,

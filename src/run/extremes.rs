@@ -25,11 +25,10 @@ const RESOLVED: f64 = 1e-10;
 /// Degrees by which a step is judged before anything else is done: short steps, as between close rows, by the
 /// lower one first.
 const FIRST: [usize; 2] = [6, 12];
-/// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the
+/// Below this share of the largest value, last coefficients that [stay](Chebyshev::stays) with twice the
 /// degree are what the dense output is off, where its pieces join: neither a higher degree nor halves have
 /// less.
 const NOISE: f64 = 1e-6;
-const FALLS: f64 = 0.3;
 /// What an output may be beside its interpolant, over the largest value, for a step to be passed over, and
 /// what the last coefficients may be there.
 const MARGIN: f64 = 1e-6;
@@ -300,8 +299,7 @@ impl ExtremesDetector {
         let at = |share: f64, row: &mut Vec<f64>| self.known(inside.at(begin + share * span), row);
         let is_enough = |k: usize, curve: &Chebyshev, lower: Option<&Chebyshev>| {
             let (tail, size) = (curve.tail(), curve.most());
-            let is_noise = lower.is_some_and(|lower| tail > FALLS * lower.tail());
-            tail <= (RESOLVED * size).max(rounding[k]) || tail <= NOISE * size && is_noise
+            tail <= (RESOLVED * size).max(rounding[k]) || tail <= NOISE * size && curve.stays(lower)
         };
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
         if depth == 0 && self.look_inwards(inside, begin, span, &values) {

@@ -10,11 +10,10 @@ use std::ops::ControlFlow;
 /// Degrees of the interpolants, and what their last coefficients may be over their largest value.
 const DEGREES: [usize; 3] = [8, 16, 24];
 const RESOLVED: f64 = 1e-14;
-/// Below this share of the largest value, last coefficients that do not fall to [`FALLS`] with twice the
+/// Below this share of the largest value, last coefficients that [stay](Chebyshev::stays) with twice the
 /// degree are what the dense output of an explicit pair is off beside the steps that take its place where it
 /// is not exact enough: neither a higher degree nor halves have less.
 const NOISE: f64 = 1e-4;
-const FALLS: f64 = 0.3;
 /// Halvings of a step that no interpolant resolves.
 const HALVINGS: u32 = 4;
 
@@ -75,8 +74,7 @@ impl Recorder {
 
 fn is_enough(_: usize, curve: &Chebyshev, lower: Option<&Chebyshev>) -> bool {
     let (tail, most) = (curve.tail(), curve.most());
-    let is_noise = lower.is_some_and(|lower| tail > FALLS * lower.tail());
-    tail <= RESOLVED * most || tail <= NOISE * most && is_noise || !most.is_finite()
+    tail <= RESOLVED * most || tail <= NOISE * most && curve.stays(lower) || !most.is_finite()
 }
 
 /// Winding angles and positions, then rates.

@@ -206,7 +206,7 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         }
         let mut event = None;
         if self.by_series {
-            if problem.mechanism().may_be_flat() {
+            if problem.mechanism().needs_confirmation() {
                 h = self.confirmed(problem, state, h);
             }
             if problem.events() > 0 {

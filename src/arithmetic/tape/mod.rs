@@ -174,7 +174,7 @@ impl Tape {
     /// True where its powers at one time may say nothing of what it is a little later: of exponentials,
     /// hyperbolic tangents and quotients by what is no constant, which may be flat, of roots, which nearly
     /// have a corner where their argument is nearly zero, and of angles, which jump by 2π.
-    pub fn may_be_flat(&self) -> bool {
+    pub fn needs_confirmation(&self) -> bool {
         self.operations.iter().any(|operation| match *operation {
             Operation::Exponential(_)
             | Operation::HyperbolicTangent(_)

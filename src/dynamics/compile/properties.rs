@@ -110,9 +110,11 @@ impl Mechanism {
         events.iter().map(|event| event.name.as_str()).collect()
     }
 
-    /// True where a law may be flat to the last digit at one place and not at another.
-    pub fn may_be_flat(&self) -> bool {
-        self.forces.iter().any(|force| force.may_be_flat) || self.aims().any(|aim| aim.tape.may_be_flat())
+    /// True where the powers of a law at one place may say nothing of it at another: see
+    /// [`Tape::needs_confirmation`](crate::arithmetic::tape::Tape::needs_confirmation).
+    pub fn needs_confirmation(&self) -> bool {
+        self.forces.iter().any(|force| force.needs_confirmation)
+            || self.aims().any(|aim| aim.tape.needs_confirmation())
     }
 
     /// True where laws have corners, places stick and slide or events change what acts, so that steps end

@@ -160,9 +160,11 @@ impl<C: Decimal> LawOnBranches<'_, C> {
             UserForce::recorded(&self.law.name, |at| self.potential(at), |at, loads| self.apply(at, loads))?;
         Ok(match self.span() {
             // What it divides by the length for is no more flat than a built-in spring is.
-            Some(span) => {
-                UserForce { may_be_flat: span.tape.may_be_flat(), span: Some(Box::new(span)), ..force }
-            }
+            Some(span) => UserForce {
+                needs_confirmation: span.tape.needs_confirmation(),
+                span: Some(Box::new(span)),
+                ..force
+            },
             None => force,
         })
     }

@@ -153,7 +153,7 @@ impl<C: Real> UserForce<C> {
         });
         let of_forces = |part: ForceTape| Self {
             name: String::new(),
-            may_be_flat: part.tape.may_be_flat(),
+            needs_confirmation: part.tape.needs_confirmation(),
             parts: [part, ForceTape::default()],
             span: None,
             potential: None,
@@ -213,7 +213,7 @@ impl<C: Real> UserForce<C> {
         let parts = [conservative.part(by_potential), applied.part(beside)];
         Ok(Self {
             name: name.into(),
-            may_be_flat: parts.iter().any(|part| part.tape.may_be_flat()),
+            needs_confirmation: parts.iter().any(|part| part.tape.needs_confirmation()),
             parts,
             span: None,
             potential: energy.1.first().map(|&slot| (energy.0, slot)),

@@ -130,8 +130,8 @@ pub struct UserForce<C = f64> {
     pub(in crate::dynamics) parts: [ForceTape; 2],
     /// The same law over its length, where it is that of a spring and asks for nothing else.
     pub(crate) span: Option<Box<SpanLaw<C>>>,
-    /// True where it has exponentials, hyperbolic tangents or quotients, which may be flat to the last digit.
-    pub(crate) may_be_flat: bool,
+    /// See [`Tape::needs_confirmation`].
+    pub(crate) needs_confirmation: bool,
     /// Potential energy \[J\].
     pub(super) potential: Option<(Tape, Slot)>,
 }
@@ -170,7 +170,7 @@ impl UserForce {
             // Neither is asked for by series.
             span: None,
             potential: None,
-            may_be_flat: self.may_be_flat,
+            needs_confirmation: self.needs_confirmation,
         }
     }
 }

@@ -28,9 +28,9 @@ const MOST: usize = 60;
 pub struct Probe<const W: usize>(Series<Digits<W>>);
 
 impl<const W: usize> Probe<W> {
-    /// Of a mechanism with laws that may be flat.
+    /// Of a mechanism with laws that need it.
     pub fn of(mechanism: &ExactMechanism<Digits<W>>, coordinates: Coordinates) -> Option<Self> {
-        let is_needed = mechanism.forces.iter().any(|force| force.may_be_flat);
+        let is_needed = mechanism.forces.iter().any(|force| force.needs_confirmation);
         is_needed.then(|| Self(Series::of_terms(&mechanism.terms(), coordinates, POWERS)))
     }
 }

@@ -78,7 +78,7 @@ pub struct DigitsMotion<const W: usize> {
     pub(super) series: Series<Digits<W>>,
     pub(super) state: LongState<W>,
     pub(super) keeper: DigitsKeeper<W>,
-    /// What confirms steps, where laws may be flat.
+    /// What confirms steps, where laws need it.
     pub(super) probe: Option<Probe<W>>,
     /// Watches for events.
     pub(super) watch: EventWatch<W>,

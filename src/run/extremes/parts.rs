@@ -108,15 +108,21 @@ impl ExtremesDetector {
 
     /// Looks at a part, up to as near its ends as all outputs are finite.
     fn look_at_part(&mut self, inside: &mut dyn Inside, ahead: &PendingStep, [from, to]: [f64; 2]) {
-        let mut finite = |share: f64| {
-            let values = self.values_at(inside.at(ahead.time(share)));
+        let (begin, span) = (ahead.time(from), (to - from) * ahead.span);
+        let by = self.inwards(inside, begin, span).unwrap_or(0.0);
+        self.look_at(inside, begin + by * span, span - 2.0 * by * span);
+    }
+
+    /// By which share of a span its ends are to be moved inwards, until as many outputs are finite there as
+    /// in the middle; `None` where no share is enough.
+    fn inwards(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<f64> {
+        let mut finite = |after: f64| {
+            let values = self.values_at(inside.at(begin + after));
             values.iter().filter(|value| value.is_finite()).count()
         };
-        let (width, most) = (to - from, finite(0.5 * (from + to)));
-        let ends = INWARDS.map(|by| [from + by * width, to - by * width]);
-        let ends = ends.into_iter().find(|ends| ends.iter().all(|&end| finite(end) >= most));
-        let [from, to] = ends.unwrap_or([from, to]);
-        self.look_at(inside, ahead.time(from), (to - from) * ahead.span);
+        let most = finite(0.5 * span);
+        let mut is_enough = |by: f64| finite(by * span) >= most && finite(span - by * span) >= most;
+        INWARDS.into_iter().find(|&by| is_enough(by))
     }
 
     /// Looks at a step of outputs that have no value at its ends and do inside, as a root at an impact may;
@@ -135,16 +141,7 @@ impl ExtremesDetector {
         if !self.branches.is_empty() || !values.iter().any(is_blind) {
             return false;
         }
-        let mut finite = |by: f64| {
-            let ends = [by * span, span - by * span];
-            let mut count = |after: f64| {
-                let values = self.values_at(inside.at(begin + after));
-                values.iter().filter(|value| value.is_finite()).count()
-            };
-            ends.into_iter().map(&mut count).min()
-        };
-        let most = finite(0.5);
-        let Some(by) = INWARDS[1..].iter().copied().find(|&by| finite(by) >= most) else { return false };
+        let Some(by) = self.inwards(inside, begin, span).filter(|&by| by > 0.0) else { return false };
         self.look(inside, begin + by * span, span - 2.0 * by * span, 1);
         true
     }
@@ -157,10 +154,16 @@ impl ExtremesDetector {
         begin: Time,
         span: f64,
     ) -> Option<[Vec<f64>; 2]> {
-        let branches = Some(std::mem::take(&mut self.branches)).filter(|branches| !branches.is_empty())?;
-        let ends = [begin + span, begin].map(|time| self.values_at(inside.at(time)));
+        let is_given = !self.branches.is_empty();
+        is_given.then(|| [begin + span, begin].map(|time| self.true_values(inside.at(time))))
+    }
+
+    /// The outputs at a motion on the branches that hold there.
+    fn true_values(&mut self, motion: &Motion) -> Vec<f64> {
+        let branches = std::mem::take(&mut self.branches);
+        let values = self.values_at(motion);
         self.branches = branches;
-        Some(ends)
+        values
     }
 
     /// Appends the outputs at a motion; on the branches that hold there where they have no value on those
@@ -169,10 +172,7 @@ impl ExtremesDetector {
         let begin = values.len();
         self.values(motion, values);
         if !self.branches.is_empty() && values[begin..].iter().any(|value| !value.is_finite()) {
-            let branches = std::mem::take(&mut self.branches);
-            let here = self.values_at(motion);
-            self.branches = branches;
-            let pairs = values[begin..].iter_mut().zip(here);
+            let pairs = values[begin..].iter_mut().zip(self.true_values(motion));
             pairs.filter(|(value, _)| !value.is_finite()).for_each(|(value, here)| *value = here);
         }
     }

@@ -151,6 +151,14 @@ impl Chebyshev {
         last.fold(0.0, |most, c| f64::max(most, c.abs()))
     }
 
+    /// True where the tail has hardly fallen since an interpolant of half the degree, as what is not smooth
+    /// leaves it; false where there is none.
+    pub fn stays(&self, lower: Option<&Self>) -> bool {
+        /// Share to which it falls at least where a function is smooth.
+        const FALLS: f64 = 0.3;
+        lower.is_some_and(|lower| self.tail() > FALLS * lower.tail())
+    }
+
     /// Its integral from 0 to 1.
     pub fn integral(&self) -> f64 {
         let even = self.coefficients.iter().enumerate().step_by(2);

@@ -339,7 +339,7 @@ impl<const B: usize, const S: usize> Code for SpringWork<'_, B, S> {
 
 /// The law of a force, where it fits: a spring's over its length and rate.
 fn in_lanes(force: &UserForce) -> Option<&SpanLaw> {
-    force.span.as_deref().filter(|law| !law.depends_on_time() && !force.may_be_flat)
+    force.span.as_deref().filter(|law| !law.depends_on_time() && !force.needs_confirmation)
 }
 
 /// A spring of 1 N/m along a span.

@@ -24,7 +24,7 @@ enum Equations {
 /// What steps are judged by.
 #[derive(Debug, Default)]
 pub(super) struct StepJudge {
-    /// Those of every lane, where formulas may be flat: see [`confirm`].
+    /// Those of every lane, where steps of formulas need it: see [`confirm`].
     equations: [Option<Equations>; LANES],
     inside: State,
     rates: Vec<f64>,
@@ -51,7 +51,7 @@ impl StepJudge {
             (true, mechanism) => Equations::All(Box::new(Multiplier::new(mechanism))),
             (false, mechanism) => Equations::Independent(Box::new(Elimination::new(mechanism))),
         };
-        self.equations[lane] = mechanism.may_be_flat().then(equations);
+        self.equations[lane] = mechanism.needs_confirmation().then(equations);
     }
 
     /// Of the step a lane wants as much as its series carries \[s\].
