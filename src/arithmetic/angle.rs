@@ -31,6 +31,11 @@ pub fn difference<T: Real>(a: T, b: T) -> T {
     if turns == 0.0 { raw } else { raw - T::split(DoubleDouble::TAU.scale(turns)).0 }
 }
 
+/// Whole turns that are to be taken off an angle \[rad\] for it to be in [-π, π].
+pub fn whole_turns(angle: f64) -> f64 {
+    if angle.abs() <= std::f64::consts::PI { 0.0 } else { (angle / std::f64::consts::TAU).round() }
+}
+
 /// The winding angle \[rad\]: the wrapped one and its turns.
 pub fn unwrapped(angle: DoubleDouble, turns: i64) -> f64 {
     (angle + DoubleDouble::TAU.scale(turns as f64)).hi

@@ -57,6 +57,8 @@ use crate::dynamics::impact::Contact;
 use crate::dynamics::series::{Coefficient, Series, powers};
 use crate::dynamics::{Coordinates, Form, Mechanism, MotionPowers, OdeSystem, State, Time};
 
+/// Highest order of the code that has room of a fixed size.
+const HIGHEST_ORDER: usize = 24;
 /// Powers the step is taken from.
 const JUDGES: usize = 5;
 /// Powers of the rates beyond the first that `extended` carries in double-double.

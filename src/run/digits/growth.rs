@@ -69,6 +69,9 @@ pub fn forecast(
 }
 
 /// What it takes where errors grow by so many digits; `mean` \[s\] is the length of steps.
+///
+/// # Errors
+/// More digits than runs may have.
 pub fn planned(
     source: &DigitsSource,
     growth: f64,

@@ -11,6 +11,7 @@ use self::impacts::ThroughImpacts;
 use self::singular::PastSingular;
 use super::watching::Watching;
 use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::angle::whole_turns;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::multiplier::Multiplier;
 use crate::dynamics::{Mechanism, Time};
@@ -19,7 +20,6 @@ use crate::run::extremes::Extremes;
 use crate::run::plan::Plan;
 use crate::stepping::StepError;
 use crate::stepping::taylor::batch::{Batch, BatchMember, BatchObserver, Going, TakenStep, Watch};
-use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// What takes one trajectory on.
@@ -148,9 +148,4 @@ pub(super) fn form_in_lanes(mechanism: Arc<Mechanism>) -> Box<dyn Problem> {
         true => Box::new(Multiplier::<0, true>::new(mechanism)),
         false => Box::new(Elimination::<0>::new(mechanism)),
     }
-}
-
-/// Whole turns that are to be taken off an angle \[rad\] for it to be in [-π, π].
-fn whole_turns(angle: f64) -> f64 {
-    if angle.abs() <= PI { 0.0 } else { (angle / TAU).round() }
 }

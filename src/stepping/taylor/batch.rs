@@ -34,7 +34,7 @@ use self::slots::LaneSlots;
 pub(super) use self::swinging::{SwingingLanes, law_of as swinging_law};
 use self::trees::TreeLanes;
 use self::vectors::{added, flaw_of, load, moved, pair, store, unit};
-use super::{ExpansionKernel, JUDGES, Taylor, stop};
+use super::{ExpansionKernel, HIGHEST_ORDER, JUDGES, Taylor, stop};
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors, WideCode};
 use crate::dynamics::looped::reduced;
@@ -44,8 +44,6 @@ use crate::dynamics::{Mechanism, State, Time};
 use crate::stepping::{Cause, Statistics, StepError, Tolerance};
 use std::sync::{Arc, OnceLock};
 
-/// Largest order there is room for.
-const MOST: usize = 24;
 /// Largest number of bodies, and of those with springs.
 const BODIES: usize = 6;
 const SPRUNG: usize = 4;
@@ -160,7 +158,7 @@ impl Batch {
 
     /// The same with another order, from 10 to 24.
     pub fn with_order(self, order: usize) -> Self {
-        Self { order: order.clamp(2 * JUDGES, MOST), ..self }
+        Self { order: order.clamp(2 * JUDGES, HIGHEST_ORDER), ..self }
     }
 
     /// The same by another kernel: `Portable` does without the processor's lanes.

@@ -22,6 +22,7 @@
 
 mod start;
 use self::start::begin;
+use super::HIGHEST_ORDER;
 use super::springs::Springs;
 use super::step_size::{self, StepSize};
 use super::terms::over;
@@ -30,8 +31,6 @@ use crate::arithmetic::lanes::row::{Row, at, load, room, store};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::{Mechanism, MotionPowers, State};
 
-/// Largest order there is room for.
-pub const MOST: usize = 24;
 /// Constants of the mechanism, whose springs fill `S` vectors; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
 pub struct Bodies<const B: usize, const S: usize> {
@@ -72,9 +71,9 @@ struct MatrixColumn<const B: usize> {
 #[repr(align(64))]
 struct BodiesScratch<const B: usize> {
     /// c and s.
-    e: [[Row<B>; 2]; MOST + 2],
+    e: [[Row<B>; 2]; HIGHEST_ORDER + 2],
     /// v and the two components of P.
-    v: [[Row<B>; 3]; MOST + 1],
+    v: [[Row<B>; 3]; HIGHEST_ORDER + 1],
 }
 
 /// What the newest coefficients are made from.
@@ -101,7 +100,13 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
         let n = tree.coordinates;
         let is_sprung_only =
             !mechanism.is_winding() && mechanism.actions.is_empty() && mechanism.constraints.is_empty();
-        if n == 0 || n > room(B) || tree.off_axis || !is_sprung_only || order > MOST || order % 2 == 1 {
+        if n == 0
+            || n > room(B)
+            || tree.off_axis
+            || !is_sprung_only
+            || order > HIGHEST_ORDER
+            || order % 2 == 1
+        {
             return None;
         }
         let springs = Springs::new(mechanism)?;
@@ -134,7 +139,10 @@ impl<const B: usize, const S: usize> Bodies<B, S> {
             springs,
             energy: mechanism.energy_scale * mechanism.units.time,
             columns: vec![MatrixColumn { mass: zero, inverse: zero, cos: zero, sin: zero }; n],
-            scratch: Box::new(BodiesScratch { e: [[zero; 2]; MOST + 2], v: [[zero; 3]; MOST + 1] }),
+            scratch: Box::new(BodiesScratch {
+                e: [[zero; 2]; HIGHEST_ORDER + 2],
+                v: [[zero; 3]; HIGHEST_ORDER + 1],
+            }),
         })
     }
 

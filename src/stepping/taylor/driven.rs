@@ -22,6 +22,7 @@
 //! Wins over the series of any mechanism (whole runs by `taylor`): 3.1 times on `motor` at 1e-9, 3.9 at
 //! 1e-14.
 
+use super::HIGHEST_ORDER;
 use super::direction;
 use super::step_size::{self, StepSize};
 use super::terms::{left_over, reciprocal};
@@ -30,9 +31,6 @@ use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::{Mechanism, State, Time};
 use crate::scene::Law;
-
-/// Largest order there is room for.
-pub const MOST: usize = 24;
 
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
@@ -45,7 +43,7 @@ pub struct DrivenKernel {
     /// W of the driven body \[N·m\].
     pub(super) weight: Complex<f64>,
     /// e × W - A w² Im u over d k as a product with E, in two terms.
-    load: [[[f64; 4]; 2]; MOST + 1],
+    load: [[[f64; 4]; 2]; HIGHEST_ORDER + 1],
     /// Fastest rate: small oscillations, and the motor \[rad/s\].
     rate: f64,
     /// What an error of the unit vectors comes to in the work, over the energy scale and the unit of time: a
@@ -86,14 +84,14 @@ impl DrivenFlow {
 #[repr(align(64))]
 pub struct DrivenScratch {
     /// E.
-    e: [[f64; 4]; MOST + 1],
+    e: [[f64; 4]; HIGHEST_ORDER + 1],
     /// v in every lane.
-    v: [[f64; 4]; MOST + 1],
+    v: [[f64; 4]; HIGHEST_ORDER + 1],
 }
 
 impl Default for DrivenScratch {
     fn default() -> Self {
-        Self { e: [[0.0; 4]; MOST + 1], v: [[0.0; 4]; MOST + 1] }
+        Self { e: [[0.0; 4]; HIGHEST_ORDER + 1], v: [[0.0; 4]; HIGHEST_ORDER + 1] }
     }
 }
 
@@ -127,7 +125,7 @@ impl DrivenKernel {
             DoubleDouble::ZERO,
             DoubleDouble::product(w, w).scale(-a),
         ];
-        let mut load = [[[0.0; 4]; 2]; MOST + 1];
+        let mut load = [[[0.0; 4]; 2]; HIGHEST_ORDER + 1];
         for (k, load) in load.iter_mut().enumerate().skip(1) {
             let lanes = lanes.map(|lane| lane / DoubleDouble::product(d, k as f64));
             *load = [lanes.map(|lane| lane.hi), lanes.map(|lane| lane.lo)];

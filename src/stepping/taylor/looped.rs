@@ -21,6 +21,7 @@
 mod spring;
 
 use self::spring::{LoopSpring, pull};
+use super::HIGHEST_ORDER;
 use super::expansion::{larger_size, minus_log2};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::lanes::Lanes;
@@ -33,8 +34,6 @@ use crate::dynamics::natural::keeper::NaturalKeeper;
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
 
-/// Largest order there is room for.
-pub const MOST: usize = 24;
 /// Powers an order is judged by.
 const JUDGES: usize = 4;
 /// The least order.
@@ -60,9 +59,9 @@ pub struct LoopedKernel<const B: usize> {
     /// Highest power of z summed in the last step.
     summed: usize,
     /// z: powers 0…P+1.
-    z: [[Row<B>; 2]; MOST + 2],
+    z: [[Row<B>; 2]; HIGHEST_ORDER + 2],
     /// mu: powers 0…P-1.
-    mu: [Row<B>; MOST],
+    mu: [Row<B>; HIGHEST_ORDER],
     /// U, its transpose G = Uᵀ, and P: x and y, column by column.
     spread: Vec<[Row<B>; 2]>,
     across: Vec<[Row<B>; 2]>,
@@ -83,7 +82,7 @@ impl<const B: usize> LoopedKernel<B> {
             && mechanism.forces.is_empty()
             && !mechanism.is_damped()
             && mechanism.actions.iter().all(|action| action.law.is_none());
-        if n > room(B) || !is_plain || order > MOST {
+        if n > room(B) || !is_plain || order > HIGHEST_ORDER {
             return None;
         }
         let mut applied = vec![Complex::ZERO; n];
@@ -120,8 +119,8 @@ impl<const B: usize> LoopedKernel<B> {
             torque,
             springs: mechanism.springs.iter().map(LoopSpring::new).collect(),
             summed: 0,
-            z: [[zero; 2]; MOST + 2],
-            mu: [zero; MOST],
+            z: [[zero; 2]; HIGHEST_ORDER + 2],
+            mu: [zero; HIGHEST_ORDER],
             spread: vec![[zero; 2]; n],
             across: vec![[zero; 2]; n],
             projected: vec![[zero; 4]; n],

@@ -27,6 +27,7 @@
 //! Wins over the series of any mechanism (whole runs by `taylor`, start of the program included): 1.6 times
 //! on `free` at 1e-9 and 1.7 at 1e-14, 1.4 and 1.7 on `gentle`.
 
+use super::HIGHEST_ORDER;
 use super::direction;
 use super::step_size::{self, StepSize};
 use super::terms::{LEFT, add_to, left_over, less_over, over, over_first, pair_sum};
@@ -34,9 +35,6 @@ use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::sum::two_product;
 use crate::dynamics::{Mechanism, MotionPowers, State};
-
-/// Largest order there is room for.
-pub const MOST: usize = 24;
 
 /// Constants of the mechanism.
 #[derive(Clone, Debug)]
@@ -92,15 +90,15 @@ impl PairFlow {
 #[derive(Clone, Debug)]
 #[repr(align(64))]
 pub struct PairScratch {
-    pub(super) e: [[f64; 4]; MOST + 1],
-    pub(super) v: [[f64; 4]; MOST + 1],
+    pub(super) e: [[f64; 4]; HIGHEST_ORDER + 1],
+    pub(super) v: [[f64; 4]; HIGHEST_ORDER + 1],
     /// -A m (f_2, f_1)_m.
-    pub(super) g: [[f64; 4]; MOST + 1],
+    pub(super) g: [[f64; 4]; HIGHEST_ORDER + 1],
 }
 
 impl Default for PairScratch {
     fn default() -> Self {
-        let zeros = [[0.0; 4]; MOST + 1];
+        let zeros = [[0.0; 4]; HIGHEST_ORDER + 1];
         Self { e: zeros, v: zeros, g: zeros }
     }
 }

@@ -17,6 +17,7 @@
 mod law;
 
 use self::law::LawSeries;
+use super::HIGHEST_ORDER;
 use super::terms::over;
 use super::wide::Wide;
 use crate::arithmetic::lanes::row::{Row, at, room, store};
@@ -25,9 +26,6 @@ use crate::dynamics::Mechanism;
 use crate::dynamics::force::span::SpanLaw;
 use crate::dynamics::force::{CompiledSpring, UserForce};
 use crate::dynamics::point::Point;
-
-/// Largest order there is room for.
-const MOST: usize = super::bodies::MOST;
 
 /// Constants of the springs in `S` vectors, and their coefficients in the step; with `S = 0` nothing at all.
 #[derive(Clone, Debug)]
@@ -59,15 +57,15 @@ struct SpringScratch<const S: usize> {
     /// 1/q_0.
     inverse: Row<S>,
     /// D.
-    x: [Row<S>; MOST + 2],
-    y: [Row<S>; MOST + 2],
+    x: [Row<S>; HIGHEST_ORDER + 2],
+    y: [Row<S>; HIGHEST_ORDER + 2],
     /// q, h, a, s and κ.
-    square: [Row<S>; MOST + 2],
-    half: [Row<S>; MOST + 2],
-    strain: [Row<S>; MOST + 2],
-    reciprocal: [Row<S>; MOST + 2],
-    factor: [Row<S>; MOST + 2],
-    power: [f64; MOST + 1],
+    square: [Row<S>; HIGHEST_ORDER + 2],
+    half: [Row<S>; HIGHEST_ORDER + 2],
+    strain: [Row<S>; HIGHEST_ORDER + 2],
+    reciprocal: [Row<S>; HIGHEST_ORDER + 2],
+    factor: [Row<S>; HIGHEST_ORDER + 2],
+    power: [f64; HIGHEST_ORDER + 1],
 }
 
 impl<const B: usize, const S: usize> Springs<B, S> {
@@ -127,14 +125,14 @@ impl<const B: usize, const S: usize> Springs<B, S> {
             laws,
             scratch: Box::new(SpringScratch {
                 inverse: zero,
-                x: [zero; MOST + 2],
-                y: [zero; MOST + 2],
-                square: [zero; MOST + 2],
-                half: [zero; MOST + 2],
-                strain: [zero; MOST + 2],
-                reciprocal: [zero; MOST + 2],
-                factor: [zero; MOST + 2],
-                power: [0.0; MOST + 1],
+                x: [zero; HIGHEST_ORDER + 2],
+                y: [zero; HIGHEST_ORDER + 2],
+                square: [zero; HIGHEST_ORDER + 2],
+                half: [zero; HIGHEST_ORDER + 2],
+                strain: [zero; HIGHEST_ORDER + 2],
+                reciprocal: [zero; HIGHEST_ORDER + 2],
+                factor: [zero; HIGHEST_ORDER + 2],
+                power: [0.0; HIGHEST_ORDER + 1],
             }),
         })
     }

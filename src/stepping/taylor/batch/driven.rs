@@ -10,7 +10,7 @@ use super::super::driven::DrivenKernel;
 use super::super::terms::over;
 use super::laws::{LaneLaws, reduced};
 use super::{
-    BatchMember, JUDGES, LaneClock, LaneKernel, MOST, added, flaw_of, load, moved, pair, store, unit,
+    BatchMember, HIGHEST_ORDER, JUDGES, LaneClock, LaneKernel, added, flaw_of, load, moved, pair, store, unit,
 };
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::{LANES, Octet};
@@ -42,7 +42,7 @@ pub(super) struct DrivenLanes {
     before: [Octet; 2],
     /// What the driven body turns in the step \[rad\].
     swept: Octet,
-    powers: [DrivenPower; MOST + 1],
+    powers: [DrivenPower; HIGHEST_ORDER + 1],
 }
 
 /// Coefficients of one power: e, u and v.
@@ -128,7 +128,7 @@ impl LaneKernel for DrivenLanes {
             between: [zero; 2],
             before: [zero; 2],
             swept: zero,
-            powers: [DrivenPower { c: zero, s: zero, x: zero, y: zero, v: zero }; MOST + 1],
+            powers: [DrivenPower { c: zero, s: zero, x: zero, y: zero, v: zero }; HIGHEST_ORDER + 1],
         }
     }
 

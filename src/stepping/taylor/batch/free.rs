@@ -3,7 +3,7 @@
 
 use super::series::{expand, finish};
 use super::springs::LaneSprings;
-use super::{BatchMember, JUDGES, LaneClock, LaneKernel, MOST, SPRINGS, flaw_of, load, store};
+use super::{BatchMember, HIGHEST_ORDER, JUDGES, LaneClock, LaneKernel, SPRINGS, flaw_of, load, store};
 use crate::arithmetic::angle;
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
@@ -24,7 +24,7 @@ pub(super) struct FreeLanes<const N: usize, const SPRUNG: bool> {
     pub low: [[Octet; N]; 2],
     /// Angles at the start of the step.
     before: [Octet; N],
-    pub powers: [FreePower<N>; MOST + 1],
+    pub powers: [FreePower<N>; HIGHEST_ORDER + 1],
     pub springs: LaneSprings<N>,
 }
 
@@ -61,7 +61,7 @@ impl<const N: usize, const SPRUNG: bool> LaneKernel for FreeLanes<N, SPRUNG> {
             high: [zero; 2],
             low: [zero; 2],
             before: zero,
-            powers: [power; MOST + 1],
+            powers: [power; HIGHEST_ORDER + 1],
             springs: LaneSprings::new(like.mechanism.springs.len()),
         }
     }

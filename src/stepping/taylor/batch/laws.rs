@@ -2,7 +2,7 @@
 
 use super::super::terms::over;
 use super::super::wide::Wide;
-use super::{LaneClock, MOST, load, pair, store};
+use super::{HIGHEST_ORDER, LaneClock, load, pair, store};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::Arithmetic;
@@ -11,8 +11,8 @@ use crate::arithmetic::sincos;
 use crate::arithmetic::sum::WHOLE;
 use crate::scene::Law;
 
-/// Powers of a rate: what order `MOST` of the free body asks for.
-pub(super) const RATES: usize = MOST + 2;
+/// Powers of a rate: what order `HIGHEST_ORDER` of the free body asks for.
+pub(super) const RATES: usize = HIGHEST_ORDER + 2;
 const ZERO: Octet = Octet([0.0; LANES]);
 
 /// The law of each lane, and where it is.

@@ -20,7 +20,7 @@ mod turn;
 
 use self::matrices::Matrices;
 use self::spring::LaneSpringSeries;
-use super::{BatchMember, JUDGES, LaneClock, LaneKernel, MOST, added, flaw_of, load, store, unit};
+use super::{BatchMember, HIGHEST_ORDER, JUDGES, LaneClock, LaneKernel, added, flaw_of, load, store, unit};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{Complex, angle};
@@ -28,11 +28,11 @@ use crate::dynamics::force::action::Applied;
 use crate::dynamics::natural::ReducedMatrices;
 use crate::dynamics::series::lanes::are_equal;
 use crate::dynamics::{self, Mechanism, State};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 const ZERO: Octet = Octet([0.0; LANES]);
 /// Powers of z there is room for, body by body.
-const ROOM: usize = MOST + 2;
+const ROOM: usize = HIGHEST_ORDER + 2;
 
 /// x and y of a vector in every lane.
 type Pair = [Octet; 2];
@@ -322,7 +322,7 @@ impl LoopLanes {
     /// The angle of a body where the step began, less whole turns \[rad\].
     fn start(&self, lane: usize, body: usize) -> f64 {
         let angle = self.before[0][body].0[lane];
-        if angle.abs() <= PI { angle } else { angle - TAU * (angle / TAU).round() }
+        angle - TAU * angle::whole_turns(angle)
     }
 
     /// Power m of the applied forces, into f.

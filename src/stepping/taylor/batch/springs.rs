@@ -4,7 +4,7 @@
 use super::super::terms::over;
 use super::super::wide::Wide;
 use super::free::FreePower;
-use super::{MOST, added, load, moved, pair, store};
+use super::{HIGHEST_ORDER, added, load, moved, pair, store};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::arithmetic::sincos;
@@ -21,7 +21,7 @@ pub(super) struct LaneSprings<const N: usize> {
     /// Cosine and sine of the bodies' angles, and what these leave out.
     units: [[Octet; 4]; N],
     /// The dampers' power \[W/s^m\], and their work \[J\] in two terms.
-    power: [Octet; MOST + 1],
+    power: [Octet; HIGHEST_ORDER + 1],
     work: [Octet; 2],
     /// The energy scale times the unit of time \[J s\].
     energy: Octet,
@@ -40,7 +40,7 @@ struct LaneSpring<const N: usize> {
     measured: Octet,
     /// 1/q_0.
     inverse: Octet,
-    powers: [SpringPower; MOST + 1],
+    powers: [SpringPower; HIGHEST_ORDER + 1],
 }
 
 /// One power of D, q, h, a, s and κ.
@@ -96,13 +96,13 @@ impl<const N: usize> LaneSprings<N> {
             damping: ZERO,
             measured: ZERO,
             inverse: ZERO,
-            powers: [power; MOST + 1],
+            powers: [power; HIGHEST_ORDER + 1],
         };
         Self {
             all: vec![spring; count],
             is_damped: false,
             units: [[ZERO; 4]; N],
-            power: [ZERO; MOST + 1],
+            power: [ZERO; HIGHEST_ORDER + 1],
             work: [ZERO; 2],
             energy: Octet([1.0; LANES]),
         }

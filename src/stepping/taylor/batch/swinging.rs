@@ -14,7 +14,9 @@
 use super::super::driven::DrivenKernel;
 use super::super::terms::over;
 use super::laws::{LaneLaws, RATES};
-use super::{BatchMember, JUDGES, LaneClock, LaneKernel, MOST, added, flaw_of, load, moved, store, unit};
+use super::{
+    BatchMember, HIGHEST_ORDER, JUDGES, LaneClock, LaneKernel, added, flaw_of, load, moved, store, unit,
+};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::arithmetic::{DoubleDouble, angle};
@@ -45,7 +47,7 @@ pub(in crate::stepping::taylor) struct SwingingLanes {
     /// What angle and rate of the driven body grow by in the step.
     moved: [Octet; 2],
     given: [GivenPower; RATES],
-    powers: [SwingingPower; MOST + 1],
+    powers: [SwingingPower; HIGHEST_ORDER + 1],
 }
 
 /// One power of the driven body: the unit vector, and its second derivative.
@@ -169,7 +171,7 @@ impl LaneKernel for SwingingLanes {
             before: ZERO,
             moved: [ZERO; 2],
             given: [GivenPower { c: ZERO, s: ZERO, bx: ZERO, by: ZERO }; RATES],
-            powers: [SwingingPower { c: ZERO, s: ZERO, v: ZERO, q: ZERO, power: ZERO }; MOST + 1],
+            powers: [SwingingPower { c: ZERO, s: ZERO, v: ZERO, q: ZERO, power: ZERO }; HIGHEST_ORDER + 1],
         }
     }
 

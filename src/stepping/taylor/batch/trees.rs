@@ -16,7 +16,7 @@ use crate::arithmetic::lanes::wide::{EightLanes, Vectors};
 use crate::dynamics::law::Law;
 use crate::dynamics::series::lanes::{SeriesInLanes, StepEnds, in_lanes};
 use crate::dynamics::{Mechanism, State, Time};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Largest number of bodies: beyond, dense matrices are not the form to compute in.
 const BODIES: usize = 12;
@@ -128,7 +128,7 @@ impl TreeLanes {
     fn start(&self, lane: usize, body: usize) -> f64 {
         let Some(base) = self.coordinate(body) else { return self.series.angle_of(body, lane) };
         let angle = self.before[base].0[lane];
-        if angle.abs() <= PI { angle } else { angle - TAU * (angle / TAU).round() }
+        angle - TAU * angle::whole_turns(angle)
     }
 
     /// Brings the ends of the steps back onto the rows; lanes that take no step, or do not get there, stay

@@ -5,14 +5,14 @@
 //!     F_m = k (L0 Σ s_j D_{m-j} - D_m)
 //! ```
 
-use super::MOST;
+use super::HIGHEST_ORDER;
 use crate::arithmetic::Complex;
 use crate::arithmetic::lanes::Lanes;
 use crate::dynamics::force;
 use crate::dynamics::point::Point;
 
 /// Room for a scalar series, and for lanes that read beyond its end.
-const LENGTH: usize = MOST + 8;
+const LENGTH: usize = HIGHEST_ORDER + 8;
 
 /// A spring and its series: D, |D|² with its powers' numbers, 1/|D|; `backwards` ones run from the end, so
 /// that products are of neighbours.
@@ -57,7 +57,7 @@ impl SpringPowers {
     #[inline(always)]
     fn push(&mut self, m: usize, value: f64) {
         self.forwards[m] = value;
-        self.backwards[MOST - m] = value;
+        self.backwards[HIGHEST_ORDER - m] = value;
     }
 }
 
@@ -67,7 +67,7 @@ fn convolve<L: Lanes>(a: &[f64; LENGTH], b: &SpringPowers, m: usize) -> f64 {
     let mut sum = L::ZERO;
     let mut j = 0;
     while j <= m {
-        let at = MOST - m + j;
+        let at = HIGHEST_ORDER - m + j;
         let (a, b) = ([a[j], a[j + 1], a[j + 2], a[j + 3]], &b.backwards);
         sum = L::of(a).mul_add(L::of([b[at], b[at + 1], b[at + 2], b[at + 3]]), sum);
         j += 4;

@@ -14,14 +14,14 @@
 //! Wins over the series of any mechanism with the tape of points (whole runs by `taylor` of a double
 //! pendulum with a linear law, by instructions): 5 times.
 
-use super::MOST;
+use super::HIGHEST_ORDER;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::lanes::Lanes;
 use crate::arithmetic::tape::{Operation, Slot};
 use crate::dynamics::force::span::{LENGTH, RATE, SpanLaw};
 
 /// Blocks of four that hold all powers, and how many powers these are.
-const BLOCKS: usize = (MOST + 2).div_ceil(4);
+const BLOCKS: usize = (HIGHEST_ORDER + 2).div_ceil(4);
 const ROOM: usize = 4 * BLOCKS;
 
 /// Powers of one series.
@@ -220,9 +220,9 @@ mod tests {
     fn the_recurrences_are_those_of_a_tape_in_double_double() {
         let [(tape, slots)] = Symbol::record(|| [vec![everything(Symbol::input(0), Symbol::input(1))]]);
         let inputs = |number: u32, m: usize| [1.3, 0.4][number as usize] / ((m * m + 1) as f64 * 1.5);
-        let mut exact = TapeSeries::<DoubleDouble>::new(&tape, MOST);
+        let mut exact = TapeSeries::<DoubleDouble>::new(&tape, HIGHEST_ORDER);
         let mut results = vec![LawPowers::NONE; tape.len()];
-        for m in 0..=MOST {
+        for m in 0..=HIGHEST_ORDER {
             exact.advance(&tape, m, |number| DoubleDouble::from(inputs(number, m)));
             advance::<Portable>(tape.operations(), &mut results, m, |number| inputs(number, m));
             let (found, wanted) = (results[slots[0] as usize].at(m), exact.of(slots[0])[m].hi);

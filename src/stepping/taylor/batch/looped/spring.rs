@@ -4,7 +4,7 @@
 //! q = |D|²,  s = q^(-1/2):  m q_0 s_m = Σ_{j=1..m} (j/2 - m) q_j s_{m-j},  F_m = k (L0 Σ s_j D_{m-j} - D_m)
 //! ```
 
-use super::{MOST, PAIR, Pair, ROOM, ZERO, put};
+use super::{HIGHEST_ORDER, PAIR, Pair, ROOM, ZERO, put};
 use crate::arithmetic::eight::Octet;
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::force;
@@ -28,7 +28,7 @@ pub(super) struct LaneSpringSeries {
 impl LaneSpringSeries {
     /// Room for a spring like this one.
     pub(super) fn new(spring: &force::CompiledSpring) -> Self {
-        let room = || vec![ZERO; MOST + 1];
+        let room = || vec![ZERO; HIGHEST_ORDER + 1];
         Self {
             root: PAIR,
             terms: spring.span.terms.iter().map(|&(k, _)| (k, PAIR)).collect(),
