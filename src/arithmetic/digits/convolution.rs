@@ -4,7 +4,7 @@
 //! negative ones; carries are left for the end, and no branch depends on a sign.  The code is made for every
 //! number of limbs up to eight.
 
-use super::{Digits, DigitsKind, FARTHEST, MOST, Scalar};
+use super::{Digits, DigitsKind, FARTHEST, MIDDLE, MOST, Scalar};
 
 /// The upper columns of the product of two numbers of `N` limbs each into `found` (N + 2), the first of which
 /// is what is carried out of the first column.
@@ -70,6 +70,7 @@ pub fn product<const W: usize>(a: &Digits<W>, b: &Digits<W>) -> Digits<W> {
         3 => product_in::<5, W>(a, b, 3),
         4 => product_in::<6, W>(a, b, 4),
         limbs @ ..=8 => product_in::<10, W>(a, b, limbs),
+        limbs @ ..=MIDDLE => product_in::<{ MIDDLE + 2 }, W>(a, b, limbs),
         limbs => product_in::<{ MOST + 2 }, W>(a, b, limbs),
     }
 }
@@ -128,7 +129,8 @@ pub fn sum_of_products<'a, const W: usize>(
         return Digits::ZERO;
     }
     match limbs {
-        ..=8 => sum_in::<10, 20, W>(terms, top, limbs),
+        0..=8 => sum_in::<10, 20, W>(terms, top, limbs),
+        9..=MIDDLE => sum_in::<{ MIDDLE + 2 }, { 2 * MIDDLE + 4 }, W>(terms, top, limbs),
         _ => sum_in::<{ MOST + 2 }, { 2 * MOST + 4 }, W>(terms, top, limbs),
     }
 }
@@ -141,7 +143,7 @@ fn sum_in<'a, const ROOM: usize, const DOUBLE: usize, const W: usize>(
     limbs: usize,
 ) -> Digits<W> {
     let mut sums = [[0; DOUBLE]; 2];
-    by_size!(limbs, accumulate::ROOM::DOUBLE::W, any_accumulate, (terms, top, &mut sums));
+    by_size!(limbs, accumulate::ROOM::DOUBLE::W, any_accumulate::<ROOM, DOUBLE, W>, (terms, top, &mut sums));
     rounded::<DOUBLE, W>(&sums, top, limbs)
 }
 
@@ -154,15 +156,13 @@ fn accumulate<'a, const N: usize, const ROOM: usize, const DOUBLE: usize, const 
     add_all::<ROOM, DOUBLE, W>(N, terms, top, sums, columns::<N>);
 }
 
-fn any_accumulate<'a, const DOUBLE: usize, const W: usize>(
+fn any_accumulate<'a, const ROOM: usize, const DOUBLE: usize, const W: usize>(
     limbs: usize,
     terms: impl Iterator<Item = (&'a Digits<W>, &'a Digits<W>)>,
     top: i32,
     sums: &mut [[u128; DOUBLE]; 2],
 ) {
-    add_all::<{ MOST + 2 }, DOUBLE, W>(limbs, terms, top, sums, |a, b, found| {
-        any_columns(limbs, a, b, found)
-    });
+    add_all::<ROOM, DOUBLE, W>(limbs, terms, top, sums, |a, b, found| any_columns(limbs, a, b, found));
 }
 
 /// Adds the limbs of every product to those of the positive or of the negative sum, carries left for the end.

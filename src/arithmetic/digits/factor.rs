@@ -24,11 +24,11 @@ const EARLY: usize = 5;
 const GROWTH: i32 = 10;
 /// Bits that room above two factors takes, with two for rounding.
 const GUARD: usize = 2 * HEAD as usize + 4;
-/// Limbs at most, and room of sums: one limb above the point and one below the last column.
+/// Limbs at most.  Sums have room for three more: one above the point, and one below the last column.
 const MOST: usize = super::MOST + 2;
-const ROOM: usize = MOST + 3;
 /// Limbs that there is smaller room for: it is cleared every time.
 const SMALL: usize = 9;
+const MIDDLE: usize = super::MIDDLE + 2;
 /// Limbs of powers that are kept one after another.
 const FEW: usize = 4;
 
@@ -160,6 +160,7 @@ impl<const W: usize> Factor<W> {
             3 => self.place_in::<3>(scale, m, 3),
             4 => self.place_in::<4>(scale, m, 4),
             limbs @ ..=SMALL => self.place_in::<SMALL>(scale, m, limbs),
+            limbs @ ..=MIDDLE => self.place_in::<MIDDLE>(scale, m, limbs),
             limbs => self.place_in::<MOST>(scale, m, limbs),
         }
     }
@@ -217,8 +218,9 @@ impl<const W: usize> Factor<W> {
             2 => self.scaled_few::<2, 5>(other, of, from, bits),
             3 => self.scaled_few::<3, 6>(other, of, from, bits),
             4 => self.scaled_few::<4, 7>(other, of, from, bits),
-            ..=SMALL => self.scaled::<{ SMALL + 3 }>(other, of, from, limbs, bits),
-            _ => self.scaled::<ROOM>(other, of, from, limbs, bits),
+            0..=SMALL => self.scaled::<{ SMALL + 3 }>(other, of, from, limbs, bits),
+            10..=MIDDLE => self.scaled::<{ MIDDLE + 3 }>(other, of, from, limbs, bits),
+            _ => self.scaled::<{ MOST + 3 }>(other, of, from, limbs, bits),
         }
     }
 

@@ -212,6 +212,7 @@ impl<const W: usize> Digits<W> {
             3 => Self::sum_in::<5>(a, b, is_difference, 3),
             4 => Self::sum_in::<6>(a, b, is_difference, 4),
             limbs @ ..=8 => Self::sum_in::<10>(a, b, is_difference, limbs),
+            limbs @ ..=MIDDLE => Self::sum_in::<{ MIDDLE + 2 }>(a, b, is_difference, limbs),
             limbs => Self::sum_in::<{ MOST + 2 }>(a, b, is_difference, limbs),
         }
     }
@@ -258,6 +259,8 @@ impl<const W: usize> Digits<W> {
 const TWO_64: f64 = 18_446_744_073_709_551_616.0;
 /// Limbs at most.
 pub const MOST: usize = 112;
+/// Limbs of the size between few and [`MOST`].
+pub const MIDDLE: usize = 24;
 
 /// Adds digits, and tells the carry.
 fn plus(place: &mut [u64], digits: &[u64]) -> bool {

@@ -247,3 +247,41 @@ fn what_is_not_finite_stays_so() {
     }
     assert!(Number::of(f64::INFINITY).partial_cmp(&Number::ONE).is_none());
 }
+
+/// Numbers of more limbs than a few, in every size of room: what fits in them is exact.
+#[test]
+fn whole_numbers_are_exact_at_any_length() {
+    let mut state = 0x9E37_79B9_7F4A_7C15_u64;
+    let mut next = || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state
+    };
+    let whole = |x: &Digits<MOST>| {
+        let digits = x.limb.iter().rev().flat_map(|&limb| [limb as u32, (limb >> 32) as u32]);
+        let digits = BigInt::from_slice(Sign::Plus, &digits.collect::<Vec<u32>>());
+        let digits = if x.is_negative() { -digits } else { digits };
+        if x.is_zero() { BigInt::from(0) } else { digits >> (64 * (MOST as i32 - x.exponent)) }
+    };
+    for limbs in (2..40).chain([64, MOST - 1, MOST]) {
+        let mut number = |is_negative| {
+            let mut half: Vec<u64> = (0..limbs / 2).map(|_| next()).collect();
+            // Sums of a few products fit as well.
+            half[0] = half[0] >> 2 | 1;
+            Digits::<MOST>::normalized(is_negative, (limbs / 2) as i32, MOST, &half).shortened(limbs)
+        };
+        let [a, b, c, d] = [false, true, true, false].map(&mut number);
+        let [exact_a, exact_b, exact_c, exact_d] = [&a, &b, &c, &d].map(whole);
+        assert_eq!(whole(&(a * b)), &exact_a * &exact_b, "{limbs} limbs");
+        assert_eq!(whole(&(a + b)), &exact_a + &exact_b, "{limbs} limbs");
+        assert_eq!(whole(&(a - b)), &exact_a - &exact_b, "{limbs} limbs");
+        let terms = [(a, b), (c, d), (b, c)];
+        let found = sum_of_products(terms.iter().map(|(a, b)| (a, b)));
+        assert_eq!(
+            whole(&found),
+            exact_a * &exact_b + &exact_c * exact_d + exact_b * exact_c,
+            "{limbs} limbs"
+        );
+    }
+}

@@ -42,7 +42,7 @@ use self::posture::DigitsCoordinates;
 use self::resting::Hold;
 use super::magnitude::changes;
 use super::plan::{RequestRefusal, check_forces_of_joints};
-use crate::arithmetic::digits::{Digits, MOST};
+use crate::arithmetic::digits::{Digits, MIDDLE, MOST};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Mechanism;
@@ -143,8 +143,7 @@ pub fn long_run(source: &DigitsSource, precision: Precision) -> Result<Box<dyn L
     match precision.room() {
         5 => Ok(Box::new(Runner::<5>::new(source, precision)?)),
         8 => Ok(Box::new(Runner::<8>::new(source, precision)?)),
-        16 => Ok(Box::new(Runner::<16>::new(source, precision)?)),
-        32 => Ok(Box::new(Runner::<32>::new(source, precision)?)),
+        MIDDLE => Ok(Box::new(Runner::<MIDDLE>::new(source, precision)?)),
         _ => Ok(Box::new(Runner::<MOST>::new(source, precision)?)),
     }
 }

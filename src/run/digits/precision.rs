@@ -1,6 +1,6 @@
 //! What a number of digits asks of numbers and series.
 
-use crate::arithmetic::digits::{MOST, limbs_for};
+use crate::arithmetic::digits::{MIDDLE, MOST, limbs_for};
 
 /// Digits a run may have.
 pub const DIGITS: std::ops::RangeInclusive<usize> = 20..=2000;
@@ -74,7 +74,7 @@ impl Precision {
 
     /// Room of numbers that hold so many limbs and one more: the sizes there is code for.
     pub(super) fn room(&self) -> usize {
-        let sizes = [5, 8, 16, 32, MOST];
+        let sizes = [5, 8, MIDDLE, MOST];
         sizes.into_iter().find(|&size| size > self.limbs).unwrap_or(MOST)
     }
 }
