@@ -93,6 +93,30 @@ fn operators_bind_as_in_mathematics() {
     assert_eq!(Formula::parse("a*b.c - a").expect("a formula").value(&[3.0, 5.0]), 12.0);
 }
 
+/// In all quadrants, and switched where it jumps: nowhere, where the second argument is positive whatever the
+/// names are.
+#[test]
+fn an_angle_is_that_of_the_standard_library_and_has_a_switch_where_it_can_jump() {
+    let angle = Formula::parse("atan2(a, b)").expect("a formula");
+    let sizes = [-3.0, -0.5, -1e-9, 0.0, 1e-9, 0.25, 2.0_f64];
+    for (y, x) in sizes.iter().flat_map(|&y| sizes.map(|x| (y, x))) {
+        let found = angle.value(&[y, x]);
+        assert!((found - y.atan2(x)).abs() < 1e-15, "atan2({y}, {x}) = {found}");
+    }
+    let switches = |text: &str| Formula::parse(text).expect(text).conditions();
+    for (text, expected) in [
+        ("atan2(a, b)", 2),
+        ("atan2(a, 2 + b)", 2),
+        ("atan2(a, cos(b) - 1)", 2),
+        ("atan2(a, -1)", 2),
+        ("atan2(a, 2 - cos(b))", 0),
+        ("atan2(a, 1 + sqrt(b) + c^2)", 0),
+        ("atan2(a, 3)", 0),
+    ] {
+        assert_eq!(switches(text), expected, "{text}");
+    }
+}
+
 /// A parameter that an event sets to 1 exactly: from 1 s on the torque gives the rotor 1 rad/s each second.
 #[test]
 fn a_flag_that_an_event_sets_is_equal_to_what_it_is_set_to() {

@@ -315,3 +315,70 @@ fn random_linkages_with_friction_in_their_joints_agree_between_methods() {
     );
     assert!(compared == count && transitions > count && resting > 0 && stopped > count / 8);
 }
+
+/// Mass \[kg\], place of the centre \[m\], moment of inertia about the hinge \[kg·m²\] and radius of the hinge
+/// \[m\] of [`lifted`].
+const LEVER: [f64; 4] = [2.0, 0.5, 0.2 + 2.0 * 0.25, 0.05];
+const FIELD: [f64; 2] = [9.81, -2.0];
+
+/// A bar whose end lies on a wall with friction and whose hinge has some, under a torque that grows with time.
+fn lifted(kinetic: f64, stiction: f64, until: f64) -> String {
+    let ([mass, centre, inertia, radius], [gx, gy]) = (LEVER, FIELD);
+    let own = inertia - mass * centre * centre;
+    format!(
+        r#"{{"name": "lifted", "gravity": [{gx}, {gy}],
+        "bars": [{{"name": "bar", "mass": {mass}, "centre": [{centre}, 0], "inertia": {own}, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}],
+            "friction": {{"radius": {radius}, "kinetic": {kinetic}, "static": {stiction}}}}}],
+        "walls": [{{"name": "W", "body": "bar", "point": [1, 0], "restitution": 0, "friction": {{"kinetic": 0.3}},
+            "line": {{"through": [0, 0], "normal": [0, 1]}}}}],
+        "torques": [{{"name": "T", "body": "bar", "torque": "1*t"}}],
+        "start": {{"bar": {{"phi": 0, "omega": 0}}}}, "until": {until}, "every": {until}}}"#
+    )
+}
+
+/// The angular acceleration while the hinge slips forward: the force that presses it depends on it.
+fn slipping(t: f64, phi: f64, omega: f64, kinetic: f64) -> f64 {
+    let ([mass, centre, inertia, radius], [gx, gy], (s, c)) = (LEVER, FIELD, phi.sin_cos());
+    let weight = mass * centre * (c * gy - s * gx);
+    let mut acceleration = 0.0;
+    for _ in 0..60 {
+        let x = -centre * (s * acceleration + omega * omega * c) - gx;
+        let y = centre * (c * acceleration - omega * omega * s) - gy;
+        acceleration = (t + weight - kinetic * radius * mass * x.hypot(y)) / inertia;
+    }
+    acceleration
+}
+
+/// What holds the end down ceases to press, the hinge takes the rest up to what it holds, and then lets go: one
+/// motion, not the one with the wall as well.
+#[test]
+fn a_bar_leaves_its_wall_where_the_friction_of_its_hinge_breaks() {
+    let until = 3.5;
+    for (kinetic, stiction) in [(0.2, 0.3), (0.2, 0.2)] {
+        let [mass, centre, _, radius] = LEVER;
+        let pressing = mass * FIELD[0].hypot(FIELD[1]);
+        let begin = -mass * centre * FIELD[1] + stiction * radius * pressing;
+        let (count, [mut phi, mut omega]) = (20_000, [0.0, 0.0]);
+        let h = (until - begin) / f64::from(count);
+        for i in 0..count {
+            let t = begin + f64::from(i) * h;
+            let rate = |share: f64, [a, b]: [f64; 2]| {
+                let (phi, omega) = (phi + share * h * a, omega + share * h * b);
+                [omega, slipping(t + share * h, phi, omega, kinetic)]
+            };
+            let one = rate(0.0, [0.0; 2]);
+            let two = rate(0.5, one);
+            let three = rate(0.5, two);
+            let four = rate(1.0, three);
+            let mean = |i: usize| (one[i] + 2.0 * (two[i] + three[i]) + four[i]) / 6.0;
+            (phi, omega) = (phi + h * mean(0), omega + h * mean(1));
+        }
+        assert!(phi > 0.05 && omega > 0.01, "{phi} {omega}");
+        for (name, outcome) in runs(&lifted(kinetic, stiction, until)) {
+            let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
+            println!("{name}, {stiction}: off by {off:?}");
+            assert!(off.iter().all(|off| off.abs() < 1e-9), "{name}: {off:?} of {phi} {omega}");
+        }
+    }
+}

@@ -321,3 +321,21 @@ fn the_column_of_a_redundant_lock_balances_the_forces_of_the_hinges() {
     }
     is_near(&inspected(&scene)["constraints"]["lock"]["torque"], rows[0][columns[0]]);
 }
+
+/// A point that lies on its wall at the start is pressed, and the hinge carries the rest: moments about both.
+#[test]
+fn a_point_at_rest_on_its_wall_is_held_at_the_start() {
+    let at = |body: &str, x: f64| json!({"body": body, "point": [x, 0]});
+    for fraction in [0.7, 1.0] {
+        let scene = hung(&json!({
+            "hinges": [{"name": "A", "between": [at("ground", 0.0), at("body", 0.0)]}],
+            "walls": [{"name": "W", "body": "body", "point": [fraction, 0], "restitution": 0.5,
+                       "line": {"through": [0, 0], "normal": [0, 1]}}],
+        }));
+        let found = inspected(&scene);
+        let pressing = 0.5 * WEIGHT / fraction;
+        is_near(&found["bodies"]["body"]["phi"], 0.0);
+        is_near(&found["hinges"]["A"]["force"][1], WEIGHT - pressing);
+        is_near(&found["constraints"]["W"]["multiplier"], -pressing);
+    }
+}

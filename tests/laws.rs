@@ -2,6 +2,7 @@
 
 use super::formulas::{adaptive, rotor, run, scene};
 use driftless::run::{MethodId, Outcome, Request};
+use driftless::stepping::Cause;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Moment of inertia of [`rotor`] \[kg·m²\].
@@ -131,6 +132,23 @@ fn quadratic_drag_is_a_logarithm() {
 }
 
 /// A free bar falls onto a spring that only pushes: parabolas and sines in turn.
+/// Where a law has no slope its series has no powers: the method stops there, at a state of numbers.
+#[test]
+fn a_series_without_powers_ends_the_motion_at_its_last_state() {
+    let law = "-1*sign(bar.phi)*sqrt(abs(bar.phi))";
+    let scene = scene(&rotor([0.01, 0.0], 1.0, &torque(law)));
+    let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-9));
+    let stop = outcome.stop.expect("a stop");
+    // φ'' = -sqrt(φ)/I from φ0 at rest: t = ∫ dφ / sqrt(4/3 (φ0^1.5 - φ^1.5)/I) = sqrt(3 I/4) φ0^(1/4) B.
+    let beta = (0..200_000).map(|i| (f64::from(i) + 0.5) / 200_000.0).map(|s: f64| {
+        // u = 1 - s²: the integrand 2 s / sqrt(1 - u^1.5) has no corner there.
+        2.0 * s / (1.0 - (1.0 - s * s).powf(1.5)).sqrt() / 200_000.0
+    });
+    let expected = (0.75 * INERTIA).sqrt() * 0.01_f64.powf(0.25) * beta.sum::<f64>();
+    assert!((stop.t - expected).abs() < 1e-5, "{} {expected}", stop.t);
+    assert!(outcome.last.phi[0].abs() < 1e-6 && outcome.last.omega[0].is_finite(), "{:?}", outcome.last);
+}
+
 #[test]
 fn a_bar_bounces_on_a_spring_that_only_pushes() {
     let (mass, k, height, until) = (0.5_f64, 300.0_f64, 0.4_f64, 4.0_f64);
@@ -517,6 +535,65 @@ fn a_torque_by_an_angle_jumps_where_it_is_cut() {
         let outcome = run(&scene(&text), &adaptive(method, 1e-12));
         let off = [outcome.last.phi[0] - phi - TAU * turns, outcome.last.omega[0] - omega];
         println!("{method:?}: {off:?} {:?}", outcome.statistics);
-        assert!(off[0].abs().max(off[1].abs()) < 1e-7, "{method:?}: {off:?}");
+        assert!(off[0].abs().max(off[1].abs()) < 1e-10, "{method:?}: {off:?}");
+    }
+}
+
+/// A torque that the jump of an angle drives back onto itself from either side holds the motion there.
+#[test]
+fn a_torque_that_an_angle_drives_back_onto_its_jump_is_said_to_slide() {
+    let text = rotor([0.0, 1.0], 2.0, &torque("-1*atan2(bar.omega, -1)"));
+    // I ω' = -(π - arctan ω): the time to ω = 0 is ∫ I dω / (π - arctan ω).
+    let count = 100_000;
+    let pieces = (0..count).map(|i| (f64::from(i) + 0.5) / f64::from(count));
+    let time = pieces.map(|omega| INERTIA / (PI - omega.atan()) / f64::from(count)).sum::<f64>();
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5), MethodId::Dopri5] {
+        let outcome = run(&scene(&text), &adaptive(method, 1e-11));
+        let stop = outcome.stop.expect("a stop");
+        println!("{method:?}: {stop:?}");
+        assert_eq!(stop.cause, Cause::Sliding, "{method:?}: {stop:?}");
+        assert!((stop.t - time).abs() < 1e-8, "{method:?}: {} {time}", stop.t);
+        assert!(outcome.statistics.steps < 500, "{method:?}: {:?}", outcome.statistics);
+    }
+}
+
+/// The direction of a point's velocity jumps from π to -π where it crosses the axis below zero; where its other
+/// part passes zero nothing does, whatever the accelerations on the branches are.
+#[test]
+fn a_force_by_the_direction_of_a_velocity_jumps_at_half_a_turn_alone() {
+    // Two equal rotors whose rates (a, b) turn about zero: a' = -b + 0.1 angle, b' = a.
+    let text = r#"{"name": "two", "gravity": [0, 0],
+        "bars": [{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 1}, {"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "ground", "point": [1, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "torques": [{"name": "T", "body": "a", "torque": "-1*b.omega + 0.1*atan2(b.omega, a.omega)"},
+            {"name": "U", "body": "b", "torque": "1*a.omega"}],
+        "start": {"a": {"phi": 0, "omega": 1}, "b": {"phi": 0, "omega": 0.1}}, "until": 9, "every": 9}"#;
+    // In polar coordinates r and s of (a, b): r' = 0.1 s cos s, s' = 1 - 0.1 s sin(s)/r.
+    let by_hand = |_: f64, y: &[f64; 2]| {
+        let pull = 0.1 * y[1];
+        [pull * y[1].cos(), 1.0 - pull * y[1].sin() / y[0]]
+    };
+    let (mut state, mut t, mut turns) = ([1.01_f64.sqrt(), 0.1_f64.atan2(1.0)], 0.0, 0);
+    // Up to the jump at s = π, then on from -π, by steps that end there by Newton's iteration.
+    while t < 9.0 {
+        let mut h = 1e-4_f64.min(9.0 - t);
+        let mut next = rk4(state, h, 1, by_hand);
+        if next[1] > PI {
+            for _ in 0..8 {
+                h += (PI - next[1]) / by_hand(0.0, &next)[1];
+                next = rk4(state, h, 1, by_hand);
+            }
+            (next[1], turns) = (next[1] - TAU, turns + 1);
+        }
+        (state, t) = (next, t + h);
+    }
+    assert_eq!(turns, 1);
+    let expected = [state[0] * state[1].cos(), state[0] * state[1].sin()];
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = run(&scene(text), &adaptive(method, 1e-12));
+        let off = [outcome.last.omega[0] - expected[0], outcome.last.omega[1] - expected[1]];
+        println!("{method:?}: {off:?}, {:?} {:?}", outcome.stop, outcome.statistics);
+        assert!(outcome.stop.is_none() && off[0].abs().max(off[1].abs()) < 1e-10, "{method:?}: {off:?}");
     }
 }

@@ -363,7 +363,14 @@ const REFUSALS: &[(&str, &str, &str, &str, &str)] = &[
         "[0, 0]}, {\"body\": \"bar1\", \"point\": [0, 0]",
         "{\"name\": \"spring\"",
         "springs[0]",
-        "starts with length 0",
+        "starts with length 0 and has the free length",
+    ),
+    (
+        "[-0.3, 0]}, {\"body\": \"bar1\", \"point\": [0.4, 0]}], \"stiffness\": 7, \"free_length\": 0.4",
+        "[0, 0]}, {\"body\": \"bar1\", \"point\": [0, 0]}], \"stiffness\": 7, \"free_length\": 0, \"damping\": 0.1",
+        "{\"name\": \"spring\"",
+        "springs[0]",
+        "starts with length 0 and has the damping",
     ),
     (
         "\"normal\": [3, 4]",

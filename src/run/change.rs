@@ -122,8 +122,8 @@ impl ContactDriver {
                         *mode = there;
                     }
                 }
-            } else if let Some(mode) = flips.and_then(|number| modes.get_mut(number)) {
-                *mode = !*mode;
+            } else if let (Some(number), Some(events)) = (flips, &self.events) {
+                events.flip(number, &after, &mut modes);
             }
             match self.whole.on_branch(next, modes) {
                 Ok(whole) => self.whole = Arc::new(whole),

@@ -1,8 +1,10 @@
 //! Events of scenes and from outside the crate: conditions on the motion, and what happens where they come
 //! true.
 //!
-//! The module `detector` looks for them in every step, `search` locates them on its dense output.
+//! The module `detector` looks for them in every step, `search` locates them on its dense output; `branches`
+//! are those of laws that an event changes.
 
+mod branches;
 mod detector;
 mod search;
 

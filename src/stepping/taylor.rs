@@ -309,7 +309,9 @@ impl<T: Coefficient> Taylor<T> {
         expansion.expand(problem.mechanism(), state);
         // What a wall sees of the motion are the unit vectors.
         let mut wanted = expansion.wanted(self.tolerance, problem.events() > 0);
-        wanted = wanted.min(walls_known(problem.mechanism(), state.time, expansion.series()));
+        let known = walls_known(problem.mechanism(), state.time, expansion.series());
+        // A step that is not a number stays one.
+        wanted = if known < wanted { known } else { wanted };
         wanted = expansion.until_reversal(wanted);
         if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
             let singular_passage = self.singular_passage.get_or_insert_with(|| {

@@ -172,8 +172,8 @@ impl Tape {
     }
 
     /// True where its powers at one time may say nothing of what it is a little later: of exponentials,
-    /// hyperbolic tangents and quotients by what is no constant, which may be flat, of roots, which nearly
-    /// have a corner where their argument is nearly zero, and of angles, which jump by 2π.
+    /// hyperbolic tangents and quotients by what is no constant, which may be flat, and of roots and angles,
+    /// which nearly have a corner or a jump where their arguments are nearly zero.
     pub fn needs_confirmation(&self) -> bool {
         self.operations.iter().any(|operation| match *operation {
             Operation::Exponential(_)

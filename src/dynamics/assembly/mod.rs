@@ -193,7 +193,7 @@ impl Mechanism {
         let (start, size) = (self.start(scene), self.size_of_parts());
         let mut z = vec![Complex::ZERO; self.coordinates()];
         self.tree.unit_vectors::<DoubleDouble, 0>(&start.phi, &mut z);
-        for spring in self.springs.iter().filter(|spring| spring.free_length > 0.0) {
+        for spring in self.springs.iter().filter(|spring| spring.needs_length()) {
             let span = spring.span.position(&z);
             if span.norm_squared().hi.sqrt() <= SAME * size {
                 return Err(CompileError::SpringWithoutLength(spring.name.clone()));

@@ -73,10 +73,10 @@ pub enum CompileError {
         /// What to give, so that the first of them is told from all others.
         advice: String,
     },
-    /// A spring with a free length starts without a direction.
+    /// A spring with a free length or a damper starts without a direction.
     #[error(
-        "spring `{0}` starts with length 0 and has a free length\nhint: its force has no direction there; \
-            start elsewhere, move an end, or set free_length to 0"
+        "spring `{0}` starts with length 0 and has a free length or damping\nhint: its force has no direction \
+            there; start elsewhere, move an end, or set both to 0"
     )]
     SpringWithoutLength(String),
     /// A rigid spring that vibrates is not the only constraint.

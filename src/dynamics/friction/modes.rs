@@ -121,6 +121,14 @@ pub struct ContactSigns {
     pub load: Vec<f64>,
 }
 
+/// A motion that fits modes.
+struct FittingMotion {
+    /// Accelerations of all coordinates.
+    load: Vec<f64>,
+    /// True where a closed contact does not press.
+    ceases: bool,
+}
+
 /// What is known of a moment in the numbers of a run.
 pub trait Evidence {
     /// The relative velocity \[rad/s, m/s\] of every place, zero where it is rounding.
@@ -174,7 +182,7 @@ impl Mechanism {
     ) -> Result<Modes, Paradox> {
         let rates = evidence.rates();
         let pushed = self.pushed(at, before, staying, transition);
-        let mut found: Option<(Modes, Vec<f64>)> = None;
+        let mut found: Option<(Modes, FittingMotion)> = None;
         let mut looked_at = 0;
         for closed in subsets(staying, touching) {
             let rates = self.rates_beside(evidence, at, &closed, &rates);
@@ -196,12 +204,17 @@ impl Mechanism {
             }
             let known = PlaceRates { rates: &rates, pushed: &pushed, arrived: transition.arrived };
             let fit = combinations(&options).into_iter().find_map(|modes| {
-                let load = self.fits(evidence, at, &closed, &modes, touching, known)?;
-                Some(((closed.clone(), modes), load))
+                let motion = self.fits(evidence, at, &closed, &modes, touching, known)?;
+                Some(((closed.clone(), modes), motion))
             });
             found = match (fit, found) {
-                (Some(fit), Some(known)) if !are_alike(&fit.1, &known.1) => {
-                    return Err(Paradox::Indeterminate);
+                (Some(fit), Some(known)) if !are_alike(&fit.1.load, &known.1.load) => {
+                    // What a wall holds that just ceases to press ends there.
+                    match (fit.1.ceases, known.1.ceases) {
+                        (false, true) => Some(fit),
+                        (true, false) => Some(known),
+                        _ => return Err(Paradox::Indeterminate),
+                    }
                 }
                 // Where a wall just ceases to press, the motion is the same with it and without.
                 (Some(fit), Some(known)) if fit.0.0.len() < known.0.0.len() => Some(fit),
@@ -216,10 +229,10 @@ impl Mechanism {
         found.map(|(modes, _)| modes).ok_or(Paradox::Inconsistent)
     }
 
-    /// The mechanism in the modes of its start, contacts held that stay; `None` where it has no friction, or
-    /// no modes fit.
+    /// The mechanism in the modes of its start, contacts held that stay; `None` where nothing holds it and it
+    /// has no friction, or no modes fit.
     pub fn moving_at_start(&self, start: &Motion) -> Option<Self> {
-        if self.frictions.is_empty() {
+        if self.frictions.is_empty() && self.contacts.is_empty() {
             return None;
         }
         let [phi, omega] = start.rounded();
@@ -231,6 +244,9 @@ impl Mechanism {
         };
         let touching: Vec<usize> = (0..self.contacts.len()).filter(is_still).collect();
         let staying = self.staying(&touching, start.time, &phi, &omega)?;
+        if self.frictions.is_empty() {
+            return (!staying.is_empty()).then(|| self.holding(&staying));
+        }
         let at = FrictionMoment { t: start.time, phi: &phi, z: &z, omega: &omega };
         let (contacts, modes) =
             self.modes_at(at, &self.modes, [&staying, &touching], Transition::default()).ok()?;
@@ -290,7 +306,7 @@ impl Mechanism {
         self.frictions.iter().enumerate().map(of).collect()
     }
 
-    /// The accelerations in these modes, where they and the forces are such as the modes claim.
+    /// The motion in these modes, where it and the forces are such as the modes claim.
     fn fits(
         &self,
         evidence: &dyn Evidence,
@@ -299,7 +315,7 @@ impl Mechanism {
         modes: &[FrictionMode],
         touching: &[usize],
         PlaceRates { rates, pushed, arrived }: PlaceRates,
-    ) -> Option<Vec<f64>> {
+    ) -> Option<FittingMotion> {
         let told = evidence.told(closed, modes, touching)?;
         // At walls the pressure has a sign, which tells; the force of joints and rails may have either.
         let at_walls = self.frictions.iter().zip(modes).all(|(friction, mode)| {
@@ -330,7 +346,7 @@ impl Mechanism {
             }
             FrictionMode::Strained(strain) => is_held(number) && is_still(number, *strain == 0.0),
         });
-        fit.then_some(told.load)
+        fit.then(|| FittingMotion { ceases: told.pressures.contains(&0), load: told.load })
     }
 }
 

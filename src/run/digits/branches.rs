@@ -80,11 +80,19 @@ impl<const W: usize> BranchConditions<W> {
     pub fn others(&self, motion: &DigitsMotion<W>, step: f64) -> Option<Vec<bool>> {
         let known = &motion.mechanism.acting.modes;
         let rounding = motion.precision.rounding(SURE);
-        let mode = |(powers, &mode): (&Vec<Digits<W>>, &bool)| {
-            let side = Condition::new(powers, step, rounding).side;
-            if side == 0 { mode } else { side > 0 }
+        let conditions = self.functions.powers.iter().map(|powers| Condition::new(powers, step, rounding));
+        let conditions: Vec<Condition> = conditions.collect();
+        // Those that are not at their zeros first: what the others do next depends on them.
+        let is_other = |(condition, &mode): (&Condition, &bool)| {
+            !condition.is_at_zero && condition.side != 0 && mode != (condition.side > 0)
         };
-        let modes: Vec<bool> = self.functions.powers.iter().zip(known).map(mode).collect();
+        let has_clear = conditions.iter().zip(known).any(is_other);
+        let mode = |(condition, &mode): (&Condition, &bool)| match condition.side {
+            0 => mode,
+            _ if has_clear && condition.is_at_zero => mode,
+            side => side > 0,
+        };
+        let modes: Vec<bool> = conditions.iter().zip(known).map(mode).collect();
         (modes != known[..modes.len()]).then_some(modes)
     }
 

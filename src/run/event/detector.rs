@@ -63,8 +63,8 @@ impl EventMemory {
 pub(in crate::run) struct EventDetector {
     events: Vec<Box<dyn Event>>,
     /// The scene's formulas on their present branches.
-    laws: Option<Laws>,
-    mechanism: Arc<Mechanism>,
+    pub(super) laws: Option<Laws>,
+    pub(super) mechanism: Arc<Mechanism>,
     /// Where places stick and slide.
     pub friction: Option<FrictionWatch>,
     pub memory: EventMemory,
@@ -152,8 +152,12 @@ impl EventDetector {
 
     /// How many belong to the scene's events, those from outside and the conditions of laws.
     pub(super) fn before_friction(&self) -> usize {
-        let conditions = self.laws.as_ref().map_or(0, |laws| laws.modes.len());
-        self.of_the_scene() + self.events.len() + conditions
+        self.before_conditions() + self.laws.as_ref().map_or(0, |laws| laws.modes.len())
+    }
+
+    /// How many belong to the scene's events and those from outside.
+    pub(super) fn before_conditions(&self) -> usize {
+        self.of_the_scene() + self.events.len()
     }
 
     /// How many functions there are.
@@ -178,7 +182,7 @@ impl EventDetector {
 
     /// What a function belongs to.
     pub(super) fn owner(&self, function: usize) -> Owner<'_> {
-        let (scene, conditions) = (self.of_the_scene(), self.of_the_scene() + self.events.len());
+        let (scene, conditions) = (self.of_the_scene(), self.before_conditions());
         if let (Some(watch), Some(number)) = (&self.friction, self.friction_function(function)) {
             return Owner::Friction(watch, number);
         }
@@ -328,18 +332,6 @@ impl EventDetector {
                 None => due.push((event, rises)),
             }
         }
-    }
-
-    /// Which conditions are at their zeros, to rounding, before and after the motion changes and parameters
-    /// are set.
-    pub fn conditions_at_zero(&self, [before, after]: [&Motion; 2], set: &[f64]) -> Vec<bool> {
-        let Some(Laws { formulas, parameters, modes }) = &self.laws else { return Vec::new() };
-        let values = |motion: &Motion, parameters: &[f64]| {
-            self.mechanism.seen(motion, |at| formulas.condition_values(at, parameters, modes))
-        };
-        let largest = self.memory.largest.iter().skip(self.of_the_scene() + self.events.len());
-        let values = values(before, parameters).into_iter().zip(values(after, set));
-        values.zip(largest).map(|((a, b), largest)| a.abs().max(b.abs()) <= NO_VALUE * largest).collect()
     }
 
     /// Takes what functions change by in one unit of a coordinate or rate for their magnitude, those not seen

@@ -42,15 +42,17 @@ impl BarPositions {
 
 /// Refuses a spring without a direction.
 pub(super) fn springs(posture: &BarPositions, springs: &[Spring], places: &[At]) -> Result<(), SceneError> {
-    for (Spring { name, between: [a, b], free_length, .. }, at) in springs.iter().zip(places) {
+    for (Spring { name, between: [a, b], free_length, damping, .. }, at) in springs.iter().zip(places) {
         let ((from, way_from), (to, way_to)) = (posture.at(*a), posture.at(*b));
         let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
-        if *free_length > 0.0 && length <= SAME * (way_from + way_to) {
-            let problem =
-                format!("(spring `{name}`) starts with length 0 and has the free length {free_length} m");
-            let hint =
-                "its force has no direction there; start elsewhere, move an end, or set free_length to 0";
-            return Err(at.refuse(&problem, "such a spring must start with a positive length", hint));
+        if (*free_length > 0.0 || *damping > 0.0) && length <= SAME * (way_from + way_to) {
+            let (part, hint) = match *free_length > 0.0 {
+                true => (format!("free length {free_length} m"), "set free_length to 0"),
+                false => (format!("damping {damping} N s/m"), "set damping to 0"),
+            };
+            let problem = format!("(spring `{name}`) starts with length 0 and has the {part}");
+            let hint = format!("its force has no direction there; start elsewhere, move an end, or {hint}");
+            return Err(at.refuse(&problem, "such a spring must start with a positive length", &hint));
         }
     }
     Ok(())

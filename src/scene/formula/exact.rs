@@ -22,7 +22,9 @@ impl<C: Decimal> Numbers<C> {
     pub fn of(formula: &Formula, tables: &[PointTable<C>]) -> Self {
         let number = |(&node, &(start, end)): (&Node, &(u32, u32))| match node {
             Node::Number(value) => {
-                written(&formula.text[start as usize..end as usize]).unwrap_or_else(|| C::of(value))
+                // What is not written stands for a part of a function.
+                written(&formula.text[start as usize..end as usize])
+                    .unwrap_or_else(|| if value == PI { C::pi() } else { C::of(value) })
             }
             _ => C::ZERO,
         };

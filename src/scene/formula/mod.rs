@@ -324,6 +324,34 @@ impl Formula {
         }
     }
 
+    /// Bounds of what an operation comes to, whatever its names are.
+    fn range(&self, node: usize) -> [f64; 2] {
+        if let Some(value) = self.constants[node] {
+            return [value; 2];
+        }
+        match self.nodes[node] {
+            Node::Negative(a) => {
+                let [least, most] = self.range(a);
+                [-most, -least]
+            }
+            Node::Sum(a, b) => {
+                let (a, b) = (self.range(a), self.range(b));
+                [a[0] + b[0], a[1] + b[1]]
+            }
+            Node::Difference(a, b) => {
+                let (a, b) = (self.range(a), self.range(b));
+                [a[0] - b[1], a[1] - b[0]]
+            }
+            Node::Sine(_) | Node::Cosine(_) | Node::HyperbolicTangent(_) => [-1.0, 1.0],
+            Node::Root(_) | Node::Exponential(_) => [0.0, f64::INFINITY],
+            Node::Power(_, b) if self.constants[b].is_some_and(|power| power % 2.0 == 0.0) => {
+                [0.0, f64::INFINITY]
+            }
+            Node::Flip(condition, a) if self.conditions[condition] == a => [0.0, f64::INFINITY],
+            _ => [f64::NEG_INFINITY, f64::INFINITY],
+        }
+    }
+
     /// Adds an operation that stands at bytes `place`, and what it comes to where all it takes is constant.
     fn push(&mut self, node: Node, place: (usize, usize)) -> usize {
         let is_open = matches!(node, Node::Name(_) | Node::Flip(..) | Node::Select(..) | Node::Table(..));

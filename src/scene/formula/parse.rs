@@ -2,6 +2,7 @@
 
 use super::unit::{Dimension, Unit, find};
 use super::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant, LONGEST, Node, meant};
+use std::f64::consts::PI;
 
 /// How strongly a sign binds: more than `*`, less than `^`.
 const SIGN: u8 = 5;
@@ -345,7 +346,7 @@ impl<'a> Parser<'a> {
             "cos" => Node::Cosine(first),
             "tan" => Node::Tangent(first),
             "tanh" => Node::HyperbolicTangent(first),
-            "atan2" => Node::Angle(first, last),
+            "atan2" => return Ok(self.angle(first, last, (start, end))),
             "pow" => Node::Power(first, last),
             "abs" => Node::Flip(self.condition(first), first),
             "sign" => {
@@ -363,6 +364,27 @@ impl<'a> Parser<'a> {
             _ => Node::Select(self.condition(first), arguments[1], last),
         };
         Ok(self.push(node, start, end))
+    }
+
+    /// The angle of (x, y), whose jump is a condition: where x < 0 it is that of (-x, -y) and half a turn, up
+    /// or down by the sign of y, which chooses nothing elsewhere.
+    fn angle(&mut self, y: usize, x: usize, (start, end): (usize, usize)) -> usize {
+        let plain = Node::Angle(y, x);
+        if self.formula.range(x)[0] > 0.0 {
+            return self.push(plain, start, end);
+        }
+        let [under, left] = [y, x].map(|node| self.push(Node::Negative(node), start, end));
+        let is_left = self.condition(left);
+        let nowhere = self.push(Node::Number(-1.0), start, end);
+        let under_left = self.push(Node::Select(is_left, under, nowhere), start, end);
+        let is_under_left = self.condition(under_left);
+        let half = self.push(Node::Number(PI), start, end);
+        self.formula.units.push((half, Dimension::NONE));
+        let down = self.push(Node::Flip(is_under_left, half), start, end);
+        let turned = self.push(Node::Angle(under, left), start, end);
+        let on_the_left = self.push(Node::Difference(turned, down), start, end);
+        let on_the_right = self.push(plain, start, end);
+        self.push(Node::Select(is_left, on_the_left, on_the_right), start, end)
     }
 
     /// The right side of a comparison, if one stands here: what is positive where it holds; with true beside
