@@ -101,16 +101,11 @@ impl AssemblyProblem<'_> {
         let mut matrix = self.jacobian(q, rows);
         self.add_aims(&mut matrix, aims, q);
         let mut asked = Vec::new();
-        for _ in missing {
-            let open = matrix.svd().open(q.len(), DEPENDENT);
-            let most = missing.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b]));
-            let Some(k) = most.filter(|&k| open[k] > OPEN) else { break };
+        for k in matrix.svd().to_fix(q.len(), DEPENDENT, missing, OPEN) {
             let place = self.place(k, what);
             if !asked.contains(&place) {
                 asked.push(place);
             }
-            matrix.entries.extend((0..q.len()).map(|j| f64::from(u8::from(j == k))));
-            matrix.rows += 1;
         }
         if asked.is_empty() { Ok(()) } else { Err(CompileError::Undetermined(asked)) }
     }

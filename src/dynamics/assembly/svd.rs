@@ -229,6 +229,33 @@ impl Svd {
         }
         open
     }
+
+    /// Of these columns as many as must be fixed for the rows to leave none of them open by more than `most`,
+    /// each time the one that is most open: pivots of Cholesky's factor of the projector 1 - Σ v vᵀ onto
+    /// the open directions.  Singular values below `least` count as zero.
+    pub fn to_fix(&self, columns: usize, least: f64, among: &[usize], most: f64) -> Vec<usize> {
+        let mut open = self.open(columns, least);
+        // Unit vectors of what is fixed by the rows, and then by the columns found.
+        let mut fixed: Vec<Vec<f64>> =
+            self.triples.iter().filter(|triple| triple.0 > least).map(|triple| triple.2.clone()).collect();
+        let mut found = Vec::new();
+        for _ in among {
+            let next = among.iter().copied().max_by(|&a, &b| open[a].total_cmp(&open[b]));
+            let Some(k) = next.filter(|&k| open[k] > most) else { break };
+            let mut unit = vec![0.0; columns];
+            unit[k] = 1.0;
+            for known in fixed.iter().filter(|known| known[k] != 0.0) {
+                let share = known[k];
+                unit.iter_mut().zip(known).for_each(|(x, known)| *x -= share * known);
+            }
+            let length = open[k].sqrt();
+            unit.iter_mut().for_each(|x| *x /= length);
+            open.iter_mut().zip(&unit).for_each(|(open, x)| *open -= x * x);
+            fixed.push(unit);
+            found.push(k);
+        }
+        found
+    }
 }
 
 /// Which of the rows, from the first on, are no combination of those before; what is left of a row counts as
@@ -354,5 +381,15 @@ mod tests {
         let open = a.svd().open(5, 1e-9);
         assert_eq!(open[4], 1.0);
         assert!((open.iter().sum::<f64>() - 3.0).abs() < 1e-14, "5 columns less rank 2: {open:?}");
+        // Each column asked for is the most open one beside the rows and those before.
+        let fixed = a.svd().to_fix(5, 1e-9, &[0, 1, 2, 3, 4], 1e-6);
+        assert_eq!((fixed.len(), fixed[0]), (3, 4), "{fixed:?}");
+        for &k in &fixed {
+            let open = a.svd().open(5, 1e-9);
+            assert!(open.iter().all(|other| *other <= open[k] + 1e-13), "{open:?} {k}");
+            a.entries.extend((0..5).map(|j| f64::from(u8::from(j == k))));
+            a.rows += 1;
+        }
+        assert!(a.svd().open(5, 1e-9).iter().all(|open| open.abs() < 1e-13));
     }
 }
