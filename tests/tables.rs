@@ -62,4 +62,23 @@ fn points_that_are_not_passed_cost_no_steps() {
     assert_eq!(few.statistics.steps, many.statistics.steps);
     let refusal = parse_scene(&far(1_000_000), "test", &[]).expect_err("too many").to_string();
     assert!(refusal.contains("1000002 points") && refusal.contains("2 to 1000000"), "{refusal}");
+    assert!(refusal.contains("thin it out"), "{refusal}");
+}
+
+/// A table needs two points, in the scene or in a file: no hint to have fewer of them.
+#[test]
+fn too_few_points_are_to_become_more() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("none.csv"), "").expect("a file");
+    let file = folder.path().join("scene.json").display().to_string();
+    for (points, says) in [
+        ("[]", "tables.f has 0 points:"),
+        ("[[1, 2]]", "tables.f has 1 point:"),
+        ("\"none.csv\"", "tables.f has 0 points in "),
+    ] {
+        let text = rotor("1*f(bar.phi)", &format!("\"tables\": {{\"f\": {points}}},"));
+        let refusal = parse_scene(&text, &file, &[]).expect_err("too few").to_string();
+        assert!(refusal.contains(says) && refusal.contains("add points"), "{refusal}");
+        assert!(!refusal.contains("thin it out"), "{refusal}");
+    }
 }

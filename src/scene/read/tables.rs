@@ -49,19 +49,25 @@ fn refused(at: &At) -> SceneError {
     at.refuse_value(&FieldShape::Tables.allowed(), HINT)
 }
 
-/// Refuses a number of points.
-fn counted(table: &At, count: usize) -> Result<(), SceneError> {
+/// Refuses a number of points; `source` is where they are from, ` in gust.csv`, or empty.
+fn counted(table: &At, count: usize, source: &str) -> Result<(), SceneError> {
     let [least, most] = POINTS;
     if (least..=most).contains(&count) {
         return Ok(());
     }
-    let hint = "thin it out, or write a formula";
-    Err(table.refuse(&format!("has {count} points"), &FieldShape::Tables.allowed(), hint))
+    let hint = if count < least {
+        "add points: a curve needs two; what is constant is a number or a parameter"
+    } else {
+        "thin it out, or write a formula"
+    };
+    let points = if count == 1 { "point" } else { "points" };
+    let problem = format!("has {count} {points}{source}");
+    Err(table.refuse(&problem, &FieldShape::Tables.allowed(), hint))
 }
 
 /// Points written in the scene.
 fn listed(table: &At, nodes: &[Located]) -> Result<Vec<[f64; 2]>, SceneError> {
-    counted(table, nodes.len())?;
+    counted(table, nodes.len(), "")?;
     let mut points: Vec<[f64; 2]> = Vec::with_capacity(nodes.len());
     for (number, node) in nodes.iter().enumerate() {
         let item = table.item(node, number);
@@ -136,7 +142,7 @@ fn from_file(table: &At, name: &str, columns: Option<[&str; 2]>) -> Result<Vec<[
         }
         points.push([x, y]);
     }
-    counted(table, points.len())?;
+    counted(table, points.len(), &format!(" in {shown}"))?;
     Ok(points)
 }
 
