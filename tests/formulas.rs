@@ -81,6 +81,8 @@ fn operators_bind_as_in_mathematics() {
         ("if(1 >= 2, 3, 4) + if(1 <= 2, 10, 20)", 14.0),
         ("if(2 >= 1, 3, 4) + if(2 <= 1, 10, 20)", 23.0),
         ("if(1 > 1, 3, 4) + if(1 < 1, 10, 20)", 24.0),
+        // A number for a condition.
+        ("if(0.1, 3, 4) + if(0, 10, 20) + if(-2, 100, 200)", 223.0),
         ("10 rad*s^-1", 10.0),
         ("3 mm^-2", 3e6),
         ("2 m/s^-1", 2.0),
@@ -223,6 +225,11 @@ fn refusals_in_scenes_name_the_place() {
     assert!(through.contains("depends on s, which depends on t"), "{through}");
     let part = with(r#""events": [{"name": "E", "when": "bar.phi", "off": ["sprnig"]}]"#);
     assert!(part.contains("events[0].off[0]"), "{part}");
+    let twice = with(
+        r#""torques": [{"name": "T", "body": "bar", "torque": 1}, {"name": "U", "body": "bar", "torque": 1}],
+        "events": [{"name": "E", "when": "bar.phi", "on": ["T"], "off": ["U", "T"]}]"#,
+    );
+    assert!(twice.contains("events[0].off[1] = \"T\"") && twice.contains("does not switch on"), "{twice}");
 }
 
 #[test]

@@ -178,6 +178,18 @@ pub(super) fn event(fields: &Fields, name: String) -> Result<SceneEvent, SceneEr
     })
 }
 
+/// Refuses a part that an event switches on and off at once.
+fn check_on_and_off(event: &SceneEvent, at: &At) -> Result<(), SceneError> {
+    let Some(off) = at.child("off") else { return Ok(()) };
+    let Value::List(nodes) = &off.node.value else { return Ok(()) };
+    let both = nodes.iter().zip(&event.off).position(|(_, part)| event.on.contains(part));
+    both.map_or(Ok(()), |number| {
+        let allowed = "must be a part that the event does not switch on";
+        let hint = "leave it in `on` or in `off`; a later change takes another event";
+        Err(off.item(&nodes[number], number).refuse_value(allowed, hint))
+    })
+}
+
 /// A list of names.
 pub(super) fn names(at: &At) -> Result<Vec<String>, SceneError> {
     let hint = "for example [\"latch\"]";
@@ -330,6 +342,7 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Valued]) -> 
         judge(&found(at.child("when")), &event.when, &scope, None)?;
         at.child("on").map_or(Ok(()), |list| parts.check(&list))?;
         at.child("off").map_or(Ok(()), |list| parts.check(&list))?;
+        check_on_and_off(event, &at)?;
         for (name, text) in &event.set {
             let value = found(at.child("set").and_then(|set| set.child(name)));
             let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
