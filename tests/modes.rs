@@ -595,3 +595,127 @@ fn assemblies_that_nothing_moves_are_left() {
     let down = lowest(&found);
     assert!((down.modes[0].frequency / f64::sqrt(square) - 1.0).abs() < 1e-9, "{down:?} {square}");
 }
+
+/// A bar that hangs along x in gravity g, with more parts.
+fn hanging(gravity: f64, parts: &str) -> Scene {
+    parsed(&format!(
+        r#"{{"name": "hanging", "gravity": [{gravity}, 0],
+        "bars": [{{"name": "a", "mass": 2, "centre": [0.5, 0], "inertia": 0.2, "length": 1}}],
+        "hinges": [{{"name": "A", "between":
+            [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}}],
+        {parts},
+        "start": {{"a": {{"phi": 0.02, "omega": 0}}}}, "until": 3, "every": 0.05}}"#
+    ))
+}
+
+fn coil(torque: &str) -> String {
+    format!(r#""torsion_springs": [{{"name": "c", "body": "a", "torque": "{torque}"}}]"#)
+}
+
+/// The equilibrium at which the bar hangs down.
+fn down(scene: &Scene) -> Equilibrium {
+    let near = |one: &Equilibrium| one.phi[0].abs() < 0.2;
+    found(scene, 16).equilibria.into_iter().find(near).unwrap_or_else(|| panic!("{scene:?}"))
+}
+
+/// Where the slopes of a torque differ on both sides of an equilibrium, in the angle or in the rate, or are
+/// none, there are no modes.
+#[test]
+fn an_equilibrium_on_a_corner_has_no_modes() {
+    for torque in [
+        "if(angle < 0, 0, 5*angle)",
+        "max(0, 5*angle)",
+        "max(5*angle, 4*angle)",
+        "3*angle + 0.1*sign(rate)",
+        "3*angle + 0.2*abs(rate)",
+        "2*angle*sign(rate)",
+        "3*angle + 0.1*sqrt(rate*rate)",
+        "max(1*angle, 1*rate)",
+    ] {
+        let one = down(&hanging(9.81, &coil(torque)));
+        assert!(one.is_on_corner && one.modes.is_empty() && !one.is_family, "{torque}: {one:?}");
+        assert_eq!(one.stability, Stability::Undecided, "{torque}");
+    }
+    // An infinite slope, found from where it is.
+    let mut steep = hanging(9.81, &coil("3*sign(angle)*sqrt(abs(angle))"));
+    steep.start[0].phi = 0.0;
+    let one = down(&steep);
+    assert!(one.is_on_corner && one.modes.is_empty() && one.stability == Stability::Undecided, "{one:?}");
+    // A rope at its free length: 80 N/m where the bar turns away from its end, and none where it turns to it.
+    let rope = r#""springs": [{"name": "s", "tension": "max(0, 80*(length - 1))",
+        "between": [{"body": "ground", "point": [1, 1]}, {"body": "a", "point": [1, 0]}]}]"#;
+    assert!(down(&hanging(9.81, rope)).is_on_corner);
+    // A jump in the angle holds the bar between two branches, each of which has its equilibrium beyond it.
+    let held = found(&hanging(9.81, &coil("0.5*sign(angle)")), 16);
+    assert!(held.equilibria.iter().all(|one| one.phi[0].abs() > 1.0), "{:?}", held.equilibria);
+    assert!(held.left_out.contains(&"positions held by jumps of forces"), "{:?}", held.left_out);
+}
+
+/// The same torques with equal slopes, and with the corner next to the equilibrium, have the modes of these.
+#[test]
+fn an_equilibrium_beside_a_corner_has_its_modes() {
+    let inertia = 0.2 + 2.0 * 0.25;
+    for (torque, stiffness, damping) in [
+        ("2*angle*abs(angle)", 0.0, 0.0),
+        ("2*angle*abs(1*rate)", 0.0, 0.0),
+        ("max(5*angle, 4*angle - 1e-4)", 5.0, 0.0),
+        ("if(angle < 1e-5, 3*angle, 5*angle - 2e-5)", 3.0, 0.0),
+        ("3*angle + 1e-4*tanh(rate/1e-4)", 3.0, 1.0),
+        ("1*sin(3*angle) + 0.1*rate", 3.0, 0.1),
+    ] {
+        let one = down(&hanging(9.81, &coil(torque)));
+        assert!(!one.is_on_corner, "{torque}: {one:?}");
+        let (b, c) = (damping / inertia, (9.81 + stiffness) / inertia);
+        let [re, im] = one.modes[0].eigenvalue;
+        assert!(
+            (re + b / 2.0).abs() < 1e-6 && (im - (c - b * b / 4.0).sqrt()).abs() < 1e-6,
+            "{torque}: {one:?}"
+        );
+    }
+    // Without gravity the bar is at rest wherever the torque is none; on its corner alone there are no modes.
+    let all = found(&hanging(0.0, &coil("max(0, 5*angle)")), 16).equilibria;
+    let free = all.iter().find(|one| one.phi[0] < -1e-3).expect("free");
+    assert!(free.is_family && !free.is_on_corner && free.stability == Stability::Stable, "{free:?}");
+}
+
+/// A closed loop with a torque of the angle of its follower.
+#[test]
+fn corners_are_found_along_constraints() {
+    let hinge = |name: &str, bodies: [&str; 2], along: [f64; 2]| {
+        let end = |k: usize| format!(r#"{{"body": "{}", "point": [{}, 0]}}"#, bodies[k], along[k]);
+        format!(r#"{{"name": "{name}", "between": [{}, {}]}}"#, end(0), end(1))
+    };
+    let text = |torque: &str| {
+        format!(
+            r#"{{"name": "loop", "gravity": [0, -9.81],
+            "bars": [{{"name": "a", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4}},
+                     {{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}},
+                     {{"name": "c", "mass": 1, "centre": [0.4, 0], "inertia": 0.06, "length": 0.8}}],
+            "hinges": [{}, {}, {}, {}],
+            "torques": [{{"name": "T", "body": "c", "torque": "{torque}"}}],
+            "start": {{"a": {{"phi": -1.9, "omega": 0}}, "b": {{"phi": 1.13}}, "c": {{"phi": 2.42}}}},
+            "until": 1, "every": 0.1}}"#,
+            hinge("A", ["ground", "a"], [0.0, 0.0]),
+            hinge("B", ["a", "b"], [0.4, 0.0]),
+            hinge("C", ["b", "c"], [1.0, 0.8]),
+            hinge("D", ["ground", "c"], [0.9, 0.0]),
+        )
+    };
+    let free = found(&parsed(&text("0*c.phi")), 16);
+    assert!(free.equilibria.iter().all(|one| !one.is_on_corner), "{:?}", free.equilibria);
+    let (angle, slowest) = (lowest(&free).phi[2], lowest(&free).modes[0].frequency);
+    let lower = |law: &str| {
+        let all = found(&parsed(&text(law)), 16).equilibria;
+        let at = |one: &Equilibrium| (one.phi[2] - angle).abs() < 1e-6;
+        all.into_iter().find(at).unwrap_or_else(|| panic!("{law}"))
+    };
+    for law in [
+        format!("-min(0, 2*(c.phi - {angle:?}))"),
+        format!("-1*abs(c.phi - {angle:?})"),
+        "-0.1*abs(c.omega)".to_owned(),
+    ] {
+        assert!(lower(&law).is_on_corner, "{law}");
+    }
+    let smooth = lower(&format!("-2*(c.phi - {angle:?})*abs(c.phi - {angle:?})"));
+    assert!(!smooth.is_on_corner && (smooth.modes[0].frequency - slowest).abs() < 1e-6, "{smooth:?}");
+}

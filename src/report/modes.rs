@@ -48,6 +48,7 @@ pub fn object(found: &Modes) -> Value {
             "stability": one.stability,
             "from_start": one.from_start,
             "is_family": one.is_family,
+            "is_on_corner": one.is_on_corner,
             "modes": one.modes.iter().map(mode).collect::<Vec<_>>(),
         })
     };
@@ -65,6 +66,9 @@ fn words(one: &Equilibrium) -> String {
         Stability::AsymptoticallyStable => "stable, disturbances die away",
         Stability::Stable => "stable to first order, without damping",
         Stability::Unstable => "unstable",
+        Stability::Undecided if one.is_on_corner => {
+            "forces have a corner or a jump here, and no linearization holds"
+        }
         Stability::Undecided => "ways of motion cross here, and no linearization holds",
     };
     let family = if one.is_family { "; neighbours are equilibria too" } else { "" };
@@ -104,6 +108,9 @@ pub fn text(found: &Modes) -> String {
                 std::iter::once((k + 1).to_string()).chain(told).collect()
             })
             .collect();
+        if one.modes.is_empty() {
+            continue;
+        }
         page.table(&["mode", "f [Hz]", "period [s]", "damping ratio", "Re [1/s]", "Im [rad/s]"], &rows);
         if one.modes.len() > LISTED {
             page.entry("", &format!("{} more modes in the record", one.modes.len() - LISTED));

@@ -13,6 +13,7 @@
 //! A_q and A_w are exact (dual numbers).  To first order the curvature of the constraints has no part in it,
 //! as a(q0, 0) = 0.  Source: L. Meirovitch, *Methods of Analytical Dynamics* (1970), sections 5.3 to 5.6.
 
+mod corner;
 mod local;
 mod period;
 mod periodic;
@@ -62,6 +63,9 @@ const DEPENDENT: f64 = 1e-7;
 /// Below this share ways of motion cross nearby: an equilibrium there is not found to better than its root.
 const CROSSING: f64 = 1e-4;
 
+/// What has no part in it where a start finds the equilibrium of either branch on the other one.
+const JUMPS: &str = "positions held by jumps of forces";
+
 /// What becomes of a small disturbance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -72,7 +76,7 @@ pub enum Stability {
     Stable,
     /// It grows.
     Unstable,
-    /// Ways of motion cross there, and no linearization holds.
+    /// Ways of motion cross there, or forces have a corner or a jump: no linearization holds.
     Undecided,
 }
 
@@ -99,8 +103,11 @@ pub struct Equilibrium {
     pub potential: f64,
     /// What a small disturbance does.
     pub stability: Stability,
-    /// Its modes, from the slowest.
+    /// Its modes, from the slowest; none where its stability is undecided.
     pub modes: Vec<Mode>,
+    /// True where forces have a corner or a jump there, in the coordinates or in the rates, or a derivative
+    /// that is infinite.
+    pub is_on_corner: bool,
     /// True where the scene's start slides down to it, or comes to it by Newton's method.
     pub from_start: bool,
     /// True where neighbours are equilibria too: coordinates that nothing brings back.
@@ -234,7 +241,7 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
         degrees_of_freedom: freedom,
         equilibria,
         starts: count,
-        left_out: left_out(scene),
+        left_out: left_out(scene).into_iter().chain(search.has_jump.then_some(JUMPS)).collect(),
     })
 }
 

@@ -162,7 +162,17 @@ impl<'a> Local<'a> {
 
 /// A position at rest at a time.
 pub(super) fn at_rest(phi: &[f64], t: f64) -> Motion {
+    moving(&[phi.to_vec(), vec![0.0; phi.len()]], t)
+}
+
+/// Coordinates and rates at a time.
+pub(super) fn moving([phi, omega]: &[Vec<f64>; 2], t: f64) -> Motion {
     let of = |values: &[f64]| values.iter().map(|&value| Time::of(value)).collect();
-    let (omega, turns) = (vec![Time::default(); phi.len()], vec![0; phi.len()]);
-    Motion { time: Time::of(t), phi: of(phi), omega, turns, ..Motion::default() }
+    Motion {
+        time: Time::of(t),
+        phi: of(phi),
+        omega: of(omega),
+        turns: vec![0; phi.len()],
+        ..Motion::default()
+    }
 }

@@ -12,12 +12,17 @@ use crate::dynamics::{Mechanism, Time};
 use nalgebra::{Complex, DMatrix, DVector};
 use std::sync::Arc;
 
+/// Half the length of differences \[rad, units of length\].
+const NEAR: f64 = 1e-6;
+
 /// A search for equilibria.
 pub(super) struct EquilibriumSearch<'a> {
     pub(super) local: Local<'a>,
     jacobian: Jacobian,
     /// The largest acceleration at rest where the search starts.
-    usual: f64,
+    pub(super) usual: f64,
+    /// True where a start went to and fro between branches.
+    pub(super) has_jump: bool,
 }
 
 impl<'a> EquilibriumSearch<'a> {
@@ -25,13 +30,13 @@ impl<'a> EquilibriumSearch<'a> {
         let mut local = Local::new(mechanism);
         local.turns = WholeTurns::beside_rows(mechanism);
         let usual = starts.map(|phi| local.pull(phi, 0.0).amax()).fold(0.0, f64::max);
-        Self { local, jacobian: Jacobian::new(mechanism), usual }
+        Self { local, jacobian: Jacobian::new(mechanism), usual, has_jump: false }
     }
 
     /// The same search with the laws on other branches.
     pub(super) fn on<'b>(&self, mechanism: &'b Mechanism) -> EquilibriumSearch<'b> {
         let local = Local { turns: self.local.turns.clone(), ..Local::new(mechanism) };
-        EquilibriumSearch { local, jacobian: Jacobian::new(mechanism), usual: self.usual }
+        EquilibriumSearch { local, jacobian: Jacobian::new(mechanism), usual: self.usual, has_jump: false }
     }
 
     /// The equilibrium that is reached from a position with the laws on their branches there, and the
@@ -42,16 +47,21 @@ impl<'a> EquilibriumSearch<'a> {
         };
         let mut phi = phi.to_vec();
         let mut own = of(self.local.mechanism, &phi)?;
-        for _ in 0..BRANCHES {
-            phi = match &own {
+        for round in 0..BRANCHES {
+            let found = match &own {
                 Some(own) => self.on(own).settle(&phi)?,
                 None => self.settle(&phi)?,
             };
-            match of(own.as_deref().unwrap_or(self.local.mechanism), &phi)? {
-                Some(next) => own = Some(next),
-                None => return Some((phi, own)),
+            let next = of(own.as_deref().unwrap_or(self.local.mechanism), &found)?;
+            // On a corner rounding chooses between branches that have the same equilibrium.
+            let is_same = round > 0 && self.local.is_same(&phi, &found);
+            phi = found;
+            match next {
+                Some(next) if !is_same => own = Some(next),
+                _ => return Some((phi, own)),
             }
         }
+        self.has_jump = true;
         None
     }
 
@@ -67,6 +77,35 @@ impl<'a> EquilibriumSearch<'a> {
             });
             tangent.transpose() * all * tangent
         })
+    }
+
+    /// T' A_q T to search by: of differences where a derivative has no value, as that of `sqrt(rate^2)` at
+    /// rest.
+    fn slope(&mut self, phi: &[f64], tangent: &DMatrix<f64>) -> DMatrix<f64> {
+        let [mut slope, _] = self.linear(phi, tangent);
+        if slope.iter().all(|entry| entry.is_finite()) {
+            return slope;
+        }
+        for j in 0..tangent.ncols() {
+            let y = DVector::from_fn(tangent.ncols(), |i, _| if i == j { NEAR } else { 0.0 });
+            let [ahead, behind] = [y.clone(), -y].map(|y| {
+                let there = self.local.moved(phi, tangent, &y);
+                let there = self.local.projected(&there).unwrap_or(there);
+                tangent.transpose() * self.local.pull(&there, 0.0)
+            });
+            slope.set_column(j, &((ahead - behind) / (2.0 * NEAR)));
+        }
+        slope
+    }
+
+    /// The largest derivative of an acceleration where the linearization was evaluated last, also in
+    /// directions off the constraints.
+    pub(super) fn steepest(&self) -> f64 {
+        let (n, unit) = (self.local.unit.len(), &self.local.unit);
+        let all = self.jacobian.acceleration.iter().enumerate();
+        // Not a maximum, which passes over what is no number.
+        all.map(|(k, a)| (a * unit[k % n] / unit[k / (2 * n)]).abs())
+            .fold(0.0, |most, a| if a > most || a.is_nan() { a } else { most })
     }
 
     /// Where a position slides to along its accelerations, as long as its potential energy falls.
@@ -106,7 +145,7 @@ impl<'a> EquilibriumSearch<'a> {
         let mut left = tangent.transpose() * self.local.pull(&phi, 0.0);
         let mut damping = 0.0;
         for _ in 0..ITERATIONS {
-            let [slope, _] = self.linear(&phi, &tangent);
+            let slope = self.slope(&phi, &tangent);
             let scale = slope.amax();
             if left.amax() <= STILL * scale.max(f64::MIN_POSITIVE) {
                 let last = self.polished(phi, (tangent, slope, left));
@@ -162,10 +201,12 @@ impl<'a> EquilibriumSearch<'a> {
             let Some(there) = self.local.projected(&self.local.moved(&phi, &tangent, &y)) else { break };
             let frame = self.local.tangent(&there);
             let rest = frame.transpose() * self.local.pull(&there, 0.0);
-            if frame.ncols() != tangent.ncols() || rest.norm() >= left.norm() {
+            // Not where there is no value, as of a root beyond its corner.
+            let is_nearer = rest.norm() < left.norm();
+            if frame.ncols() != tangent.ncols() || !is_nearer {
                 break;
             }
-            slope = self.linear(&there, &frame)[0].clone();
+            slope = self.slope(&there, &frame);
             (phi, tangent, left) = (there, frame, rest);
         }
         phi
@@ -182,7 +223,11 @@ impl<'a> EquilibriumSearch<'a> {
         let tangent = self.local.tangent(&phi);
         let f = tangent.ncols();
         let is_singular = f != freedom || self.local.conditioning < CROSSING;
-        let [stiffness, damping] = self.linear(&phi, &tangent);
+        let linear = self.linear(&phi, &tangent);
+        if !is_singular && self.is_on_corner(&phi, &tangent, &linear) {
+            return self.on_corner(phi, &linear[0], from_start);
+        }
+        let [stiffness, damping] = linear;
         let [slack, held] = slack(&stiffness);
         let values = eigenvalues(&stiffness, &damping, &held);
         let largest = values.iter().map(|value| value.norm()).fold(0.0, f64::max);
@@ -220,8 +265,23 @@ impl<'a> EquilibriumSearch<'a> {
             phi: self.local.turns.principal(&phi),
             stability,
             modes,
+            is_on_corner: false,
             from_start,
             is_family: slack.ncols() > 0 && !is_singular,
+        }
+    }
+
+    /// An equilibrium at which no linearization holds since forces have a corner there.
+    fn on_corner(&mut self, phi: Vec<f64>, stiffness: &DMatrix<f64>, from_start: bool) -> Equilibrium {
+        let is_finite = stiffness.iter().all(|entry| entry.is_finite());
+        Equilibrium {
+            potential: self.potential(&phi),
+            phi: self.local.turns.principal(&phi),
+            stability: Stability::Undecided,
+            modes: Vec::new(),
+            is_on_corner: true,
+            from_start,
+            is_family: is_finite && slack(stiffness)[0].ncols() > 0,
         }
     }
 

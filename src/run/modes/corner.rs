@@ -1,0 +1,94 @@
+//! Corners and jumps of forces at an equilibrium, where no linearization holds.
+//!
+//! ```text
+//! f(d) = T' a(q0 + T y, T v),  d = (y, v)       on the branches that the laws have there
+//! r(d, h) = |f(h d) - f(0) - h (T' A_q T y + T' A_w T v)| / h
+//! smooth forces:  r(d, h) = O(h)                corner:  r tends to a constant,  jump:  r = O(1/h)
+//! ```
+//!
+//! The accelerations themselves are asked, on both sides of the equilibrium, in every coordinate and rate
+//! that the constraints leave, and in mixed directions: a corner is found whatever function has it.
+
+use super::local::moving;
+use super::search::EquilibriumSearch;
+use crate::dynamics::Mechanism;
+use crate::dynamics::kernel::Bias;
+use nalgebra::{DMatrix, DVector};
+
+/// The distances h, of coordinates \[rad, units of length\] and of rates \[1/s of these\]: corners nearer
+/// than the second are at the equilibrium.
+const DISTANCES: [f64; 2] = [1e-5, 1e-6];
+/// What is left at the second distance over what is at the first: a tenth of it where forces are smooth, as
+/// much beside a corner.
+const KEPT: f64 = 0.5;
+/// What is left over the largest derivatives and accelerations where it may be what constraints are off by.
+const NOTICED: f64 = 1e-5;
+/// Mixed directions, and the step of their angles \[rad\], no fraction of a turn: the golden angle.
+const MIXED: usize = 8;
+const GOLDEN: f64 = 2.399_963_229_728_653;
+
+impl EquilibriumSearch<'_> {
+    /// True where the accelerations have a corner or a jump at an equilibrium, or derivatives that are not
+    /// finite.  `linear`: T' A_q T and T' A_w T there, evaluated last.
+    pub(super) fn is_on_corner(
+        &mut self,
+        phi: &[f64],
+        tangent: &DMatrix<f64>,
+        linear: &[DMatrix<f64>; 2],
+    ) -> bool {
+        let steepest = self.steepest();
+        if !steepest.is_finite() || linear.iter().flat_map(DMatrix::iter).any(|entry| !entry.is_finite()) {
+            return true;
+        }
+        let mechanism = self.local.mechanism;
+        // What has no formula is smooth.
+        if mechanism.laws.is_none() && mechanism.forces.is_empty() {
+            return false;
+        }
+        let f = tangent.ncols();
+        let least = NOTICED * (steepest + self.usual);
+        let here = tangent.transpose() * self.local.pull(phi, 0.0);
+        let mut left = |direction: &DVector<f64>, h: f64| {
+            let [y, v] = [direction.rows(0, f) * h, direction.rows(f, f) * h];
+            let there = self.pull_beside(phi, tangent, [&y, &v])?;
+            Some(((there - &here - &linear[0] * y - &linear[1] * v) / h).amax())
+        };
+        directions(2 * f).iter().any(|direction| {
+            let [Some(wide), Some(narrow)] = DISTANCES.map(|h| left(direction, h)) else { return false };
+            !narrow.is_finite() || (narrow > least && narrow > KEPT * wide)
+        })
+    }
+
+    /// Accelerations along the directions of `tangent` at local coordinates and rates, with the laws on their
+    /// branches there; `None` where the constraints cannot be kept.
+    fn pull_beside(
+        &mut self,
+        phi: &[f64],
+        tangent: &DMatrix<f64>,
+        [y, v]: [&DVector<f64>; 2],
+    ) -> Option<DVector<f64>> {
+        let still = vec![0.0; phi.len()];
+        let state = [self.local.moved(phi, tangent, y), self.local.moved(&still, tangent, v)];
+        match self.local.mechanism.on_branches_of(&moving(&state, 0.0)).ok()? {
+            Some(other) => self.on(&other).pull_moving(&state, tangent),
+            None => self.pull_moving(&state, tangent),
+        }
+    }
+
+    fn pull_moving(&mut self, state: &[Vec<f64>; 2], tangent: &DMatrix<f64>) -> Option<DVector<f64>> {
+        let local = &mut self.local;
+        let mechanism: &Mechanism = local.mechanism;
+        let [phi, omega] = local.projected_moving(state)?;
+        local.kernel.accelerate::<0>(mechanism, local.time, &phi, &omega, Bias::default());
+        let of = local.kernel.load.iter().zip(&local.unit).map(|(a, unit)| a / unit);
+        Some(tangent.transpose() * DVector::from_iterator(phi.len(), of))
+    }
+}
+
+/// Every axis of a space and mixed directions in it, both ways, the largest entry of each at most 1.
+fn directions(size: usize) -> Vec<DVector<f64>> {
+    let axis = |j: usize| DVector::from_fn(size, |i, _| f64::from(u8::from(i == j)));
+    let mixed = |k: usize| DVector::from_fn(size, |i, _| (GOLDEN * ((k + 1) * (i + 1)) as f64).sin());
+    let all = (0..size).map(axis).chain((0..MIXED).map(mixed));
+    all.flat_map(|direction| [-&direction, direction]).collect()
+}
