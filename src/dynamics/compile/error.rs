@@ -75,8 +75,8 @@ pub enum CompileError {
     },
     /// A spring with a free length or a damper starts without a direction.
     #[error(
-        "spring `{0}` starts with length 0 and has a free length or damping\nhint: its force has no direction \
-            there; start elsewhere, move an end, or set both to 0"
+        "spring `{0}` starts with length 0 and has a free length or damping\nhint: its force has no \
+            direction there; start elsewhere, move an end, or set both to 0"
     )]
     SpringWithoutLength(String),
     /// A rigid spring that vibrates is not the only constraint.
