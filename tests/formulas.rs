@@ -114,6 +114,7 @@ fn an_angle_is_that_of_the_standard_library_and_has_a_switch_where_it_can_jump()
         ("atan2(a, 2 - cos(b))", 0),
         ("atan2(a, 1 + sqrt(b) + c^2)", 0),
         ("atan2(a, 3)", 0),
+        ("atan2(-1, -2)*a", 0),
     ] {
         assert_eq!(switches(text), expected, "{text}");
     }

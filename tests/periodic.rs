@@ -327,3 +327,39 @@ fn motions_held_to_one_another_by_a_curve_have_the_multipliers_of_their_equation
     }
     assert!(found.motions.iter().any(|one| one.stability == Stability::Unstable));
 }
+
+/// A bar that hangs at the corner of a spring to one side, beside one that a motor turns: disturbances to either
+/// side have other frequencies, and so has the motion no multipliers.  A corner elsewhere changes nothing.
+#[test]
+fn a_motion_on_a_corner_has_no_multipliers() {
+    let with = |law: &str| {
+        let scene = parsed(&format!(
+            r#"{{"name": "hanging", "gravity": [10, 0],
+            "bars": [{{"name": "one", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4}},
+                     {{"name": "two", "mass": 2, "centre": [0.3, 0], "inertia": 0.05, "length": 0.6}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [2, 0]}}, {{"body": "one", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "two", "point": [0, 0]}}]}}],
+            "motors": [{{"name": "motor", "body": "one", "law": {{"start": 0.3, "rate": 5}}}}],
+            "torsion_springs": [{{"name": "T", "body": "two", "torque": "{law}"}}],
+            "start": {{"two": {{"phi": 0, "omega": 0}}}}, "until": 1, "every": 1}}"#
+        ));
+        let motions = found(&scene, 0, None).expect("a search").motions;
+        motions.into_iter().find(|one| one.from_start).unwrap_or_else(|| panic!("{law}: no motion"))
+    };
+    for law in
+        ["if(angle < 0, 0, 1.5*angle)", "max(0, 1.5*angle)", "0.3*abs(angle)", "2*max(0, angle) + 1*angle"]
+    {
+        let one = with(law);
+        println!("{law}: {one:?}");
+        assert!(one.is_on_corner && one.multipliers.is_empty(), "{law}: {one:?}");
+        assert_eq!(one.stability, Stability::Undecided, "{law}");
+    }
+    // J s² + k + m g l = 0 on the branch it stays on.
+    let rate = ((1.5 + LEVER * 10.0) / INERTIA).sqrt() * TAU / 5.0;
+    let expected = [[rate.cos(), rate.sin()], [rate.cos(), -rate.sin()]];
+    for law in ["1.5*min(angle, 0.5)", "if(angle < -0.2, 0, 1.5*angle)", "1.5*angle"] {
+        let one = with(law);
+        println!("{law}: {one:?}");
+        assert!(!one.is_on_corner && off(&one, &expected) < 1e-8, "{law}: {one:?}");
+    }
+}

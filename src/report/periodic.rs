@@ -37,6 +37,7 @@ pub fn object(found: &PeriodicMotions) -> Value {
             "stability": one.stability,
             "from_start": one.from_start,
             "is_family": one.is_family,
+            "is_on_corner": one.is_on_corner,
             "multipliers": one.multipliers,
         })
     };
@@ -55,7 +56,8 @@ fn words(one: &PeriodicMotion) -> String {
     let stability = match one.stability {
         Stability::AsymptoticallyStable => "stable, disturbances die away",
         Stability::Unstable => "unstable",
-        _ => "stable to first order",
+        Stability::Undecided => "stays on a corner or a jump of a law, and no linearization holds",
+        Stability::Stable => "stable to first order",
     };
     let family = if one.is_family { "; neighbours may be periodic too" } else { "" };
     format!("{stability}{family}")
@@ -99,6 +101,9 @@ pub fn text(found: &PeriodicMotions) -> String {
                 std::iter::once((k + 1).to_string()).chain(told).collect()
             })
             .collect();
+        if rows.is_empty() {
+            continue;
+        }
         page.table(&["multiplier", "Re", "Im", "magnitude", "growth [1/s]", "turns a period"], &rows);
         if one.multipliers.len() > LISTED {
             page.entry("", &format!("{} more multipliers in the record", one.multipliers.len() - LISTED));

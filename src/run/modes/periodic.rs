@@ -12,6 +12,7 @@
 use super::local::Local;
 use super::period::{check_period, common_period};
 use super::{DISTINCT, ModesError, Stability};
+use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
@@ -43,6 +44,11 @@ const CLOSED_AGAIN: f64 = 1e-8;
 /// Multipliers that differ from magnitude 1 by less, times the root of the largest entry of DP, do so by
 /// rounding: a double root is known to half the digits.
 const ROUNDING: f64 = 1e-4;
+/// What both sides of a motion differ by over the length of a difference where it may be a corner, for each
+/// unit of the largest entry of DP, and how much of it is left at half the length: half beside a smooth
+/// motion, all beside a corner.
+const BENT: f64 = 1e-5;
+const KEPT: f64 = 0.6;
 /// Most steps of a run, which near a collision would take them without end.
 const STEPS_MOST: usize = 20_000;
 /// Periods that the scene's start is left to settle for.
@@ -59,7 +65,8 @@ pub struct PeriodicMotion {
     pub turns: Vec<i64>,
     /// What is left of the difference of its ends: rad, units of length, and 2π/T of these.
     pub residual: f64,
-    /// Real and imaginary parts of its Floquet multipliers, the largest first; of a pair both.
+    /// Real and imaginary parts of its Floquet multipliers, the largest first; of a pair both.  None where it
+    /// stays on a corner.
     pub multipliers: Vec<[f64; 2]>,
     /// What a small disturbance does.
     pub stability: Stability,
@@ -67,6 +74,9 @@ pub struct PeriodicMotion {
     pub from_start: bool,
     /// True where a multiplier is 1: neighbours may be periodic too.
     pub is_family: bool,
+    /// True where it stays on a corner or a jump of a law, or touches one and turns back: disturbances to
+    /// either side have other multipliers.
+    pub is_on_corner: bool,
 }
 
 impl PeriodicMotion {
@@ -148,7 +158,11 @@ pub fn periodic(
             found.push(motion);
         }
     }
-    let growth = |one: &PeriodicMotion| one.multipliers.first().map_or(0.0, |[re, im]| re.hypot(*im));
+    let growth = |one: &PeriodicMotion| match one.multipliers.first() {
+        Some([re, im]) => re.hypot(*im),
+        None if one.is_on_corner => f64::INFINITY,
+        None => 0.0,
+    };
     found.sort_by(|a, b| growth(a).total_cmp(&growth(b)));
     Ok(PeriodicMotions {
         scene: scene.clone(),
@@ -266,21 +280,24 @@ impl Shooting<'_> {
         Some(DVector::from_fn(2 * f, |k, _| if k < f { phi[k] } else { omega[k - f] }))
     }
 
-    /// DP at the base by central differences of a half length; `None` where they are too long for that.
-    fn derivative(&mut self, base: &Base, length: f64) -> Option<DMatrix<f64>> {
+    /// DP at the base, where the motion closes or nearly so, by central differences of a half length, and
+    /// what both sides differ by over it; `None` where it is too long.
+    fn derivative(&mut self, base: &Base, length: f64) -> Option<(DMatrix<f64>, f64)> {
         let size = 2 * base.tangent.ncols();
-        let mut matrix = DMatrix::zeros(size, size);
+        let (mut matrix, mut bend) = (DMatrix::zeros(size, size), 0.0);
         for j in 0..size {
             let mut x = DVector::zeros(size);
             x[j] = length;
-            let apart = (self.image(base, &x)? - self.image(base, &-x)?) / 2.0;
+            let [ahead, behind] = [self.image(base, &x)?, self.image(base, &-x)?];
+            let apart = (&ahead - &behind) / 2.0;
             if apart.amax() > LINEAR {
                 self.unstable += 1;
                 return None;
             }
+            bend = larger(bend, (ahead + behind).amax() / (2.0 * length));
             matrix.set_column(j, &(apart / length));
         }
-        Some(matrix)
+        Some((matrix, bend))
     }
 
     /// The periodic motion that is reached from a state, if one is.
@@ -294,7 +311,7 @@ impl Shooting<'_> {
             if left.amax() <= CLOSED {
                 break;
             }
-            let slope = self.derivative(&base, DIFFERENCES[0])? - DMatrix::identity(size, size);
+            let slope = self.derivative(&base, DIFFERENCES[0])?.0 - DMatrix::identity(size, size);
             let squares = slope.transpose() * &slope;
             let scale = squares.diagonal().amax();
             let mut step = None;
@@ -325,10 +342,12 @@ impl Shooting<'_> {
 
     /// Multipliers of a motion that closes, and whether it closes once more.
     fn judged(&mut self, base: &Base, from_start: bool) -> Option<PeriodicMotion> {
-        let rough = self.derivative(base, DIFFERENCES[0])?.amax().max(1.0);
+        let rough = self.derivative(base, DIFFERENCES[0])?.0.amax().max(1.0);
         let length = DIFFERENCES[1] / rough;
-        let [wide, narrow] = [length, 0.5 * length].map(|length| self.derivative(base, length));
-        let derivative = (narrow? * 4.0 - wide?) / 3.0;
+        let (wide, bend) = self.derivative(base, length)?;
+        let (narrow, left) = self.derivative(base, 0.5 * length)?;
+        let is_on_corner = left > BENT * rough && left > KEPT * bend;
+        let derivative = (narrow * 4.0 - wide) / 3.0;
         let end = self.after(&base.state)?;
         let off =
             |to: &[Vec<f64>; 2]| self.apart(&base.state, to).iter().map(DVector::amax).fold(0.0, f64::max);
@@ -336,15 +355,19 @@ impl Shooting<'_> {
         if off(&self.after(&end)?) > CLOSED_AGAIN * rough {
             return None;
         }
-        let mut multipliers: Vec<[f64; 2]> =
-            derivative.complex_eigenvalues().iter().map(|value| [value.re, value.im]).collect();
+        let mut multipliers: Vec<[f64; 2]> = match is_on_corner {
+            true => Vec::new(),
+            false => derivative.complex_eigenvalues().iter().map(|value| [value.re, value.im]).collect(),
+        };
         let size = |value: &[f64; 2]| value[0].hypot(value[1]);
         multipliers.sort_by(|a, b| {
             size(b).total_cmp(&size(a)).then(b[0].total_cmp(&a[0])).then(b[1].total_cmp(&a[1]))
         });
         let most = multipliers.first().map_or(0.0, size);
         let rounding = ROUNDING * rough.sqrt();
-        let stability = if most > 1.0 + rounding {
+        let stability = if is_on_corner {
+            Stability::Undecided
+        } else if most > 1.0 + rounding {
             Stability::Unstable
         } else if most < 1.0 - rounding {
             Stability::AsymptoticallyStable
@@ -362,6 +385,7 @@ impl Shooting<'_> {
             multipliers,
             stability,
             from_start,
+            is_on_corner,
         })
     }
 

@@ -370,7 +370,8 @@ impl<'a> Parser<'a> {
     /// or down by the sign of y, which chooses nothing elsewhere.
     fn angle(&mut self, y: usize, x: usize, (start, end): (usize, usize)) -> usize {
         let plain = Node::Angle(y, x);
-        if self.formula.range(x)[0] > 0.0 {
+        let is_constant = [y, x].iter().all(|&node| self.formula.constants[node].is_some());
+        if is_constant || self.formula.range(x)[0] > 0.0 {
             return self.push(plain, start, end);
         }
         let [under, left] = [y, x].map(|node| self.push(Node::Negative(node), start, end));
