@@ -203,7 +203,7 @@ fn tables_come_from_files_beside_the_scene() {
         ("0,0\n2,1\n1,2\n", r#""bad.csv""#, "line 3, whose x is not above the one before"),
         ("0,0,0\n", r#""bad.csv""#, "line 1, which has 3 columns"),
         ("a,b\n0,0\n1,1\n", r#"{"file": "bad.csv", "x": "a", "y": "c"}"#, "has no column c"),
-        ("0,0\n", r#""bad.csv""#, "has 1 points"),
+        ("0,0\n", r#""bad.csv""#, "has 1 point in "),
         ("0,0\n", r#""none.csv""#, "cannot be read from"),
         ("0,0\n", r#"{"file": "bad.csv"}"#, "must be {name:"),
     ] {
