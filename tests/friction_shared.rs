@@ -2,6 +2,7 @@
 
 use super::formulas::{adaptive, run, scene};
 use super::friction::Dice;
+use super::laws::rk4;
 use driftless::dynamics::Mechanism;
 use driftless::run::{MethodId, Outcome};
 
@@ -359,21 +360,8 @@ fn a_bar_leaves_its_wall_where_the_friction_of_its_hinge_breaks() {
         let [mass, centre, _, radius] = LEVER;
         let pressing = mass * FIELD[0].hypot(FIELD[1]);
         let begin = -mass * centre * FIELD[1] + stiction * radius * pressing;
-        let (count, [mut phi, mut omega]) = (20_000, [0.0, 0.0]);
-        let h = (until - begin) / f64::from(count);
-        for i in 0..count {
-            let t = begin + f64::from(i) * h;
-            let rate = |share: f64, [a, b]: [f64; 2]| {
-                let (phi, omega) = (phi + share * h * a, omega + share * h * b);
-                [omega, slipping(t + share * h, phi, omega, kinetic)]
-            };
-            let one = rate(0.0, [0.0; 2]);
-            let two = rate(0.5, one);
-            let three = rate(0.5, two);
-            let four = rate(1.0, three);
-            let mean = |i: usize| (one[i] + 2.0 * (two[i] + three[i]) + four[i]) / 6.0;
-            (phi, omega) = (phi + h * mean(0), omega + h * mean(1));
-        }
+        let by_hand = |after: f64, y: &[f64; 2]| [y[1], slipping(begin + after, y[0], y[1], kinetic)];
+        let [phi, omega] = rk4([0.0, 0.0], until - begin, 20_000, by_hand);
         assert!(phi > 0.05 && omega > 0.01, "{phi} {omega}");
         for (name, outcome) in runs(&lifted(kinetic, stiction, until)) {
             let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];

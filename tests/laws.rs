@@ -256,7 +256,7 @@ fn two_free_bodies_move_by_keplers_equation() {
 }
 
 /// The classical Runge–Kutta method.
-fn rk4<const N: usize>(
+pub fn rk4<const N: usize>(
     mut y: [f64; N],
     until: f64,
     count: u32,

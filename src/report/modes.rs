@@ -108,10 +108,9 @@ pub fn text(found: &Modes) -> String {
                 std::iter::once((k + 1).to_string()).chain(told).collect()
             })
             .collect();
-        if one.modes.is_empty() {
-            continue;
+        if !rows.is_empty() {
+            page.table(&["mode", "f [Hz]", "period [s]", "damping ratio", "Re [1/s]", "Im [rad/s]"], &rows);
         }
-        page.table(&["mode", "f [Hz]", "period [s]", "damping ratio", "Re [1/s]", "Im [rad/s]"], &rows);
         if one.modes.len() > LISTED {
             page.entry("", &format!("{} more modes in the record", one.modes.len() - LISTED));
         }

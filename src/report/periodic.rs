@@ -101,10 +101,9 @@ pub fn text(found: &PeriodicMotions) -> String {
                 std::iter::once((k + 1).to_string()).chain(told).collect()
             })
             .collect();
-        if rows.is_empty() {
-            continue;
+        if !rows.is_empty() {
+            page.table(&["multiplier", "Re", "Im", "magnitude", "growth [1/s]", "turns a period"], &rows);
         }
-        page.table(&["multiplier", "Re", "Im", "magnitude", "growth [1/s]", "turns a period"], &rows);
         if one.multipliers.len() > LISTED {
             page.entry("", &format!("{} more multipliers in the record", one.multipliers.len() - LISTED));
         }
@@ -165,10 +164,10 @@ pub fn charts(found: &PeriodicMotions) -> Result<Charts, ChartError> {
     };
     let plane =
         Multipliers { title: "Floquet multipliers".to_owned(), caption, values: one.multipliers.clone() };
-    let pictures = vec![
-        ("motion", chart::mechanism(&picture, FILE_RESOLUTION)?),
-        ("multipliers", chart::multipliers(&plane, FILE_RESOLUTION)?),
-    ];
+    let mut pictures = vec![("motion", chart::mechanism(&picture, FILE_RESOLUTION)?)];
+    if !plane.values.is_empty() {
+        pictures.push(("multipliers", chart::multipliers(&plane, FILE_RESOLUTION)?));
+    }
     let motion = MotionGif {
         title,
         sketch: drawing.sketch(),

@@ -129,8 +129,8 @@ pub fn sum_of_products<'a, const W: usize>(
         return Digits::ZERO;
     }
     match limbs {
-        0..=8 => sum_in::<10, 20, W>(terms, top, limbs),
-        9..=MIDDLE => sum_in::<{ MIDDLE + 2 }, { 2 * MIDDLE + 4 }, W>(terms, top, limbs),
+        limbs @ ..=8 => sum_in::<10, 20, W>(terms, top, limbs),
+        limbs @ ..=MIDDLE => sum_in::<{ MIDDLE + 2 }, { 2 * MIDDLE + 4 }, W>(terms, top, limbs),
         _ => sum_in::<{ MOST + 2 }, { 2 * MOST + 4 }, W>(terms, top, limbs),
     }
 }

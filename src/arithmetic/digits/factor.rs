@@ -218,8 +218,8 @@ impl<const W: usize> Factor<W> {
             2 => self.scaled_few::<2, 5>(other, of, from, bits),
             3 => self.scaled_few::<3, 6>(other, of, from, bits),
             4 => self.scaled_few::<4, 7>(other, of, from, bits),
-            0..=SMALL => self.scaled::<{ SMALL + 3 }>(other, of, from, limbs, bits),
-            10..=MIDDLE => self.scaled::<{ MIDDLE + 3 }>(other, of, from, limbs, bits),
+            limbs @ ..=SMALL => self.scaled::<{ SMALL + 3 }>(other, of, from, limbs, bits),
+            limbs @ ..=MIDDLE => self.scaled::<{ MIDDLE + 3 }>(other, of, from, limbs, bits),
             _ => self.scaled::<{ MOST + 3 }>(other, of, from, limbs, bits),
         }
     }

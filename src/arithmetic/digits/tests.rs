@@ -258,12 +258,7 @@ fn whole_numbers_are_exact_at_any_length() {
         state ^= state << 17;
         state
     };
-    let whole = |x: &Digits<MOST>| {
-        let digits = x.limb.iter().rev().flat_map(|&limb| [limb as u32, (limb >> 32) as u32]);
-        let digits = BigInt::from_slice(Sign::Plus, &digits.collect::<Vec<u32>>());
-        let digits = if x.is_negative() { -digits } else { digits };
-        if x.is_zero() { BigInt::from(0) } else { digits >> (64 * (MOST as i32 - x.exponent)) }
-    };
+    let whole = |x: &Digits<MOST>| integer(x) >> (64 * PLACES);
     for limbs in (2..40).chain([64, MOST - 1, MOST]) {
         let mut number = |is_negative| {
             let mut half: Vec<u64> = (0..limbs / 2).map(|_| next()).collect();

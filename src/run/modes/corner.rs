@@ -11,8 +11,6 @@
 
 use super::local::moving;
 use super::search::EquilibriumSearch;
-use crate::dynamics::Mechanism;
-use crate::dynamics::kernel::Bias;
 use nalgebra::{DMatrix, DVector};
 
 /// The distances h, of coordinates \[rad, units of length\] and of rates \[1/s of these\]: corners nearer
@@ -76,12 +74,8 @@ impl EquilibriumSearch<'_> {
     }
 
     fn pull_moving(&mut self, state: &[Vec<f64>; 2], tangent: &DMatrix<f64>) -> Option<DVector<f64>> {
-        let local = &mut self.local;
-        let mechanism: &Mechanism = local.mechanism;
-        let [phi, omega] = local.projected_moving(state)?;
-        local.kernel.accelerate::<0>(mechanism, local.time, &phi, &omega, Bias::default());
-        let of = local.kernel.load.iter().zip(&local.unit).map(|(a, unit)| a / unit);
-        Some(tangent.transpose() * DVector::from_iterator(phi.len(), of))
+        let [phi, omega] = self.local.projected_moving(state)?;
+        Some(tangent.transpose() * self.local.pull_moving([&phi, &omega], self.local.time))
     }
 }
 

@@ -50,8 +50,12 @@ impl<'a> Local<'a> {
 
     /// Accelerations at rest at a time, measured in the coordinates' units.
     pub(in crate::run) fn pull(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
-        let still = vec![0.0; phi.len()];
-        self.kernel.accelerate::<0>(self.mechanism, Time::of(t), phi, &still, Bias::default());
+        self.pull_moving([phi, &vec![0.0; phi.len()]], Time::of(t))
+    }
+
+    /// The same at these coordinates and rates.
+    pub(super) fn pull_moving(&mut self, [phi, omega]: [&[f64]; 2], t: Time) -> DVector<f64> {
+        self.kernel.accelerate::<0>(self.mechanism, t, phi, omega, Bias::default());
         DVector::from_iterator(phi.len(), self.kernel.load.iter().zip(&self.unit).map(|(a, unit)| a / unit))
     }
 

@@ -158,11 +158,9 @@ pub fn periodic(
             found.push(motion);
         }
     }
-    let growth = |one: &PeriodicMotion| match one.multipliers.first() {
-        Some([re, im]) => re.hypot(*im),
-        None if one.is_on_corner => f64::INFINITY,
-        None => 0.0,
-    };
+    // Those on corners, which have none, are the last ones.
+    let growth =
+        |one: &PeriodicMotion| one.multipliers.first().map_or(f64::INFINITY, |[re, im]| re.hypot(*im));
     found.sort_by(|a, b| growth(a).total_cmp(&growth(b)));
     Ok(PeriodicMotions {
         scene: scene.clone(),
