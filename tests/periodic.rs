@@ -21,6 +21,11 @@ fn found(scene: &Scene, starts: usize, period: Option<f64>) -> Result<PeriodicMo
 
 /// A bar on the end of one that a motor turns at 5 rad/s, with a torsion spring between them.
 fn arm(gravity: f64, stiffness: f64, damping: f64, phi: f64) -> Scene {
+    let spring = format!(r#""stiffness": {stiffness}, "free_angle": 0, "damping": {damping}"#);
+    arm_with(gravity, &spring, phi)
+}
+
+fn arm_with(gravity: f64, spring: &str, phi: f64) -> Scene {
     parsed(&format!(
         r#"{{"name": "arm", "gravity": [{gravity}, 0],
         "bars": [{{"name": "one", "mass": 1, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4}},
@@ -28,7 +33,7 @@ fn arm(gravity: f64, stiffness: f64, damping: f64, phi: f64) -> Scene {
         "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "one", "point": [0, 0]}}]}},
                    {{"name": "B", "between": [{{"body": "one", "point": [0.4, 0]}}, {{"body": "two", "point": [0, 0]}}]}}],
         "motors": [{{"name": "motor", "body": "one", "law": {{"start": 0.3, "rate": 5}}}}],
-        "torsion_springs": [{{"name": "T", "body": "two", "relative_to": "one", "stiffness": {stiffness}, "free_angle": 0, "damping": {damping}}}],
+        "torsion_springs": [{{"name": "T", "body": "two", "relative_to": "one", {spring}}}],
         "start": {{"two": {{"phi": {phi}, "omega": 5}}}}, "until": 1, "every": 1}}"#
     ))
 }
@@ -77,6 +82,23 @@ fn a_bar_on_a_turning_bar_has_the_multipliers_of_its_closed_form() {
         };
         assert_eq!(one.stability, stability);
     }
+}
+
+#[test]
+fn laws_of_relative_angles_count_turns_between_the_bodies_alone() {
+    let linear = found(&arm(0.0, 1.5, 0.3, 0.4), 0, None).expect("a search");
+    for spring in
+        [r#""torque": "1.5*angle + 0.3*rate""#, r#""potential": "0.75*angle^2", "torque": "0.3*rate""#]
+    {
+        let law = found(&arm_with(0.0, spring, 0.4), 0, None).expect("a search");
+        let multipliers = |of: &PeriodicMotions| of.motions[0].multipliers.clone();
+        assert!(off(&linear.motions[0], &multipliers(&law)) < 1e-9, "{spring}");
+        assert_eq!(law.motions[0].turns, [1, 1]);
+    }
+    // One to the ground holds the bar back.
+    let spring = r#""torque": "1.5*(angle - two.phi)""#;
+    let error = found(&arm_with(0.0, spring, 0.4), 0, None).expect_err("turns felt");
+    assert!(matches!(error, ModesError::NotPeriodic { .. }), "{error}");
 }
 
 /// A state of angle and rate after a time with the derivative by its start: the classical method of Runge and

@@ -202,6 +202,30 @@ impl Tape {
             .filter_map(|operation| if let Operation::Input(input) = operation { Some(*input) } else { None })
     }
 
+    /// True where these results stay as they are when all of these inputs grow by one number, since only
+    /// their differences are asked for.
+    pub fn is_unchanged_by_shifts(
+        &self,
+        is_shifted: impl Fn(u32) -> bool,
+        mut results: impl Iterator<Item = Slot>,
+    ) -> bool {
+        // How many times that number each result grows by; `None` where that depends on values.
+        let mut growth: Vec<Option<f64>> = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let of = |slot: Slot| growth[slot as usize];
+            growth.push(match *operation {
+                Operation::Input(input) => Some(f64::from(u8::from(is_shifted(input)))),
+                Operation::Add(a, b) => of(a).zip(of(b)).map(|(a, b)| a + b),
+                Operation::Subtract(a, b) => of(a).zip(of(b)).map(|(a, b)| a - b),
+                Operation::Negate(a) => of(a).map(|a| -a),
+                Operation::Scale(a, factor) => of(a).map(|a| factor * a),
+                Operation::Beside => growth.last().copied().flatten(),
+                other => other.operands().into_iter().flatten().all(|a| of(a) == Some(0.0)).then_some(0.0),
+            });
+        }
+        results.all(|result| growth[result as usize] == Some(0.0))
+    }
+
     /// The numbers of the inputs that these results depend on.
     pub fn inputs_of(&self, results: &[Slot]) -> Vec<u32> {
         Self::new(&self.operations, &mut results.to_vec()).inputs().collect()

@@ -106,3 +106,16 @@ fn lanes_have_the_bits_of_plain_numbers() {
         );
     }
 }
+
+#[test]
+fn only_differences_of_inputs_are_told_from_inputs() {
+    let differs = |formula: fn([Symbol; 3]) -> Symbol| {
+        let [(tape, results)] = Symbol::record(|| [vec![formula([0, 1, 2].map(Symbol::input))]]);
+        !tape.is_unchanged_by_shifts(|input| input < 2, results.into_iter())
+    };
+    assert!(!differs(|[x, y, z]| ((x - y) * z).tanh() + (y.scale(2.0) - x - x).sin_cos().1));
+    assert!(!differs(|[_, _, z]| z * z));
+    assert!(differs(|[x, y, z]| (x - y) * z + y));
+    assert!(differs(|[x, y, _]| x * x - y * y));
+    assert!(differs(|[x, y, z]| (x.scale(2.0) - y) / z));
+}

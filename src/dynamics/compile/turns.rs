@@ -2,9 +2,10 @@
 
 use super::Mechanism;
 use crate::dynamics::Time;
+use crate::dynamics::constraint::aim::{Aim, AimInput};
 use crate::dynamics::constraint::{RowMeasure, Site};
-use crate::dynamics::force::UserForce;
 use crate::dynamics::force::formula::Formulas;
+use crate::dynamics::force::user::{ForceInput, UserForce};
 use crate::scene::Meaning;
 use std::f64::consts::{PI, TAU};
 
@@ -16,7 +17,8 @@ pub(crate) struct WholeTurns {
 }
 
 impl WholeTurns {
-    /// Those of a mechanism: springs hold bodies to one another, formulas to the ground.
+    /// Those of a mechanism: springs and laws of relative angles hold bodies to one another, those of angles
+    /// to the ground.
     pub fn of(mechanism: &Mechanism) -> Self {
         Self::joined(mechanism, std::iter::empty())
     }
@@ -32,12 +34,12 @@ impl WholeTurns {
         for spring in mechanism.torsions.iter().filter(|spring| spring.stiffness != 0.0) {
             join(spring.body, spring.base.unwrap_or(ground));
         }
-        let aims = mechanism.aims().flat_map(|aim| aim.counted_angles());
-        let formulas = mechanism.laws.iter().flat_map(|laws| laws.formulas.counted_angles());
-        for body in mechanism.forces.iter().flat_map(UserForce::counted_angles).chain(aims).chain(formulas) {
-            join(body, ground);
+        let forces = mechanism.forces.iter().flat_map(UserForce::angles_compared);
+        let aims = mechanism.aims().flat_map(Aim::angles_compared);
+        let formulas = mechanism.laws.iter().flat_map(|laws| laws.formulas.angles_compared());
+        for (body, base) in forces.chain(aims).chain(formulas).chain(pairs) {
+            join(body, base.unwrap_or(ground));
         }
-        pairs.for_each(|(body, base)| join(body, base.unwrap_or(ground)));
         let first = |k: usize| group.iter().position(|one| *one == group[k]);
         let with = (0..ground).map(|k| if group[k] == group[ground] { None } else { first(k) }).collect();
         Self { with }
@@ -116,28 +118,60 @@ impl Mechanism {
     }
 }
 
+/// A body, and the one its angle is compared with; `None` for the ground.
+type Compared = (usize, Option<usize>);
+
+/// The angles of these bodies, compared with one another where only their differences matter.
+fn compared(bodies: Vec<usize>, only_differences: bool) -> impl Iterator<Item = Compared> {
+    let base = bodies.first().copied().filter(|_| only_differences);
+    bodies.into_iter().map(move |body| (body, base))
+}
+
+impl UserForce {
+    /// The bodies whose whole turns matter to it, and beside which.
+    fn angles_compared(&self) -> impl Iterator<Item = Compared> {
+        let only_differences = self.parts.iter().all(|part| {
+            let angle = |input: u32| matches!(self.inputs[input as usize], ForceInput::Angle(_));
+            let forces = part.forces.iter().flat_map(|force| force.1);
+            let acting = forces.chain(part.torques.iter().map(|torque| torque.1)).chain(part.power);
+            part.tape.is_unchanged_by_shifts(angle, acting)
+        });
+        compared(self.counted_angles().collect(), only_differences)
+    }
+}
+
+impl Aim {
+    /// The bodies whose whole turns matter to it, and beside which.
+    fn angles_compared(&self) -> impl Iterator<Item = Compared> {
+        let angle = |input: u32| matches!(self.inputs[input as usize], AimInput::Angle(_));
+        let slopes = self.slopes.iter().map(|slope| slope.1);
+        let results = [self.value, self.drive, self.convective].into_iter().chain(slopes);
+        let only_differences = self.tape.is_unchanged_by_shifts(angle, results);
+        compared(self.counted_angles().collect(), only_differences)
+    }
+}
+
 impl Formulas {
-    /// The bodies whose whole turns matter to them, on whichever branches.
-    pub fn counted_angles(&self) -> impl Iterator<Item = usize> {
-        self.meanings().flat_map(counted)
+    /// The bodies whose whole turns matter to them, on whichever branches, and beside which.
+    fn angles_compared(&self) -> impl Iterator<Item = Compared> {
+        self.meanings().filter_map(angle_of)
     }
 
     /// True where whole turns may matter to them: on other branches, to events that change what acts, and to
     /// what acts with other parameters than those that hold, beside which derivatives are taken.
     pub fn may_count_turns(&self) -> bool {
-        self.switches() && self.counted_angles().next().is_some()
-            || self.acting_meanings().flat_map(counted).next().is_some()
+        self.switches() && self.angles_compared().next().is_some()
+            || self.acting_meanings().filter_map(angle_of).next().is_some()
     }
 }
 
-/// The bodies of which a number of a formula is the angle.
-fn counted(meaning: &Meaning<Site>) -> impl Iterator<Item = usize> {
-    let bodies = match *meaning {
-        Meaning::Angle(body) => [Some(body), None],
-        Meaning::RelativeAngle(body, base) => [Some(body), base],
-        _ => [None; 2],
-    };
-    bodies.into_iter().flatten()
+/// The angle that a number of a formula is.
+fn angle_of(meaning: &Meaning<Site>) -> Option<Compared> {
+    match *meaning {
+        Meaning::Angle(body) => Some((body, None)),
+        Meaning::RelativeAngle(body, base) => Some((body, base)),
+        _ => None,
+    }
 }
 
 #[cfg(test)]
