@@ -5,8 +5,10 @@ use super::drawing::MechanismDrawing;
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Picture, plain};
+use crate::dynamics::Mechanism;
 use crate::run::Modes;
 use crate::run::modes::{Equilibrium, Mode, Stability};
+use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::f64::consts::TAU;
 
@@ -28,22 +30,18 @@ const FRAMES: usize = 48;
 
 /// One object: `equilibria`, each with its coordinates, stability and modes; `degrees_of_freedom`, `starts`.
 pub fn object(found: &Modes) -> Value {
-    let named = |values: Vec<Value>| -> Value {
-        let names = (0..values.len()).map(|k| found.mechanism.coordinate_name(k));
-        names.zip(values).collect::<Map<String, Value>>().into()
-    };
     let mode = |mode: &Mode| {
         json!({
             "eigenvalue": mode.eigenvalue,
             "frequency": mode.frequency,
             "hertz": mode.eigenvalue[1] / TAU,
             "damping_ratio": mode.damping_ratio,
-            "shape": named(mode.shape.iter().map(|shape| json!(shape)).collect()),
+            "shape": by_coordinate(&found.mechanism, &mode.shape),
         })
     };
     let equilibrium = |one: &Equilibrium| {
         json!({
-            "coordinates": named(one.phi.iter().map(|phi| json!(phi)).collect()),
+            "coordinates": by_coordinate(&found.mechanism, &one.phi),
             "potential": one.potential,
             "stability": one.stability,
             "from_start": one.from_start,
@@ -59,6 +57,28 @@ pub fn object(found: &Modes) -> Value {
         "equilibria": found.equilibria.iter().map(equilibrium).collect::<Vec<_>>(),
         "left_out": found.left_out,
     })
+}
+
+/// Values by the names of their coordinates.
+pub(super) fn by_coordinate<T: Serialize>(mechanism: &Mechanism, values: &[T]) -> Value {
+    let named = values.iter().enumerate().map(|(k, value)| (mechanism.coordinate_name(k), json!(value)));
+    named.collect::<Map<String, Value>>().into()
+}
+
+/// How many starts of a search were tried and settled, and at how many of what.
+pub(super) fn search(page: &mut Page, [tried, settled]: [usize; 2], found: &str) {
+    page.entry("search", &format!("{settled} of {tried} starts settled, at {found}"));
+}
+
+/// A numbered row of a table; numbers that are none are left out.
+pub(super) fn row(k: usize, numbers: &[f64]) -> Vec<String> {
+    let shown = |x: &f64| if x.is_finite() { figure(*x) } else { "-".to_owned() };
+    std::iter::once((k + 1).to_string()).chain(numbers.iter().map(shown)).collect()
+}
+
+/// Without what rounding leaves of zero.
+pub(super) fn rounded(x: f64) -> String {
+    figure((x * 1e12).round() / 1e12)
 }
 
 fn words(one: &Equilibrium) -> String {
@@ -79,33 +99,20 @@ fn words(one: &Equilibrium) -> String {
 pub fn text(found: &Modes) -> String {
     let mut page = Page::new(&found.scene.name, &found.scene.description);
     page.entry("freedom", &counted(found.degrees_of_freedom as u64, "degree", "degrees"));
-    page.entry(
-        "search",
-        &format!(
-            "{} of {} starts settled, at {}",
-            found.starts[1],
-            found.starts[0],
-            counted(found.equilibria.len() as u64, "equilibrium", "equilibria")
-        ),
-    );
+    search(&mut page, found.starts, &counted(found.equilibria.len() as u64, "equilibrium", "equilibria"));
     let is_told = |k: usize, one: &Equilibrium| k < TOLD || one.from_start;
     for (k, one) in found.equilibria.iter().enumerate().filter(|(k, one)| is_told(*k, one)) {
         let start = if one.from_start { ", next to the start" } else { "" };
         page.entry("equilibrium", &format!("{}: {}{start}", k + 1, words(one)));
         let places: Vec<String> = (one.phi.iter().enumerate())
-            .map(|(k, phi)| {
-                format!("{} {}", found.mechanism.coordinate_name(k), figure((phi * 1e12).round() / 1e12))
-            })
+            .map(|(k, phi)| format!("{} {}", found.mechanism.coordinate_name(k), rounded(*phi)))
             .collect();
         page.entry("", &places.join(", "));
         page.entry("", &format!("potential energy {} J", figure(one.potential)));
         let rows: Vec<Vec<String>> = (one.modes.iter().take(LISTED).enumerate())
             .map(|(k, mode)| {
                 let [re, im] = mode.eigenvalue;
-                let numbers = [im / TAU, TAU / im, mode.damping_ratio, re, im];
-                let told =
-                    numbers.into_iter().map(|x| if x.is_finite() { figure(x) } else { "-".to_owned() });
-                std::iter::once((k + 1).to_string()).chain(told).collect()
+                row(k, &[im / TAU, TAU / im, mode.damping_ratio, re, im])
             })
             .collect();
         if !rows.is_empty() {

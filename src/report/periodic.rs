@@ -4,11 +4,12 @@
 use super::drawing::MechanismDrawing;
 #[cfg(feature = "charts")]
 use super::modes::Charts;
+use super::modes::{by_coordinate, rounded, row, search};
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Multipliers, plain};
 use crate::run::modes::{PeriodicMotion, PeriodicMotions, Stability};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use std::f64::consts::TAU;
 
 /// Multipliers that the page lists of one motion, and motions that it tells; the record has all.
@@ -24,14 +25,10 @@ const PLACES: usize = 240;
 
 /// One object: `period`, `periodic_motions`, each with its start, stability and multipliers.
 pub fn object(found: &PeriodicMotions) -> Value {
-    let named = |values: &[f64]| -> Value {
-        let names = (0..values.len()).map(|k| found.mechanism.coordinate_name(k));
-        names.zip(values.iter().map(|value| json!(value))).collect::<Map<String, Value>>().into()
-    };
     let motion = |one: &PeriodicMotion| {
         json!({
-            "coordinates": named(&one.phi),
-            "rates": named(&one.omega),
+            "coordinates": by_coordinate(&found.mechanism, &one.phi),
+            "rates": by_coordinate(&found.mechanism, &one.omega),
             "turns": one.turns,
             "residual": one.residual,
             "stability": one.stability,
@@ -68,21 +65,13 @@ pub fn text(found: &PeriodicMotions) -> String {
     let mut page = Page::new(&found.scene.name, &found.scene.description);
     page.entry("freedom", &counted(found.degrees_of_freedom as u64, "degree", "degrees"));
     page.entry("period", &format!("{} s", figure(found.period)));
-    page.entry(
-        "search",
-        &format!(
-            "{} of {} starts settled, at {}",
-            found.starts[1],
-            found.starts[0],
-            counted(found.motions.len() as u64, "periodic motion", "periodic motions")
-        ),
-    );
+    let motions = counted(found.motions.len() as u64, "periodic motion", "periodic motions");
+    search(&mut page, found.starts, &motions);
     let is_told = |k: usize, one: &PeriodicMotion| k < TOLD || one.from_start;
     for (k, one) in found.motions.iter().enumerate().filter(|(k, one)| is_told(*k, one)) {
         let start = if one.from_start { ", next to the start" } else { "" };
         page.entry("motion", &format!("{}: {}{start}", k + 1, words(one)));
         let name = |k: usize| found.mechanism.coordinate_name(k);
-        let rounded = |x: f64| figure((x * 1e12).round() / 1e12);
         let places = one.phi.iter().zip(&one.omega).enumerate();
         let places: Vec<String> = places
             .map(|(k, (phi, omega))| format!("{} {} at {}", name(k), rounded(*phi), rounded(*omega)))
@@ -93,12 +82,9 @@ pub fn text(found: &PeriodicMotions) -> String {
             .map(|(k, [re, im])| {
                 let size = re.hypot(*im);
                 // Beyond nine digits there is nothing but rounding.
-                let rounded = |x: f64| (x * 1e9).round() / 1e9;
-                let growth = rounded(libm::log(size)) / found.period;
-                let numbers = [*re, *im, rounded(size), growth, libm::atan2(*im, *re) / TAU];
-                let told =
-                    numbers.into_iter().map(|x| if x.is_finite() { figure(x) } else { "-".to_owned() });
-                std::iter::once((k + 1).to_string()).chain(told).collect()
+                let nine = |x: f64| (x * 1e9).round() / 1e9;
+                let growth = nine(libm::log(size)) / found.period;
+                row(k, &[*re, *im, nine(size), growth, libm::atan2(*im, *re) / TAU])
             })
             .collect();
         if !rows.is_empty() {
