@@ -45,6 +45,7 @@ mod forces_at_points;
 mod formulas;
 #[cfg(feature = "digits")]
 mod formulas_in_digits;
+mod fractional_powers;
 mod friction;
 mod friction_impacts;
 mod friction_reversals;

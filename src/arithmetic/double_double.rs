@@ -271,6 +271,10 @@ impl Scalar for DoubleDouble {
     fn atan2(self, x: Self) -> Self {
         elementary::atan2(self, x)
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        crate::arithmetic::power_above_zero(self, exponent)
+    }
 }
 
 impl Real for DoubleDouble {

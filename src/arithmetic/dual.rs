@@ -158,6 +158,14 @@ impl<const D: usize, K: ConstantKind> Scalar for DualNumber<D, K> {
             (x.value * y_rate - self.value * x_rate) / square
         })
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        let (x, p) = (self.value, exponent.value);
+        let power = x.power_above_zero(p);
+        let slope = p * x.power_above_zero(p - 1.0);
+        let by_exponent = if x > 0.0 { power * Scalar::ln(x) } else { 0.0 };
+        self.join(exponent, power, |rate, p_rate| slope * rate + by_exponent * p_rate)
+    }
 }
 
 impl<const D: usize, K: ConstantKind> Real for DualNumber<D, K> {

@@ -134,6 +134,11 @@ impl<L: Lanes> Scalar for Eight<L> {
         let (Octet(y), Octet(x)) = (Octet::of(self.0), Octet::of(x.0));
         Self(Octet(std::array::from_fn(|lane| Scalar::atan2(y[lane], x[lane]))).halves())
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        let (Octet(base), Octet(exponent)) = (Octet::of(self.0), Octet::of(exponent.0));
+        Self(Octet(std::array::from_fn(|lane| base[lane].power_above_zero(exponent[lane]))).halves())
+    }
 }
 
 impl<L: Lanes> Add for Eight<L> {

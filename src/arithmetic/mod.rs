@@ -135,6 +135,26 @@ pub trait Scalar:
     fn powf(self, exponent: f64) -> Self {
         self.ln().scale(exponent).exp()
     }
+
+    /// The same of a base that conditions hold at zero or above, whatever rounding and trial steps make of
+    /// it: zero at zero and below.  The exponent does not change with time.
+    fn power_above_zero(self, exponent: Self) -> Self {
+        (self.ln() * exponent).exp()
+    }
+}
+
+/// What [`Scalar::power_above_zero`] is for numbers with an order; roots by their own function.
+pub(crate) fn power_above_zero<T: Real>(base: T, exponent: T) -> T {
+    let half = T::of(0.5);
+    if base <= T::ZERO {
+        T::ZERO
+    } else if exponent == half {
+        base.sqrt()
+    } else if exponent == -half {
+        T::ONE / base.sqrt()
+    } else {
+        (base.ln() * exponent).exp()
+    }
 }
 
 /// A scalar that constants of the kind `C` go with: doubles with every scalar, numbers of many digits with
@@ -168,6 +188,9 @@ pub trait Real: Scalar + PartialOrd {
     const HAS_CONSTANTS: bool = false;
     /// Share of its scale below which the pivot of a constraint counts as zero.
     const DROPPED: f64 = 1e-8;
+    /// The largest rate of a base, over itself \[1/s\], whose powers are expanded: beyond it the series of a
+    /// fractional power leaves the range of exponents.
+    const STEEPEST: f64 = 1e10;
 
     /// The nearest `f64`.
     fn value(self) -> f64;
@@ -251,6 +274,10 @@ impl Scalar for f64 {
     #[inline(always)]
     fn atan2(self, x: Self) -> Self {
         libm::atan2(self, x)
+    }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        power_above_zero(self, exponent)
     }
 }
 

@@ -109,6 +109,10 @@ impl<L: Lanes> Scalar for Pairs<L> {
     fn atan2(self, x: Self) -> Self {
         self.each(x, DoubleDouble::atan2)
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        self.each(exponent, DoubleDouble::power_above_zero)
+    }
 }
 
 impl<L: Lanes> Add for Pairs<L> {

@@ -146,6 +146,10 @@ impl<const W: usize> Scalar for Digits<W> {
     fn powf(self, exponent: f64) -> Self {
         (self.ln() * Self::of(exponent)).exp()
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        crate::arithmetic::power_above_zero(self, exponent)
+    }
 }
 
 impl<const W: usize> Over<Digits<W>> for Digits<W> {
@@ -165,6 +169,7 @@ impl<const W: usize> Real for Digits<W> {
     const HAS_CONSTANTS: bool = true;
     /// Rounding leaves far less of a pivot that is zero.
     const DROPPED: f64 = 1e-40;
+    const STEEPEST: f64 = f64::INFINITY;
 
     fn value(self) -> f64 {
         if self.kind == DigitsKind::NotFinite {

@@ -14,7 +14,7 @@ mod symbol;
 pub use series::TapeSeries;
 pub use symbol::Symbol;
 
-use super::Scalar;
+use super::{Real, Scalar};
 use std::cell::RefCell;
 
 /// Number of an operation on its tape.
@@ -60,6 +60,8 @@ pub enum Operation {
     HyperbolicTangent(Slot),
     /// The angle of the vector (x, y), given y, x and x² + y².
     Angle(Slot, Slot, Slot),
+    /// The [power above zero](Scalar::power_above_zero) of a, whose exponent b does not change with time.
+    Power(Slot, Slot),
     /// The second result of the operation before.
     Beside,
 }
@@ -69,9 +71,11 @@ impl Operation {
     pub fn operands(&self) -> [Option<Slot>; 3] {
         match *self {
             Self::Input(_) | Self::Constant(_) | Self::Beside => [None; 3],
-            Self::Add(a, b) | Self::Subtract(a, b) | Self::Multiply(a, b) | Self::Divide(a, b) => {
-                [Some(a), Some(b), None]
-            }
+            Self::Add(a, b)
+            | Self::Subtract(a, b)
+            | Self::Multiply(a, b)
+            | Self::Divide(a, b)
+            | Self::Power(a, b) => [Some(a), Some(b), None],
             Self::Negate(a)
             | Self::Scale(a, _)
             | Self::Root(a)
@@ -100,6 +104,7 @@ impl Operation {
             Self::Logarithm(a) => Self::Logarithm(of(a)),
             Self::HyperbolicTangent(a) => Self::HyperbolicTangent(of(a)),
             Self::Angle(y, x, square) => Self::Angle(of(y), of(x), of(square)),
+            Self::Power(a, b) => Self::Power(of(a), of(b)),
         }
     }
 
@@ -107,6 +112,14 @@ impl Operation {
     pub fn has_two_results(&self) -> bool {
         matches!(self, Self::Sine(_) | Self::HyperbolicTangent(_))
     }
+}
+
+/// True for a base, with its rate, whose fractional powers have no series: at zero and below, and so near that
+/// their coefficients leave the range of exponents.  Their first value stands for them, as long as the
+/// equations confirm it.
+#[inline(always)]
+pub fn has_no_powers<T: Real>(base: T, rate: T) -> bool {
+    base <= T::ZERO || rate.value().abs() > T::STEEPEST * base.value()
 }
 
 /// A formula with any number of results.
@@ -172,17 +185,23 @@ impl Tape {
     }
 
     /// True where its powers at one time may say nothing of what it is a little later: of exponentials,
-    /// hyperbolic tangents and quotients by what is no constant, which may be flat, and of roots and angles,
-    /// which nearly have a corner or a jump where their arguments are nearly zero.
+    /// hyperbolic tangents and quotients by what is no constant, which may be flat, and of roots, powers and
+    /// angles, which nearly have a corner or a jump where their arguments are nearly zero.
     pub fn needs_confirmation(&self) -> bool {
         self.operations.iter().any(|operation| match *operation {
             Operation::Exponential(_)
             | Operation::HyperbolicTangent(_)
             | Operation::Root(_)
+            | Operation::Power(..)
             | Operation::Angle(..) => true,
             Operation::Divide(_, by) => !matches!(self.operations[by as usize], Operation::Constant(_)),
             _ => false,
         })
+    }
+
+    /// True where fractional powers of what branches hold at zero or above are among its operations.
+    pub fn has_powers_above_zero(&self) -> bool {
+        self.operations.iter().any(|operation| matches!(operation, Operation::Power(..)))
     }
 
     /// Its operations.
@@ -274,6 +293,7 @@ impl Tape {
                 Operation::Exponential(a) => of(a).exp(),
                 Operation::Logarithm(a) => of(a).ln(),
                 Operation::Angle(y, x, _) => of(y).atan2(of(x)),
+                Operation::Power(a, b) => of(a).power_above_zero(of(b)),
                 Operation::Sine(a) => {
                     let (sin, cos) = of(a).sin_cos();
                     slots.put(i + 1, cos);

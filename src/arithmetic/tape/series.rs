@@ -10,12 +10,13 @@
 //! c = tanh a:   m c_m = Σ_{j=1..m} j a_j v_{m-j},  v = 1 - c²
 //! c = atan2(y, x):  m r_0 c_m = Σ_{j=1..m} j (y_j x_{m-j} - x_j y_{m-j}) - Σ_{j=1..m-1} j c_j r_{m-j},
 //!     r = x² + y²
+//! c = a^p:      m a_0 c_m = Σ_{j=1..m} (p j - (m - j)) a_j c_{m-j}
 //! ```
 //!
 //! Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99, proposition 2.1; A. Griewank, A. Walther,
 //! *Evaluating Derivatives*, table 13.2.
 
-use super::{Operation, Slot, Tape};
+use super::{Operation, Slot, Tape, has_no_powers};
 use crate::arithmetic::{DoubleDouble, Real};
 
 /// Powers 0 … P of all results of a tape.
@@ -103,6 +104,12 @@ impl<T: Real> TapeSeries<T> {
                         sum(1..=m, |j| (of(y)[j] * of(x)[m - j] - of(x)[j] * of(y)[m - j]).scale(j as f64));
                     let known = sum(1..=m - 1, |j| (own[j] * of(square)[m - j]).scale(j as f64));
                     over((turning - known) / of(square)[0], m)
+                }
+                Operation::Power(a, b) if m == 0 => of(a)[0].power_above_zero(of(b)[0]),
+                Operation::Power(a, _) if has_no_powers(of(a)[0], of(a)[1]) => T::ZERO,
+                Operation::Power(a, b) => {
+                    let factor = |j: usize| of(b)[0].scale(j as f64) - T::of((m - j) as f64);
+                    over(sum(1..=m, |j| factor(j) * of(a)[j] * own[m - j]) / of(a)[0], m)
                 }
                 Operation::Beside => continue,
             };

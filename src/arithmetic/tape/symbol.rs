@@ -53,6 +53,7 @@ fn key(operation: &Operation) -> [u64; 4] {
         Operation::HyperbolicTangent(_) => 12,
         Operation::Angle(..) => 13,
         Operation::Beside => 14,
+        Operation::Power(..) => 15,
     };
     [kind, a, b, more]
 }
@@ -140,6 +141,13 @@ impl Symbol {
                 Operation::Angle(y, x, square) => {
                     add(y, weight * at(x) / at(square));
                     add(x, -(weight * at(y) / at(square)));
+                }
+                Operation::Power(a, b) => {
+                    let exponent = match operations[b as usize] {
+                        Operation::Constant(value) => Self::of(value),
+                        _ => at(b),
+                    };
+                    add(a, weight * exponent * at(a).power_above_zero(exponent - Self::ONE));
                 }
             }
         }
@@ -238,6 +246,15 @@ impl Scalar for Symbol {
         }
         let square = self * self + x * x;
         Self::push(Operation::Angle(self.slot(), x.slot(), square.slot()))
+    }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        match (self.constant(), exponent.constant()) {
+            (Some(base), Some(exponent)) => Self::of(base.power_above_zero(exponent)),
+            (_, Some(0.0)) => Self::ONE,
+            (_, Some(1.0)) => self,
+            _ => Self::push(Operation::Power(self.slot(), exponent.slot())),
+        }
     }
 }
 

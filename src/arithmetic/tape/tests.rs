@@ -9,6 +9,7 @@ fn formula<S: Scalar>(x: S, y: S) -> S {
     (angle * root - (x / y).ln().scale(0.7)) * (x - y).tanh()
         + (-x).exp().powf(0.4)
         + S::of(2.0) / (x + x.tan())
+        + (x * y).power_above_zero(S::of(1.7)) * (x + y).power_above_zero(S::of(0.5))
 }
 
 fn recorded() -> (Tape, Slot, Vec<(u32, Slot)>) {
@@ -118,4 +119,25 @@ fn only_differences_of_inputs_are_told_from_inputs() {
     assert!(differs(|[x, y, z]| (x - y) * z + y));
     assert!(differs(|[x, y, _]| x * x - y * y));
     assert!(differs(|[x, y, z]| (x.scale(2.0) - y) / z));
+}
+
+#[test]
+fn powers_above_zero_are_zero_below() {
+    let [(tape, slots)] = Symbol::record(|| {
+        let value = Symbol::input(0).power_above_zero(Symbol::of(1.5));
+        [std::iter::once(value).chain(value.gradient().into_iter().map(|part| part.1)).collect()]
+    });
+    for (x, expected) in [(4.0, [8.0, 3.0]), (0.0, [0.0; 2]), (-1e-17, [0.0; 2])] {
+        let found = tape.results(|_| x, |results| [0, 1].map(|k| results[slots[k] as usize]));
+        assert!(
+            found.iter().zip(expected).all(|(a, b): (&f64, f64)| (a - b).abs() < 1e-14),
+            "{x}: {found:?}"
+        );
+        let dual = Dual::<1>::unknown(x, 0).power_above_zero(Dual::of(1.5));
+        assert!((dual.value - expected[0]).abs() < 1e-14 && (dual.slope[0] - expected[1]).abs() < 1e-14);
+    }
+    // The first powers are those of the value alone, as there is no series.
+    let mut series = TapeSeries::<f64>::new(&tape, 3);
+    (0..=3).for_each(|m| series.advance(&tape, m, |_| [0.0, 1.0, 0.5, 0.0][m]));
+    assert_eq!(series.of(slots[0]), [0.0; 4]);
 }

@@ -2,6 +2,7 @@
 
 use super::{Body, Joint, Mechanism};
 use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::tape::Tape;
 use crate::dynamics::constraint::{Aim, Site};
 use crate::dynamics::force::UserForce;
 use crate::dynamics::forest::{BodyOrigin, Hang};
@@ -115,6 +116,12 @@ impl Mechanism {
     pub fn needs_confirmation(&self) -> bool {
         self.forces.iter().any(|force| force.needs_confirmation)
             || self.aims().any(|aim| aim.tape.needs_confirmation())
+    }
+
+    /// True where laws have fractional powers of what branches hold at zero or above.
+    pub fn has_powers_above_zero(&self) -> bool {
+        let forces = self.forces.iter().flat_map(|force| &force.parts).map(|part| &part.tape);
+        forces.chain(self.aims().map(|aim| &aim.tape)).any(Tape::has_powers_above_zero)
     }
 
     /// True where laws have corners, places stick and slide or events change what acts, so that steps end

@@ -94,6 +94,11 @@ impl<S: Slots> Scalar for InSlots<S> {
         let x = x.store();
         self.seldom(|y| y.atan2(x))
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        let exponent = exponent.store();
+        self.seldom(|base| base.power_above_zero(exponent))
+    }
 }
 
 impl<S: Slots> Real for InSlots<S> {

@@ -6,7 +6,7 @@
 
 use super::factors::{CauchyFactor, Factored, Scale};
 use crate::arithmetic::DoubleDouble;
-use crate::arithmetic::tape::{Operation, Slot, Tape, TapeSeries};
+use crate::arithmetic::tape::{Operation, Slot, Tape, TapeSeries, has_no_powers};
 
 /// The series of a tape, as the numbers they are of multiply series.
 #[derive(Clone, Debug)]
@@ -202,6 +202,10 @@ impl<T: Factored> FactorTape<T> {
                 (of(a).ln(), None)
             }
             Operation::HyperbolicTangent(a) => (of(a).tanh(), None),
+            Operation::Power(a, b) => {
+                inverse = T::ONE / of(a);
+                (of(a).power_above_zero(of(b)), None)
+            }
             Operation::Angle(y, x, square) => {
                 inverse = T::ONE / of(square);
                 (of(y).atan2(of(x)), None)
@@ -235,6 +239,11 @@ impl<T: Factored> FactorTape<T> {
                 (of(a) - own.factor.product(&own.factor, scale, m, 1..=m - 1)) * own.inverse
             }
             Operation::Exponential(a) => over(at(a).weighted.product(&own.factor, scale, m, 1..=m)),
+            Operation::Power(a, _) if has_no_powers(at(a).powers[0], self.power(a, 1)) => T::ZERO,
+            Operation::Power(a, b) => {
+                let by_base = at(b).powers[0] * at(a).weighted.product(&own.factor, scale, m, 1..=m);
+                over(by_base - own.weighted.product(&at(a).factor, scale, m, 1..=m - 1)) * own.inverse
+            }
             Operation::Logarithm(a) => {
                 (of(a) - over(own.weighted.product(&at(a).factor, scale, m, 1..=m - 1))) * own.inverse
             }
@@ -277,6 +286,10 @@ fn factors(operations: &[Operation], constants: &[bool]) -> Vec<[bool; 2]> {
             Operation::Logarithm(a) => {
                 plain.push(a);
                 weighted.push(own);
+            }
+            Operation::Power(a, _) => {
+                plain.extend([own, a]);
+                weighted.extend([own, a]);
             }
             Operation::Sine(a) | Operation::HyperbolicTangent(a) => {
                 plain.extend([own, beside]);

@@ -12,6 +12,7 @@ mod branches;
 mod error;
 mod exact;
 mod parse;
+mod sign;
 mod table;
 pub mod unit;
 mod wave;
@@ -131,6 +132,8 @@ pub struct Formula {
     names: Vec<(String, usize)>,
     /// The nodes whose signs choose the branches, or the arguments of tables.
     conditions: Vec<usize>,
+    /// The nodes that branches hold at zero or above.
+    held: Vec<usize>,
     /// The tables in it.
     tables: Vec<Interpolant>,
 }
@@ -311,7 +314,8 @@ impl Formula {
             Node::Difference(a, b) => at(a) - at(b),
             Node::Product(a, b) => at(a) * at(b),
             Node::Quotient(a, b) => at(a) / at(b),
-            Node::Power(a, b) => self.power(at(a), at(b), b),
+            Node::Power(a, b) => self.power([a, b], at(a), at(b)),
+            Node::Root(a) if self.is_held_above_zero(a) => at(a).power_above_zero(S::of(0.5)),
             Node::Root(a) => at(a).sqrt(),
             Node::Exponential(a) => at(a).exp(),
             Node::Logarithm(a) => at(a).ln(),
@@ -324,36 +328,9 @@ impl Formula {
         }
     }
 
-    /// Bounds of what an operation comes to, whatever its names are.
-    fn range(&self, node: usize) -> [f64; 2] {
-        if let Some(value) = self.constants[node] {
-            return [value; 2];
-        }
-        match self.nodes[node] {
-            Node::Negative(a) => {
-                let [least, most] = self.range(a);
-                [-most, -least]
-            }
-            Node::Sum(a, b) => {
-                let (a, b) = (self.range(a), self.range(b));
-                [a[0] + b[0], a[1] + b[1]]
-            }
-            Node::Difference(a, b) => {
-                let (a, b) = (self.range(a), self.range(b));
-                [a[0] - b[1], a[1] - b[0]]
-            }
-            Node::Sine(_) | Node::Cosine(_) | Node::HyperbolicTangent(_) => [-1.0, 1.0],
-            Node::Root(_) | Node::Exponential(_) => [0.0, f64::INFINITY],
-            Node::Power(_, b) if self.constants[b].is_some_and(|power| power % 2.0 == 0.0) => {
-                [0.0, f64::INFINITY]
-            }
-            Node::Flip(condition, a) if self.conditions[condition] == a => [0.0, f64::INFINITY],
-            _ => [f64::NEG_INFINITY, f64::INFINITY],
-        }
-    }
-
     /// Adds an operation that stands at bytes `place`, and what it comes to where all it takes is constant.
     fn push(&mut self, node: Node, place: (usize, usize)) -> usize {
+        self.note_base(node);
         let is_open = matches!(node, Node::Name(_) | Node::Flip(..) | Node::Select(..) | Node::Table(..));
         let is_constant =
             !is_open && node.operands().into_iter().flatten().all(|node| self.constants[node].is_some());
@@ -362,15 +339,6 @@ impl Formula {
         self.constants.push(value);
         self.places.push((place.0 as u32, place.1 as u32));
         self.nodes.len() - 1
-    }
-
-    /// Whole powers by multiplications, at any base; others by the logarithm of a positive base.
-    fn power<S: Scalar>(&self, base: S, exponent: S, node: usize) -> S {
-        match self.constants[node] {
-            Some(power) if power.fract() == 0.0 && power.abs() <= LARGEST_POWER => base.powi(power as i32),
-            Some(0.5) => base.sqrt(),
-            _ => (base.ln() * exponent).exp(),
-        }
     }
 
     /// Its dimension, from those of its names in their order; `None` where that is left open: a number

@@ -37,6 +37,7 @@ impl<'a> Parser<'a> {
             places: Vec::new(),
             names: Vec::new(),
             conditions: Vec::new(),
+            held: Vec::new(),
             tables: Vec::new(),
         };
         Self { text, at: 0, depth: 0, formula, tables }
@@ -322,9 +323,11 @@ impl<'a> Parser<'a> {
         if name == "if" {
             (arguments[0], is_swapped) = self.compared(arguments[0])?;
         }
+        let mut ends = vec![self.formula.nodes.len()];
         while self.peek() == Some(b',') {
             self.at += 1;
             arguments.push(self.expression(0)?);
+            ends.push(self.formula.nodes.len());
         }
         self.close(open)?;
         if arguments.len() != takes {
@@ -338,6 +341,11 @@ impl<'a> Parser<'a> {
         }
         let first = arguments[0];
         let last = arguments[takes - 1];
+        if let ("if", &[from, middle, to]) = (name.as_str(), &ends[..]) {
+            let branches = [from..middle, middle..to];
+            let [holds, fails] = branches;
+            self.formula.note_bases(first, if is_swapped { [fails, holds] } else { [holds, fails] });
+        }
         let node = match name.as_str() {
             "sqrt" => Node::Root(first),
             "exp" => Node::Exponential(first),

@@ -100,6 +100,11 @@ impl<W: EightLanes> Scalar for InLanes<W> {
         let x = x.0.array();
         self.seldom(|lane, y| Scalar::atan2(y, x[lane]))
     }
+
+    fn power_above_zero(self, exponent: Self) -> Self {
+        let exponent = exponent.0.array();
+        self.seldom(|lane, base| base.power_above_zero(exponent[lane]))
+    }
 }
 
 impl<W: EightLanes> Real for InLanes<W> {

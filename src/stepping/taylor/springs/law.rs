@@ -17,7 +17,7 @@
 use super::HIGHEST_ORDER;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::lanes::Lanes;
-use crate::arithmetic::tape::{Operation, Slot};
+use crate::arithmetic::tape::{Operation, Slot, has_no_powers};
 use crate::dynamics::force::span::{LENGTH, RATE, SpanLaw};
 
 /// Blocks of four that hold all powers, and how many powers these are.
@@ -196,6 +196,11 @@ fn advance<L: Lanes>(
                 let turning = turned(of(y), of(x)) - turned(of(x), of(y));
                 over((turning - turned(own, of(square))) / of(square).at(0))
             }
+            Operation::Power(a, b) if m == 0 => at(a).power_above_zero(at(b)),
+            Operation::Power(a, _) if has_no_powers(of(a).at(0), of(a).at(1)) => 0.0,
+            Operation::Power(a, b) => {
+                over(of(b).at(0) * turned(of(a), own) - turned(own, of(a))) / of(a).at(0)
+            }
             Operation::Beside => continue,
         };
         own.put(m, power);
@@ -213,7 +218,8 @@ mod tests {
     fn everything(x: Symbol, y: Symbol) -> Symbol {
         let (sin, cos) = (x * y).sin_cos();
         let flat = (x - y).scale(0.7).tanh() + (-(x * x)).exp() / (y + Symbol::of(2.0));
-        sin * cos.scale(2.0) + flat + (x + y).sqrt() * (x.ln() + sin.atan2(y))
+        let power = (x + y).power_above_zero(Symbol::of(1.3));
+        sin * cos.scale(2.0) + flat + (x + y).sqrt() * (x.ln() + sin.atan2(y)) - power
     }
 
     #[test]
