@@ -376,3 +376,115 @@ fn a_joint_rubs_as_in_flight_until_infinitely_many_bounces_have_ended() {
         }
     }
 }
+
+/// A bar of 1 kg on a hinge whose tip meets a rough wall, alone or as a crank of a parallelogram whose coupler meets
+/// it: one degree of freedom, with the moment of inertia by the angle of the bar.
+fn one_freedom(is_looped: bool, through: [f64; 2], wall: &str, phi: f64) -> (String, f64) {
+    let bar = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.25, 0], "inertia": 0.03, "length": 0.5}}"#)
+    };
+    let hinge = |name: &str, one: &str, other: &str| {
+        let side = |side: &str| {
+            let (body, point) = side.split_once(' ').expect("a body and its point");
+            format!(r#"{{"body": "{body}", "point": [{point}, 0]}}"#)
+        };
+        format!(r#"{{"name": "{name}", "between": [{}, {}]}}"#, side(one), side(other))
+    };
+    let (mut bars, mut hinges) = (vec![bar("a")], vec![hinge("A", "ground 0", "a 0")]);
+    let mut start = format!(r#""a": {{"phi": {phi}, "omega": 0}}"#);
+    if is_looped {
+        bars.push(
+            r#"{"name": "b", "mass": 0.7, "centre": [0.2, 0.1], "inertia": 0.05, "length": 0.8}"#.into(),
+        );
+        bars.push(bar("c"));
+        let more = [("B", "a 0.5", "b 0"), ("C", "b 0.8", "c 0.5"), ("D", "ground 0.8", "c 0")];
+        hinges.extend(more.map(|(name, one, other)| hinge(name, one, other)));
+        start += &format!(r#", "b": {{"phi": 0, "omega": 0}}, "c": {{"phi": {phi}, "omega": 0}}"#);
+    }
+    let (on, at) = if is_looped { ("b", "0.3, -0.2") } else { ("a", "0.5, 0") };
+    let [x, y] = through;
+    let text = format!(
+        r#"{{"name": "rest", "gravity": [0, -{G}], "bars": [{}], "hinges": [{}],
+        "walls": [{{"name": "W", "body": "{on}", "point": [{at}], "line": {{"through": [{x}, {y}], {wall}}}],
+        "start": {{{start}}}, "until": 0.6, "every": 0.1}}"#,
+        bars.join(", "),
+        hinges.join(", "),
+    );
+    let crank = 0.03 + 0.0625;
+    (text, if is_looped { 2.0 * crank + 0.7 * 0.25 } else { crank })
+}
+
+/// What a wall whose normal is (x, 1) does to that mechanism, whose bar turns by `omega`: impulses of the wall and of
+/// friction, and the rate after them.
+///
+/// The point moves by J_n and J_t of the rate, and both end together; then it sticks where J_n <= mu0 J_t, and
+/// restitution moves nothing, else it slides back.
+fn stopped_by(normal: f64, phi: f64, [inertia, omega, mu, e]: [f64; 4]) -> [f64; 3] {
+    let size = normal.hypot(1.0);
+    let [n, t] =
+        [0.5 * (phi.cos() - normal * phi.sin()) / size, 0.5 * (-phi.sin() - normal * phi.cos()) / size];
+    let compressed = inertia * omega.abs() / (n.abs() + mu * t.abs());
+    let braked = -(t * omega).signum() * mu * compressed;
+    let back = -(n * t).signum() * if n.abs() <= mu * t.abs() { (n / t).abs() } else { mu };
+    let tangential = braked + back * e * compressed;
+    let after = omega + (n * (1.0 + e) * compressed + t * tangential) / inertia;
+    [(1.0 + e) * compressed, tangential, after]
+}
+
+/// What has one degree of freedom comes to rest on a rough wall, or rebounds, whichever of both velocities of its
+/// point rounding lets end first.
+#[test]
+fn a_mechanism_of_one_freedom_is_stopped_by_a_rough_wall() {
+    let (mut rests, mut rebounds) = (0, 0);
+    for k in 0..800_u32 {
+        let of = |salt: u32| {
+            f64::from(k.wrapping_mul(2_654_435_761).wrapping_mul(2 * salt + 1) >> 8) / f64::from(1_u32 << 24)
+        };
+        let (phi, normal, omega, mu) =
+            (-1.5 * of(1), 4.0 * of(2) - 2.0, 6.0 * of(3) - 3.0, 0.1 + 0.8 * of(4));
+        let (is_looped, e) = (k % 2 == 1, if k % 4 < 2 { 0.0 } else { 0.4 });
+        let velocity = 0.5 * omega * (phi.cos() - normal * phi.sin());
+        if velocity > -0.01 {
+            continue;
+        }
+        let wall =
+            format!(r#""normal": [{normal}, 1]}}, "restitution": {e}, "friction": {{"kinetic": {mu}}}"#);
+        let (text, inertia) = one_freedom(is_looped, [0.0, -9.0], &wall, phi);
+        let mechanism = Mechanism::new(&scene(&text)).expect("equations");
+        let (angles, rates) = match is_looped {
+            true => (vec![phi, 0.0, phi], vec![omega, 0.0, omega]),
+            false => (vec![phi], vec![omega]),
+        };
+        let impact = mechanism.impact_at(0, Default::default(), &angles, &rates);
+        let impact = impact.unwrap_or_else(|| panic!("no end: {text}"));
+        let [impulse, tangential, after] = stopped_by(normal, phi, [inertia, omega, mu, e]);
+        near(impact.impulse, impulse, "impulse");
+        near(impact.tangential, tangential, "friction");
+        near(impact.omega[0], after, "rate");
+        if after.abs() < 1e-9 { rests += 1 } else { rebounds += 1 }
+    }
+    assert!(rests > 100 && rebounds > 30, "{rests} rest, {rebounds} rebound");
+    // The tip falls to (0.3, -0.4), and stays there.
+    for (normal, mu) in [(-0.1, 0.3), (-0.2, 0.45), (-0.3, 0.6), (-0.4, 0.3), (-0.5, 0.5), (-0.6, 0.2)] {
+        let wall = format!(r#""normal": [{normal}, 1]}}, "restitution": 0, "friction": {{"kinetic": {mu}}}"#);
+        let (text, inertia) = one_freedom(false, [0.3, -0.4], &wall, -0.3);
+        let (phi, fell) = (-(0.8_f64.asin()), 0.25 * (0.8 - 0.3_f64.sin()));
+        let omega = -(2.0 * G * fell / inertia).sqrt();
+        let [impulse, tangential, _] = stopped_by(normal, phi, [inertia, omega, mu, 0.0]);
+        for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+            for tolerance in [1e-9, 1e-11] {
+                let outcome = run(&scene(&text), &adaptive(method, tolerance));
+                assert!(outcome.stop.is_none(), "{method} {tolerance:e}: {:?}\n{text}", outcome.stop);
+                let found = [outcome.impacts[0].impulse, outcome.impacts[0].friction_impulse];
+                let last = [outcome.last.phi[0], outcome.last.omega[0]];
+                for (found, expected) in found.into_iter().chain(last).zip([impulse, tangential, phi, 0.0]) {
+                    assert!(
+                        (found - expected).abs() < 1e3 * tolerance,
+                        "{method}: {found} and not {expected}"
+                    );
+                }
+                near(outcome.impact_count as f64, 1.0, "impacts");
+            }
+        }
+    }
+}

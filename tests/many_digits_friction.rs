@@ -269,6 +269,31 @@ fn a_ball_that_sticks_in_an_impact_turns_as_the_impulses_say() {
     }
 }
 
+/// A bar on a hinge with and without friction falls on a rough wall, whose impulses stop it at once: its tip stays at
+/// (0.14, -0.48).
+#[test]
+fn a_hinged_bar_stays_where_a_rough_wall_stops_it() {
+    for (normal, mu) in [("0.1", "0.5"), ("-0.09", "0.443"), ("-0.15", "0.25"), ("-0.25", "0.7")] {
+        for friction in ["", r#", "friction": {"radius": 0.044, "kinetic": 0.243}"#] {
+            let text = format!(
+                r#"{{"name": "rest", "gravity": [0, -9.81],
+                "bars": [{{"name": "b", "mass": 1, "centre": [0.25, 0], "inertia": 0.03, "length": 0.5}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]{friction}}}],
+                "walls": [{{"name": "W", "body": "b", "point": [0.5, 0], "restitution": 0, "friction": {{"kinetic": {mu}}},
+                    "line": {{"through": [0.14, -0.48], "normal": [{normal}, 1]}}}}],
+                "start": {{"b": {{"phi": -0.3, "omega": 0}}}}, "until": 9, "every": 9}}"#
+            );
+            for digits in [25, 30, 60] {
+                let places = digits as u32 - 3;
+                let found = ran(&text, "1", digits);
+                assert_eq!(found.impacts, 1, "{text}");
+                found.has(&[(1, BigInt::ZERO)], places);
+                near(&cosine(&number(found.row.bodies[0][0])), &fixed("0.28"), places);
+            }
+        }
+    }
+}
+
 /// A spring of 50 N/m whose other end moves with 0.3 m/s: loose at 0.4 N / (k v), then a swing about 0.2 N/k behind it.
 #[test]
 fn a_motor_that_drags_a_block_by_a_spring_pulls_it_loose() {

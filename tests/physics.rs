@@ -27,6 +27,7 @@ mod batch;
 mod batch_couplings;
 mod batch_loops;
 mod benchmarks;
+mod breaking_away;
 mod chains;
 mod contact;
 mod convergence;

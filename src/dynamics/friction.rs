@@ -17,13 +17,16 @@
 //!
 //! Source: F. Pfeiffer, C. Glocker, *Multibody Dynamics with Unilateral Contacts* (1996), chapters 5 and 6.
 
+mod combinations;
 mod evaluation;
 pub mod impact;
 pub mod modes;
+pub mod paradox;
 mod shared;
 pub mod simultaneous;
 
-pub use modes::{FrictionMoment, Paradox, Transition};
+pub use modes::{FrictionMoment, Transition};
+pub use paradox::Paradox;
 
 use super::Mechanism;
 use super::compile::{CompileError, Joint};

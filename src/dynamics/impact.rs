@@ -205,12 +205,15 @@ impl Mechanism {
             let along = MetricRow::of(&friction.tangent, t, ConstraintArguments { phi, z: &z, omega }).along;
             let across = metric.column(&along);
             let free_across = metric.free(&across);
+            let share = free.dot(&free_across) / free.norm_squared();
+            let apart = (&free_across - &free * share).norm();
             let shock = Shock {
                 response: [free.norm_squared(), free.dot(&free_across), free_across.norm_squared()],
                 velocity: [column.dot(&kept) + here.drive, across.dot(&kept)],
                 restitution: *restitution,
                 coefficients: [friction.kinetic, friction.stiction],
                 is_newton: friction.is_newton,
+                one_way: (apart <= NO_FREEDOM * free_across.norm()).then_some(NO_FREEDOM),
             };
             [impulse, tangential] = shock.impulses()?;
             push = &column * impulse + &across * tangential;

@@ -8,7 +8,8 @@ use super::contact::ContactDriver;
 use super::running::Outcome;
 use crate::arithmetic::Complex;
 use crate::dynamics::constraint::ConstraintArguments;
-use crate::dynamics::friction::modes::{HINT, JAMS, Modes};
+use crate::dynamics::friction::modes::{A_MOMENT, Modes};
+use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::dynamics::friction::{CompiledFriction, FrictionMode, FrictionMoment, Transition};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -22,8 +23,8 @@ const KEPT: usize = 1000;
 /// Velocity over the sum of the magnitudes of its parts and the mechanism's own up to which what others hold
 /// rests: they may begin to move it.
 const AT_REST: f64 = 1e-11;
-/// A moment, over the mechanism's own time.
-const A_MOMENT: f64 = 1e-6;
+/// Velocity over the mechanism's own up to which what begins to slide is at rest.
+const NO_SPEED: f64 = 1e-12;
 /// How many times a force is to grow within it for its sign to count as that of rounding.
 const NO_FORCE: f64 = 100.0;
 /// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
@@ -68,6 +69,16 @@ impl FrictionWatch {
     /// The place a function is of; `None` for the regularity.
     pub fn place(&self, function: usize) -> Option<&CompiledFriction> {
         self.mechanism.frictions.get(function)
+    }
+
+    /// Magnitude up to which a function is rounding of a place that slides from rest.
+    pub fn at_rest(&self, function: usize) -> f64 {
+        match self.mechanism.modes.get(function) {
+            Some(FrictionMode::Slip(_)) => {
+                NO_SPEED * self.mechanism.displacement_unit(function) / self.mechanism.units.time
+            }
+            _ => 0.0,
+        }
     }
 
     /// Begins to search a part of a step.

@@ -412,17 +412,8 @@ fn trace<T: Coefficient, P: Form + ?Sized>(
     match mechanism.held.iter().position(|&held| held == contact) {
         None => series.gap(&mechanism.contacts[contact], t, powers),
         Some(place) => {
-            // The rows of the contacts that are held are the last ones, but for those of what sticks.
-            let from_end = mechanism.held.len() - place + mechanism.sticking();
-            let force = |m| {
-                series
-                    .multipliers(m)
-                    .iter()
-                    .nth_back(from_end - 1)
-                    .map_or(f64::NAN, |multiplier| -multiplier.value())
-            };
             powers.clear();
-            powers.extend((0..series.order()).map(|m| force(m) / mechanism.contacts[contact].force));
+            powers.extend((0..series.order()).map(|m| expansion.pressure(place, m)));
         }
     }
 }

@@ -114,8 +114,8 @@ impl Operation {
     }
 }
 
-/// True for a base, with its rate, whose fractional powers have no series: at zero and below, and so near that
-/// their coefficients leave the range of exponents.  Their first value stands for them, as long as the
+/// True for a base, with its rate, whose fractional powers have no series: at zero and below, and so near
+/// that their coefficients leave the range of exponents.  Their first value stands for them, as long as the
 /// equations confirm it.
 #[inline(always)]
 pub fn has_no_powers<T: Real>(base: T, rate: T) -> bool {

@@ -8,6 +8,11 @@
 //! ends     Poisson: p_n = (1+e) p_c, v_n(p_c) = 0      Newton: v_n = -e v_n⁻
 //! ```
 //!
+//! Where the mechanism leaves the point one way to move, a_nn a_tt = a_nt².  Without motors and moving walls
+//! v_n and v_t are then in one proportion, and both are zero at the same impulse; which of them ends first
+//! in rounded numbers says nothing.  A point that sticks there is at rest, and no impulse moves it: after
+//! compression ends so, Poisson's restitution adds impulses without a rebound, and Newton's has no solution.
+//!
 //! Both laws agree where the point slides one way all along.  Poisson's never gains energy; Newton's may,
 //! where sliding ends or turns within the impact.
 //!
@@ -34,6 +39,9 @@ pub struct Shock<T = f64> {
     pub coefficients: [T; 2],
     /// True for Newton's law of impact, else Poisson's.
     pub is_newton: bool,
+    /// Where impulses change v_n and v_t in one proportion only: what of the normal velocity is rounding
+    /// where v_t has ended, over the velocities it is the difference of.
+    pub one_way: Option<T>,
 }
 
 /// Share of a velocity that rounding leaves of one that ended.
@@ -54,20 +62,25 @@ impl<T: Real> Shock<T> {
         let [kinetic, stiction] = self.coefficients;
         let [mut v_n, mut v_t] = self.velocity;
         let rebound = -self.restitution * v_n;
+        let at_rest = self.at_rest();
         let against = |velocity: T| if velocity < T::ZERO { kinetic } else { -kinetic };
         let [mut p_n, mut p_t] = [T::ZERO; 2];
         // The normal impulse at which it ends, known to Poisson from the end of compression on.
         let mut end = None;
         for _ in 0..8 {
+            let sticks = v_t.abs() <= still && (a_tt == T::ZERO || a_nt.abs() <= stiction * a_tt);
             let ratio = if v_t.abs() > still {
                 against(v_t)
-            } else if a_tt == T::ZERO || a_nt.abs() <= stiction * a_tt {
+            } else if sticks {
                 v_t = T::ZERO;
                 if a_tt == T::ZERO { T::ZERO } else { -a_nt / a_tt }
             } else {
                 against(a_nt)
             };
-            let (n_rate, t_rate) = (a_nn + a_nt * ratio, a_nt + a_tt * ratio);
+            let (n_rate, t_rate) = match at_rest {
+                Some(_) if sticks => (T::ZERO, T::ZERO),
+                _ => (a_nn + a_nt * ratio, a_nt + a_tt * ratio),
+            };
             // To the end of sliding, of compression, or of the impact.
             let stops = (v_t * t_rate < T::ZERO).then(|| -v_t / t_rate);
             let stops = stops.filter(|share| share.value().is_finite());
@@ -78,12 +91,16 @@ impl<T: Real> Shock<T> {
             };
             let ends = Some(ends).filter(|&share| share >= T::ZERO && share.value().is_finite());
             let is_stopped = stops.is_some_and(|stops| ends.is_none_or(|ends| stops <= ends));
-            let has_ended = ends.is_some_and(|ends| stops.is_none_or(|stops| ends <= stops));
+            let mut has_ended = ends.is_some_and(|ends| stops.is_none_or(|stops| ends <= stops));
             let share = if is_stopped { stops? } else { ends? };
             (p_n, p_t) = (p_n + share, p_t + ratio * share);
             (v_n, v_t) = (v_n + n_rate * share, v_t + t_rate * share);
             if is_stopped {
                 v_t = T::ZERO;
+                if at_rest.is_some_and(|least| v_n.abs() <= least) {
+                    v_n = T::ZERO;
+                    has_ended |= end.is_none() && (!self.is_newton || rebound == T::ZERO);
+                }
             }
             if has_ended {
                 if end.is_some() || self.is_newton {
@@ -93,6 +110,14 @@ impl<T: Real> Shock<T> {
             }
         }
         None
+    }
+
+    /// The normal velocity up to which the point rests where v_t has ended \[m/s\]; `None` where it can move
+    /// two ways.
+    fn at_rest(&self) -> Option<T> {
+        let ([_, a_nt, a_tt], [v_n, v_t]) = (self.response, self.velocity);
+        let rounding = self.one_way.filter(|_| a_tt != T::ZERO)?;
+        Some(rounding * (v_n.abs() + (a_nt / a_tt * v_t).abs()))
     }
 }
 
@@ -140,7 +165,7 @@ mod tests {
         let inertia = 1.0 / 12.0;
         // The point is at (-x, -y) from the centre: v_P = v + w (y, -x).
         let response = [1.0 + x * x / inertia, -x * y / inertia, 1.0 + y * y / inertia];
-        Shock { response, velocity, restitution: e, coefficients: [mu; 2], is_newton: false }
+        Shock { response, velocity, restitution: e, coefficients: [mu; 2], is_newton: false, one_way: None }
     }
 
     /// Impulses by small steps of the normal impulse, without any case.

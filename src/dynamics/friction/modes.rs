@@ -22,8 +22,9 @@
 use super::super::constraint::ConstraintArguments;
 use super::super::kernel::{Bias, Kernel, dot};
 use super::super::{Mechanism, Motion, Time};
+use super::combinations::{combinations, subsets};
 use super::shared::FreeDisplacements;
-use super::{FrictionMode, Normal};
+use super::{FrictionMode, Normal, Paradox};
 use crate::arithmetic::Complex;
 
 /// Velocity over the sum of the magnitudes of its parts, and over the mechanism's own, up to which a place
@@ -34,6 +35,8 @@ const ROUNDING: f64 = 1e-9;
 /// Difference of accelerations over the largest of them that the search for the moment leaves, where a wall
 /// ceases to press.
 const ALIKE: f64 = 1e-6;
+/// A moment, over the mechanism's own time.
+pub(crate) const A_MOMENT: f64 = 1e-6;
 /// Combinations that are looked at.
 const MOST: usize = 20_000;
 
@@ -45,39 +48,6 @@ pub struct Transition {
     /// The place that cannot stick any more, and the sign of the velocity it will have.
     pub breaks: Option<(usize, f64)>,
 }
-
-/// Why there is no way on.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Paradox {
-    /// No combination fits: Painlevé's inconsistent case.
-    Inconsistent,
-    /// The point may stay on its walls as well as leave one of them: Painlevé's indeterminate case.
-    Indeterminate,
-    /// Too many places touch without sliding.
-    TooMany(usize),
-}
-
-impl Paradox {
-    /// What it says of places with these names.
-    pub fn message(&self, places: &str) -> String {
-        match self {
-            Self::Inconsistent => {
-                format!("no forces of friction fit the motion at {places}: Painlevé's inconsistent case")
-            }
-            Self::Indeterminate => {
-                format!("more than one motion fits friction at {places}: Painlevé's indeterminate case")
-            }
-            Self::TooMany(count) => {
-                format!("{count} places with friction are at rest at once, more than are taken")
-            }
-        }
-    }
-}
-
-/// What to do about one.
-pub const HINT: &str = "lower the coefficient, or put a spring and a damper where the bodies touch";
-/// What is said where the equations of friction become singular.
-pub const JAMS: &str = "friction no longer follows from the motion: Painlevé's paradox, the surfaces jam";
 
 /// Contacts that are held, and the modes of all places.
 pub type Modes = (Vec<usize>, Vec<FrictionMode>);
@@ -113,13 +83,16 @@ pub struct ContactSigns {
     pub pressures: Vec<i8>,
     /// Accelerations of the gaps of all that touch.
     pub leaving: Vec<i8>,
-    /// mu0 N - |tau| of what sticks.
+    /// mu0 N - |tau| of what sticks, zero at the limit.
     pub grips: Vec<i8>,
     /// Accelerations of the relative displacements of all places.
     pub speeding: Vec<i8>,
     /// Accelerations of all coordinates.
     pub load: Vec<f64>,
 }
+
+/// Modes that fit.
+type Fit = (Modes, FittingMotion);
 
 /// A motion that fits modes.
 struct FittingMotion {
@@ -136,6 +109,11 @@ pub trait Evidence {
 
     /// What the equations tell; `None` where they have no finite solution.
     fn told(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> Option<ContactSigns>;
+
+    /// False where contacts would have to pull a moment later, or what sticks is beyond its limit.
+    fn lasts(&self, _closed: &[usize], _modes: &[FrictionMode], _touching: &[usize], _load: &[f64]) -> bool {
+        true
+    }
 
     /// True where a place that is held by contacts, constraints and the others in these modes has no
     /// acceleration; of what motors hold less is asked.
@@ -182,7 +160,7 @@ impl Mechanism {
     ) -> Result<Modes, Paradox> {
         let rates = evidence.rates();
         let pushed = self.pushed(at, before, staying, transition);
-        let mut found: Option<(Modes, FittingMotion)> = None;
+        let (mut found, mut doubtful): (Option<Fit>, Option<Fit>) = (None, None);
         let mut looked_at = 0;
         for closed in subsets(staying, touching) {
             let rates = self.rates_beside(evidence, at, &closed, &rates);
@@ -203,10 +181,26 @@ impl Mechanism {
                 return Err(Paradox::TooMany(resting));
             }
             let known = PlaceRates { rates: &rates, pushed: &pushed, arrived: transition.arrived };
-            let fit = combinations(&options).into_iter().find_map(|modes| {
+            let mut fits = combinations(&options).into_iter().filter_map(|modes| {
                 let motion = self.fits(evidence, at, &closed, &modes, touching, known)?;
                 Some(((closed.clone(), modes), motion))
             });
+            let fit = fits.next();
+            // Where one gives way, others at their limits leave more than one way to share the load, with
+            // walls or without: one that still does so a moment later is taken.
+            let lasts =
+                |((closed, modes), motion): &Fit| evidence.lasts(closed, modes, touching, &motion.load);
+            let is_in_doubt = transition.breaks.is_some() && fit.as_ref().is_some_and(|fit| !lasts(fit));
+            let word = |modes: (&FrictionMode, &FrictionMode)| modes.0.word() == modes.1.word();
+            let is_alike = |other: &Fit| fit.iter().all(|fit| fit.0.1.iter().zip(&other.0.1).all(word));
+            let lasting = if is_in_doubt { fits.find(|other| is_alike(other) && lasts(other)) } else { None };
+            let fit = match (lasting, fit) {
+                (None, Some(fit)) if is_in_doubt => {
+                    doubtful.get_or_insert(fit);
+                    None
+                }
+                (lasting, fit) => lasting.or(fit),
+            };
             found = match (fit, found) {
                 (Some(fit), Some(known)) if !are_alike(&fit.1.load, &known.1.load) => {
                     // What a wall holds that just ceases to press ends there.
@@ -226,7 +220,7 @@ impl Mechanism {
                 break;
             }
         }
-        found.map(|(modes, _)| modes).ok_or(Paradox::Inconsistent)
+        found.or(doubtful).map(|(modes, _)| modes).ok_or(Paradox::Inconsistent)
     }
 
     /// The mechanism in the modes of its start, contacts held that stay; `None` where nothing holds it and it
@@ -384,12 +378,31 @@ impl Evidence for InDoubles<'_> {
         let grip = |(friction, [tau, pressing]): (&super::CompiledFriction, [f64; 2])| {
             let rounding =
                 f64::EPSILON * kernel.multiplier.iter().fold(pressing, |most, x| most.max(x.abs()));
-            let most = friction.stiction * pressing * (1.0 + ROUNDING) + friction.stiction * rounding;
-            if tau.abs() <= most { 0 } else { -1 }
+            let most = friction.stiction * pressing;
+            sign(most - tau.abs(), ROUNDING * most + friction.stiction * rounding)
         };
         let grips = free.frictions.iter().zip(forces).map(grip).collect();
         let regularity = kernel.regularity;
         Some(ContactSigns { regularity, pressures, leaving, grips, speeding, load: kernel.load })
+    }
+
+    fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
+        let FrictionMoment { t, phi, omega, .. } = self.at;
+        let h = A_MOMENT * self.mechanism.units.time;
+        let moved = |((phi, omega), a): ((&f64, &f64), &f64)| phi + h * (omega + 0.5 * h * a);
+        let phi: Vec<f64> = phi.iter().zip(omega).zip(load).map(moved).collect();
+        let omega: Vec<f64> = omega.iter().zip(load).map(|(omega, a)| omega + h * a).collect();
+        let z = self.mechanism.elements(&phi);
+        let at = FrictionMoment { t: t + h, phi: &phi, z: &z, omega: &omega };
+        let later = InDoubles { mechanism: self.mechanism, at };
+        later.told(closed, modes, touching).is_some_and(|told| {
+            let holds =
+                |(mode, grip): (&FrictionMode, &i8)| !matches!(mode, FrictionMode::Stick(_)) || *grip >= 0;
+            let stays = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
+            told.pressures.iter().all(|&sign| sign >= 0)
+                && touching.iter().zip(&told.leaving).all(stays)
+                && modes.iter().zip(&told.grips).all(holds)
+        })
     }
 
     fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], is_driven: bool) -> bool {
@@ -411,38 +424,4 @@ fn sign(x: f64, rounding: f64) -> i8 {
 fn are_alike(one: &[f64], other: &[f64]) -> bool {
     let size = one.iter().chain(other).fold(0.0, |size: f64, x| size.max(x.abs()));
     one.iter().zip(other).all(|(a, b)| (a - b).abs() <= ALIKE * size)
-}
-
-/// The sets of contacts that may be closed: first those that stay without friction.
-fn subsets(staying: &[usize], touching: &[usize]) -> Vec<Vec<usize>> {
-    let mut all = vec![staying.to_vec()];
-    // More than a few would be too many.
-    let few = &touching[..touching.len().min(6)];
-    for bits in (0..1_usize << few.len()).rev() {
-        let set: Vec<usize> =
-            few.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, &contact)| contact).collect();
-        if !all.contains(&set) {
-            all.push(set);
-        }
-    }
-    all
-}
-
-/// Every combination of one mode a place, by the number of places that do not take their first one.
-fn combinations(options: &[Vec<FrictionMode>]) -> Vec<Vec<FrictionMode>> {
-    let mut all: Vec<(usize, Vec<FrictionMode>)> = vec![(0, Vec::new())];
-    for of in options {
-        all = all
-            .iter()
-            .flat_map(|(later, modes)| {
-                of.iter().enumerate().map(move |(i, &mode)| {
-                    let mut modes = modes.clone();
-                    modes.push(mode);
-                    (later + usize::from(i > 0), modes)
-                })
-            })
-            .collect();
-    }
-    all.sort_by_key(|(later, _)| *later);
-    all.into_iter().map(|(_, modes)| modes).collect()
 }

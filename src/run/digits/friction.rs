@@ -14,7 +14,7 @@ use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::compile::exact::Acting;
-use crate::dynamics::friction::modes::HINT;
+use crate::dynamics::friction::paradox::HINT;
 use crate::dynamics::friction::{self, FrictionMode, FrictionMoment, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
@@ -273,8 +273,16 @@ impl<const W: usize> DigitsMotion<W> {
         let DigitsCoordinates { phi, mut omega, .. } = self.state_posture();
         let (mut work, _) = keeper.close(&rest, t, &phi, &mut omega);
         let z = self.mechanism.elements(&phi);
-        let gaps: Vec<_> = sliding.iter().map(|&(_, wall)| gap_rate(self, wall)).collect();
-        let pushes = sliding.iter().zip(&gaps).map(|(&(place, _), gap)| {
+        // Points that what sticks holds along their normals have nothing to be taken off.
+        let mut is_free = |gap: &GapRate<W>| {
+            let (response, _) = keeper.response(&rest, t, [&phi, &omega], &gap.gradient);
+            !response.iter().all(Digits::is_zero)
+        };
+        let (places, gaps): (Vec<usize>, Vec<_>) = (sliding.iter())
+            .map(|&(place, wall)| (place, gap_rate(self, wall)))
+            .filter(|(_, gap)| is_free(gap))
+            .unzip();
+        let pushes = places.iter().zip(&gaps).map(|(&place, gap)| {
             let friction = &self.mechanism.frictions[place];
             let coefficient = acting.sliding[place].coefficient(friction).unwrap_or(Digits::ZERO);
             let along = gradient(&friction.tangent, &z);

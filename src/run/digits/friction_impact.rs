@@ -70,13 +70,17 @@ fn jump<const W: usize>(
     let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
     let (across, pulls_across) = keeper.response(&striking, t, at, &along);
     let slides = dot(&along, &posture.omega);
-    let still = ((*rate).abs() + slides.abs()).ldexp(motion.precision.rounding(SURE) as i32);
+    let rounding = Digits::ONE.ldexp(motion.precision.rounding(SURE) as i32);
+    let still = ((*rate).abs() + slides.abs()) * rounding;
+    let [a_nn, a_nt, a_tt] = [dot(normal, &response), dot(normal, &across), dot(&along, &across)];
+    let apart = (a_nn * a_tt - a_nt * a_nt).abs();
     let shock = Shock {
-        response: [dot(normal, &response), dot(normal, &across), dot(&along, &across)],
+        response: [a_nn, a_nt, a_tt],
         velocity: [*rate, slides],
         restitution,
         coefficients: [friction.kinetic, friction.stiction],
         is_newton: friction.is_newton,
+        one_way: (apart <= a_nn * a_tt * rounding).then_some(rounding),
     };
     let Some([impulse, tangential]) = shock.impulses_beyond(still) else {
         let what = format!("no impulses fit the law of impact and friction at wall {}", friction.name);

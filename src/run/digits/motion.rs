@@ -28,7 +28,7 @@ use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism, ExactStart};
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::friction::Transition;
-use crate::dynamics::friction::modes::{HINT, JAMS};
+use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
 

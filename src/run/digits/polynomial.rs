@@ -1,9 +1,11 @@
 //! The series of a step as polynomials: how far they reach, and their values inside the step.
 
-use super::motion::DigitsMotion;
+use super::motion::{DigitsMotion, LongState};
+use crate::arithmetic::Complex;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::{Digits, sum_of_products};
 use crate::arithmetic::sum::larger;
+use crate::dynamics::friction::FrictionMode;
 
 /// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
 const WORK: f64 = 10.0;
@@ -39,7 +41,36 @@ impl<const W: usize> DigitsMotion<W> {
         if self.mechanism.structure.has_work_integral() {
             least = allows(least, &self.series.power);
         }
-        libm::exp2(allows(least, self.series.lost()))
+        libm::exp2(allows(least, self.series.lost()).min(self.holds_allow()))
+    }
+
+    /// log2 of the step at which the last powers fall below the tolerance of the forces that hold: on points
+    /// at walls, and of what sticks with its normal force.  Their zeros and limits let go, and at rest they
+    /// alone change.
+    fn holds_allow(&self) -> f64 {
+        let (structure, LongState { acting, .. }) = (&self.mechanism.structure, &self.state);
+        let walls = acting.held.iter().map(|&wall| structure.contacts[wall].force);
+        let sticks = |(_, mode): &(usize, &FrictionMode<_>)| matches!(mode, FrictionMode::Stick(_));
+        let sticks = acting.sliding.iter().enumerate().filter(sticks);
+        let units = walls.chain(sticks.map(|(place, _)| self.friction_unit(place)));
+        let units: Vec<f64> = units.map(libm::log2).collect();
+        if units.is_empty() {
+            return f64::INFINITY;
+        }
+        let (order, own) =
+            (self.precision.order, libm::log2(structure.energy_scale / structure.size_of_parts()));
+        let allows = |k: usize| {
+            // Their rows are the last ones.
+            let forces = self.series.multipliers(k).iter().rev().zip(units.iter().rev());
+            let normals = self.series.sticks().filter_map(|normal| {
+                let [first, last] = [normal.first()?, normal.get(k)?];
+                let size = |force: &Complex<Digits<W>>| larger(force.re.log2(), force.im.log2());
+                Some(size(last) - larger(size(first), own))
+            });
+            let sizes = forces.map(|(force, unit)| force.log2() - unit).chain(normals);
+            (self.precision.tolerance() - sizes.fold(f64::NEG_INFINITY, larger)) / k as f64
+        };
+        (order - JUDGES..order).map(allows).filter(|least| !least.is_nan()).fold(f64::INFINITY, f64::min)
     }
 
     /// True where no power was kept to fewer limbs than it weighs in a step of this length.

@@ -16,7 +16,7 @@ use super::resting::Unheld;
 use super::wall::{GapRate, ImpulseJump, distance, gap_rate, work_of_rows};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
-use crate::dynamics::friction::modes::HINT;
+use crate::dynamics::friction::paradox::HINT;
 use crate::dynamics::friction::simultaneous::Shocks;
 use crate::dynamics::friction::{CompiledFriction, Normal};
 use crate::dynamics::kernel::dot;

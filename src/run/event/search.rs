@@ -147,6 +147,14 @@ impl EventDetector {
         let other = if mode { -1 } else { 1 };
         let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
         let left = is_there.then(|| left(curve, first, self.resolved)).flatten();
+        // What slides from rest and has not left it here may begin against its sense, by rounding.
+        if let Owner::Friction(watch, function) = self.owner(event)
+            && is_there
+            && left.is_none()
+            && most <= watch.at_rest(function)
+        {
+            return;
+        }
         if is_there && sign(left.map_or(next, |share| curve.at(share)[0])) == other {
             all.push(Passage { t: part.begin, event, rises: !mode, jumps: false });
         }

@@ -1,11 +1,12 @@
 //! Whether a step of the series agrees with the equations inside it.
 //!
-//! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step begins
-//! and change within it: the powers that would say so are lost in rounding, and the step wanted is longer
-//! than the circle in which the series converges.  Roots nearly have corners where their argument is nearly
-//! zero, and angles jump, which no power tells of either; and fractional powers that begin at zero have no
-//! series there, so that steps grow from one in which they hardly act.  The accelerations of the series are therefore
-//! compared with those of the equations at a few times inside the step, which is shortened until they agree.
+//! Laws with exponentials, hyperbolic tangents or quotients may be flat to the last digit where a step
+//! begins and change within it: the powers that would say so are lost in rounding, and the step wanted is
+//! longer than the circle in which the series converges.  Roots nearly have corners where their argument is
+//! nearly zero, and angles jump, which no power tells of either; and fractional powers that begin at zero
+//! have no series there, so that steps grow from one in which they hardly act.  The accelerations of the
+//! series are therefore compared with those of the equations at a few times inside the step, which is
+//! shortened until they agree.
 //! (Griewank & Walther,
 //! *Evaluating Derivatives*, 2nd ed. (2008), section 13.2, on the defect of a Taylor polynomial.)
 

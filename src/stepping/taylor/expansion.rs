@@ -128,7 +128,7 @@ impl<T: Coefficient> Expansion<T> {
         for (i, &size) in last.iter().enumerate() {
             least = least.min(minus_log2(size) / (order - i) as f64);
         }
-        least = least.min(self.work_allows());
+        least = least.min(self.work_allows()).min(self.pressures_allow());
         if with_vectors {
             let n = self.mechanism.coordinates();
             for k in order + 2 - JUDGES..=order + 1 {
@@ -163,6 +163,29 @@ impl<T: Coefficient> Expansion<T> {
         let lost = self.series.lost();
         let all = allows(&self.series.power);
         if lost.is_empty() { all } else { all.min(allows(lost)) }
+    }
+
+    /// The same of the forces on points held at walls, whose zeros let them go: of a mechanism at rest they
+    /// change with the load, and beside dry friction their series has circles of its own.
+    fn pressures_allow(&self) -> f64 {
+        let order = self.series.order();
+        let allows = |place: usize| {
+            (order - JUDGES..order).fold(f64::INFINITY, |least, k| {
+                let size = self.pressure(place, k).abs();
+                if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
+            })
+        };
+        (0..self.mechanism.held.len()).map(allows).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Power `m` of the force on a point that is held at a wall, by its place among those that are, over its
+    /// contact's own \[1/s^m\].
+    pub fn pressure(&self, place: usize, m: usize) -> f64 {
+        let (mechanism, multipliers) = (&self.mechanism, self.series.multipliers(m));
+        // The rows of the contacts that are held are the last ones, but for those of what sticks.
+        let from_end = mechanism.held.len() - place + mechanism.sticking();
+        let force = multipliers.iter().nth_back(from_end - 1);
+        force.map_or(f64::NAN, |force| -force.value() / mechanism.contacts[mechanism.held[place]].force)
     }
 
     /// Sums no further than to the power that is the smallest at `h` \[s\].

@@ -1,0 +1,186 @@
+//! A bar that sticks in its hinge beside a wall that presses it, until the load takes it away: break-away times
+//! in closed form, and the motion after them by an equation written here.
+
+use super::formulas::{adaptive, run, scene};
+use super::laws::rk4;
+use driftless::run::{MethodId, Outcome, Request};
+use std::f64::consts::TAU;
+
+/// Mass \[kg\], distance of its centre \[m\], and moment of inertia about the hinge \[kg·m²\].
+const MASS: f64 = 1.0;
+const CENTRE: f64 = 0.25;
+const INERTIA: f64 = 0.03 + MASS * CENTRE * CENTRE;
+
+/// A bar on a hinge with friction, a plastic wall where its angle is `wall`, and a torque a + b sin(w t + p).
+#[derive(Clone, Copy)]
+struct Bar {
+    gravity: [f64; 2],
+    torque: [f64; 4],
+    radius: f64,
+    coefficient: f64,
+    wall: f64,
+    start: f64,
+}
+
+impl Bar {
+    fn text(&self, until: f64) -> String {
+        let ([gx, gy], [a, b, w, p]) = (self.gravity, self.torque);
+        let (sin, cos) = self.wall.sin_cos();
+        format!(
+            r#"{{"name": "bar", "gravity": [{gx}, {gy}],
+            "bars": [{{"name": "bar", "mass": {MASS}, "centre": [{CENTRE}, 0], "inertia": 0.03, "length": 0.5}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}],
+                "friction": {{"radius": {}, "kinetic": {}}}}}],
+            "walls": [{{"name": "W", "body": "bar", "point": [0.5, 0], "restitution": 0,
+                "line": {{"through": [{}, {}], "normal": [{}, {cos}]}}}}],
+            "torques": [{{"name": "Q", "body": "bar", "torque": "1*({a} + {b}*sin({w}*t + {p}))"}}],
+            "start": {{"bar": {{"phi": {}, "omega": 0}}}}, "until": {until}, "every": {until}}}"#,
+            self.radius,
+            self.coefficient,
+            0.5 * cos,
+            0.5 * sin,
+            -sin,
+            self.start,
+        )
+    }
+
+    /// The torque of weight and load about the hinge \[N·m\].
+    fn load(&self, t: f64, phi: f64) -> f64 {
+        let ([gx, gy], [a, b, w, p]) = (self.gravity, self.torque);
+        a + b * (w * t + p).sin() + MASS * CENTRE * (phi.cos() * gy - phi.sin() * gx)
+    }
+
+    /// The first time from `from` on at which the load on the resting bar passes the limit of friction.
+    fn breaks_away(&self, from: f64) -> f64 {
+        let ([gx, gy], [a, b, w, p]) = (self.gravity, self.torque);
+        let limit = self.coefficient * self.radius * MASS * gx.hypot(gy);
+        let weight = self.load(0.0, self.wall) - a - b * p.sin();
+        let rises = ((limit - weight - a) / b).asin() - p;
+        (0..).map(|turns| (rises + TAU * f64::from(turns)) / w).find(|t| *t > from).expect("a time")
+    }
+
+    /// Angle, rate, and the energy lost in friction, a time after the break-away at `begin` while it slides up.
+    fn slid(&self, begin: f64, until: f64) -> [f64; 3] {
+        let [gx, gy] = self.gravity;
+        let equation = |t: f64, y: &[f64; 3]| {
+            let [phi, omega, _] = *y;
+            let (sin, cos) = phi.sin_cos();
+            let (mut acceleration, mut friction) = (0.0, 0.0);
+            for _ in 0..60 {
+                let ax = -CENTRE * (sin * acceleration + cos * omega * omega) - gx;
+                let ay = CENTRE * (cos * acceleration - sin * omega * omega) - gy;
+                friction = self.coefficient * self.radius * MASS * ax.hypot(ay);
+                acceleration = (self.load(begin + t, phi) - friction) / INERTIA;
+            }
+            [omega, acceleration, friction * omega]
+        };
+        rk4([self.wall, 0.0, 0.0], until - begin, 20_000, equation)
+    }
+}
+
+/// It is pressed, held by friction for some milliseconds, and goes.
+const PRESSED: Bar = Bar {
+    gravity: [0.0, -10.0],
+    torque: [-3.0, 6.0, 4.0, 4.0],
+    radius: 0.05,
+    coefficient: 0.3,
+    wall: -std::f64::consts::FRAC_PI_2,
+    start: -std::f64::consts::FRAC_PI_2,
+};
+/// It falls on its wall twice before.
+const FALLS: Bar = Bar {
+    gravity: [-1.14, -9.81],
+    torque: [-0.05, 1.36, 3.91, 2.19],
+    radius: 0.075,
+    coefficient: 0.196,
+    wall: -2.12,
+    start: -1.82,
+};
+
+fn done(text: &str, request: &Request) -> Outcome {
+    let outcome = run(&scene(text), request);
+    assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+    outcome
+}
+
+#[test]
+fn a_bar_breaks_away_from_its_wall_when_the_load_passes_the_limit() {
+    let t = PRESSED.breaks_away(0.0);
+    assert!((t - 0.708_975_105_069).abs() < 1e-12);
+    let methods = [MethodId::Taylor, MethodId::Dp8, MethodId::Dp5, MethodId::Radau(5)];
+    for (method, tolerance) in methods.into_iter().flat_map(|method| [(method, 1e-9), (method, 1e-12)]) {
+        let outcome = done(&PRESSED.text(1.3), &adaptive(method, tolerance));
+        let slides = outcome.frictions.iter().find(|record| record.mode == "slides").expect("a break-away");
+        assert!((slides.t - t).abs() < 1e-8, "{method} {tolerance}: {} for {t}", slides.t);
+        let [phi, omega, lost] = PRESSED.slid(t, 1.3);
+        let last = &outcome.last;
+        let off = [last.phi[0] - phi, last.omega[0] - omega, outcome.last.friction - lost];
+        assert!(off.iter().all(|off| off.abs() < 1e4 * tolerance), "{method} {tolerance}: {off:?}");
+    }
+}
+
+/// Where both coefficients are one, it begins without an acceleration, and rounding may begin it backwards.
+#[test]
+fn what_breaks_away_without_an_acceleration_does_not_stick_again_at_once() {
+    let until = 2.9;
+    let t = FALLS.breaks_away(2.2);
+    let [phi, omega, _] = FALLS.slid(t, until);
+    for (method, tolerance) in [
+        (MethodId::Dp8, 1e-9),
+        (MethodId::Dp8, 1e-11),
+        (MethodId::Taylor, 1e-11),
+        (MethodId::Radau(5), 1e-11),
+    ] {
+        let outcome = done(&FALLS.text(until), &adaptive(method, tolerance));
+        let last = outcome.frictions.last().expect("a break-away");
+        assert!(last.mode == "slides" && (last.t - t).abs() < 1e-9, "{method}: {last:?} for {t}");
+        let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
+        assert!(off.iter().all(|off| off.abs() < 1e4 * tolerance), "{method} {tolerance}: {off:?}");
+    }
+}
+
+/// A slider-crank at its wall, with friction at the crank pin and on the rail: either sticks and both are at
+/// their limits when the wall takes over the load, which returns with every period; none of them moves again.
+#[test]
+fn supports_at_their_limits_hand_the_load_to_the_wall() {
+    let text = r#"{"name": "crank", "gravity": [-0.95, -9.81],
+        "bars": [{"name": "crank", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": 0.2},
+            {"name": "rod", "mass": 0.5, "centre": [0.25, 0], "inertia": 0.01, "length": 0.5}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+            {"name": "P", "between": [{"body": "crank", "point": [0.2, 0]}, {"body": "rod", "point": [0, 0]}],
+             "friction": {"radius": 0.02, "kinetic": 0.08, "static": 0.104}}],
+        "sliders": [{"name": "S", "point": {"body": "rod", "point": [0.5, 0]},
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]},
+            "friction": {"kinetic": 0.131, "static": 0.1703}}],
+        "walls": [{"name": "W", "body": "rod", "point": [0.5, 0], "restitution": 0,
+            "line": {"through": [0.66, 0], "normal": [-1, 0]}}],
+        "torques": [{"name": "Q", "body": "crank", "torque": "1*(0.09 + 1.18*sin(4.65*t + 1.43))"}],
+        "torsion_springs": [{"name": "T", "body": "rod", "relative_to": "crank", "stiffness": 1.45,
+            "free_angle": -0.72}],
+        "start": {"crank": {"phi": 1.77, "omega": 0}, "rod": {"phi": -0.3}}, "until": 4, "every": 4}"#;
+    // The tip at 0.66 m: the law of cosines.
+    let crank = f64::acos((0.66 * 0.66 + 0.04 - 0.25) / (2.0 * 0.66 * 0.2));
+    for method in [MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = done(text, &adaptive(method, 1e-11));
+        assert!((outcome.last.phi[0] - crank).abs() < 1e-12, "{method}");
+        assert!(outcome.last.omega.iter().all(|omega| omega.abs() < 1e-12), "{method}");
+        assert!(outcome.frictions.iter().all(|record| record.t < 1.0), "{method}: {:?}", outcome.frictions);
+    }
+}
+
+#[cfg(feature = "digits")]
+#[test]
+fn a_bar_breaks_away_in_many_digits_at_the_same_time_whatever_their_number() {
+    use super::many_digits::{begun, source};
+    use driftless::arithmetic::Real;
+    for (bar, from, until) in [(PRESSED, 0.0, "1.3"), (FALLS, 2.2, "2.9")] {
+        let t = bar.breaks_away(from);
+        for digits in [20, 30, 40] {
+            let mut run = begun(&source(&bar.text(2.9), &[], until, until), digits);
+            let _ = run.row(run.last_row(), &mut || false).expect("a row").expect("no pause");
+            let turns = run.turns();
+            let slides = turns.iter().rfind(|turn| turn.does == "slides").expect("a break-away");
+            assert!((slides.t.value() - t).abs() < 1e-12, "{digits}: {} for {t}", slides.t.value());
+        }
+    }
+}
