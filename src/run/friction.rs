@@ -8,7 +8,7 @@ use super::contact::ContactDriver;
 use super::running::Outcome;
 use crate::arithmetic::Complex;
 use crate::dynamics::constraint::ConstraintArguments;
-use crate::dynamics::friction::modes::{A_MOMENT, Modes};
+use crate::dynamics::friction::modes::{Modes, NO_SPEED};
 use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::dynamics::friction::{CompiledFriction, FrictionMode, FrictionMoment, Transition};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
@@ -23,9 +23,7 @@ const KEPT: usize = 1000;
 /// Velocity over the sum of the magnitudes of its parts and the mechanism's own up to which what others hold
 /// rests: they may begin to move it.
 const AT_REST: f64 = 1e-11;
-/// Velocity over the mechanism's own up to which what begins to slide is at rest.
-const NO_SPEED: f64 = 1e-12;
-/// How many times a force is to grow within it for its sign to count as that of rounding.
+/// How many times a force is to grow within a moment for its sign to count as that of rounding.
 const NO_FORCE: f64 = 100.0;
 /// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
 const REGULAR: f64 = 0.3;
@@ -74,9 +72,7 @@ impl FrictionWatch {
     /// Magnitude up to which a function is rounding of a place that slides from rest.
     pub fn at_rest(&self, function: usize) -> f64 {
         match self.mechanism.modes.get(function) {
-            Some(FrictionMode::Slip(_)) => {
-                NO_SPEED * self.mechanism.displacement_unit(function) / self.mechanism.units.time
-            }
+            Some(FrictionMode::Slip(_)) => NO_SPEED * self.mechanism.speed_unit(function),
             _ => 0.0,
         }
     }
@@ -108,8 +104,7 @@ impl FrictionWatch {
             FrictionMode::Slip(sign) => sign * dot(row, omega),
             FrictionMode::Strained(0.0) => {
                 let parts: f64 = row.iter().zip(omega).map(|(d, omega)| (d * omega).abs()).sum();
-                let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time;
-                AT_REST * parts.max(own) - dot(row, omega).abs()
+                AT_REST * parts.max(self.mechanism.speed_unit(place)) - dot(row, omega).abs()
             }
             _ => 1.0,
         }
@@ -165,14 +160,10 @@ impl FrictionWatch {
             kernel.accelerate::<0>(mechanism, time, phi, omega, Bias::default());
             (kernel.friction_forces(mechanism, time, phi, omega)[place][0], kernel.load.clone())
         };
-        let [mut phi, mut omega] = motion.rounded();
+        let [phi, omega] = motion.rounded();
         let (now, accelerations) = force(motion.time, &phi, &omega);
-        let h = A_MOMENT * mechanism.units.time;
-        for ((phi, omega), acceleration) in phi.iter_mut().zip(&mut omega).zip(accelerations) {
-            *phi += h * (*omega + 0.5 * h * acceleration);
-            *omega += h * acceleration;
-        }
-        let (later, _) = force(motion.time + h, &phi, &omega);
+        let (t, [phi, omega]) = mechanism.a_moment_later(motion.time, [&phi, &omega], &accelerations);
+        let (later, _) = force(t, &phi, &omega);
         if later.abs() > NO_FORCE * now.abs() { later } else { now }
     }
 

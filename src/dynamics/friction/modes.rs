@@ -29,14 +29,14 @@ use crate::arithmetic::Complex;
 
 /// Velocity over the sum of the magnitudes of its parts, and over the mechanism's own, up to which a place
 /// does not slide.
-const NO_SPEED: f64 = 1e-12;
+pub(crate) const NO_SPEED: f64 = 1e-12;
 /// Share of a force, or of an acceleration, that rounding makes.
 const ROUNDING: f64 = 1e-9;
 /// Difference of accelerations over the largest of them that the search for the moment leaves, where a wall
 /// ceases to press.
 const ALIKE: f64 = 1e-6;
 /// A moment, over the mechanism's own time.
-pub(crate) const A_MOMENT: f64 = 1e-6;
+const A_MOMENT: f64 = 1e-6;
 /// Combinations that are looked at.
 const MOST: usize = 20_000;
 
@@ -89,6 +89,19 @@ pub struct ContactSigns {
     pub speeding: Vec<i8>,
     /// Accelerations of all coordinates.
     pub load: Vec<f64>,
+}
+
+impl ContactSigns {
+    /// True where no closed contact pulls, none of those that touch is gone into, and what sticks is within
+    /// its limit.
+    fn hold(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> bool {
+        let leaves = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
+        let grips =
+            |(mode, &grip): (&FrictionMode, &i8)| !matches!(mode, FrictionMode::Stick(_)) || grip >= 0;
+        self.pressures.iter().all(|&sign| sign >= 0)
+            && touching.iter().zip(&self.leaving).all(leaves)
+            && modes.iter().zip(&self.grips).all(grips)
+    }
 }
 
 /// Modes that fit.
@@ -247,6 +260,20 @@ impl Mechanism {
         Some(self.moving(&contacts, &modes))
     }
 
+    /// Coordinates and rates a moment after a time, with these accelerations there.
+    pub(crate) fn a_moment_later(
+        &self,
+        t: Time,
+        [phi, omega]: [&[f64]; 2],
+        load: &[f64],
+    ) -> (Time, [Vec<f64>; 2]) {
+        let h = A_MOMENT * self.units.time;
+        let moved = |((phi, omega), a): ((&f64, &f64), &f64)| phi + h * (omega + 0.5 * h * a);
+        let phi = phi.iter().zip(omega).zip(load).map(moved).collect();
+        let omega = omega.iter().zip(load).map(|(omega, a)| omega + h * a).collect();
+        (t + h, [phi, omega])
+    }
+
     /// The relative velocity \[rad/s, m/s\] of every place, zero where it is rounding.
     fn sliding_rates(&self, at: FrictionMoment) -> Vec<f64> {
         let mut row = vec![0.0; at.phi.len()];
@@ -257,7 +284,7 @@ impl Mechanism {
                 let here = friction.tangent.differentiate(at.t, posture, &mut row);
                 let rate = dot(&row, at.omega) + here.drive;
                 let parts: f64 = row.iter().zip(at.omega).map(|(d, omega)| (d * omega).abs()).sum();
-                let size = parts.max(self.displacement_unit(number) / self.units.time);
+                let size = parts.max(self.speed_unit(number));
                 if rate.abs() <= NO_SPEED * size { 0.0 } else { rate }
             })
             .collect()
@@ -316,11 +343,7 @@ impl Mechanism {
             matches!(friction.normal, Normal::Contact(_))
                 || matches!(mode, FrictionMode::Open | FrictionMode::Stick(_))
         });
-        let leaves = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
-        if !at_walls && told.regularity <= 0.0
-            || told.pressures.iter().any(|&sign| sign < 0)
-            || !touching.iter().zip(&told.leaving).all(leaves)
-        {
+        if !at_walls && told.regularity <= 0.0 || !told.hold(closed, modes, touching) {
             return None;
         }
         let is_held = |place: usize| self.room_beside(at, closed, modes, place).is_held(place);
@@ -329,9 +352,7 @@ impl Mechanism {
             FrictionMode::Open => true,
             // Where the travel of a moving linkage turns back, the linkage moves it on, and no force of
             // friction holds it.
-            FrictionMode::Stick(_) => {
-                told.grips[number] >= 0 && (!is_held(number) || is_still(number, false))
-            }
+            FrictionMode::Stick(_) => !is_held(number) || is_still(number, false),
             FrictionMode::Slip(sign) => {
                 let slides = rates[number] != 0.0 && arrived != Some(number);
                 // What breaks begins with what the coefficients leave, which may be nothing.
@@ -388,21 +409,12 @@ impl Evidence for InDoubles<'_> {
 
     fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
         let FrictionMoment { t, phi, omega, .. } = self.at;
-        let h = A_MOMENT * self.mechanism.units.time;
-        let moved = |((phi, omega), a): ((&f64, &f64), &f64)| phi + h * (omega + 0.5 * h * a);
-        let phi: Vec<f64> = phi.iter().zip(omega).zip(load).map(moved).collect();
-        let omega: Vec<f64> = omega.iter().zip(load).map(|(omega, a)| omega + h * a).collect();
+        let (t, [phi, omega]) = self.mechanism.a_moment_later(t, [phi, omega], load);
         let z = self.mechanism.elements(&phi);
-        let at = FrictionMoment { t: t + h, phi: &phi, z: &z, omega: &omega };
+        let at = FrictionMoment { t, phi: &phi, z: &z, omega: &omega };
         let later = InDoubles { mechanism: self.mechanism, at };
-        later.told(closed, modes, touching).is_some_and(|told| {
-            let holds =
-                |(mode, grip): (&FrictionMode, &i8)| !matches!(mode, FrictionMode::Stick(_)) || *grip >= 0;
-            let stays = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
-            told.pressures.iter().all(|&sign| sign >= 0)
-                && touching.iter().zip(&told.leaving).all(stays)
-                && modes.iter().zip(&told.grips).all(holds)
-        })
+        let told = later.told(closed, modes, touching);
+        told.is_some_and(|told| told.hold(closed, modes, touching))
     }
 
     fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], is_driven: bool) -> bool {

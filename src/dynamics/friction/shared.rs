@@ -73,7 +73,7 @@ impl<'a> FreeDisplacements<'a> {
         self.metric.as_ref().is_some_and(|metric| {
             let MetricRow { row, along } = self.gradient(place);
             let (column, velocity) = (metric.column(&along), metric.velocity(self.at.omega));
-            let own = self.mechanism.displacement_unit(place) / self.mechanism.units.time;
+            let own = self.mechanism.speed_unit(place);
             let size = column.norm() * velocity.norm() + row.drive.abs() + own;
             (column.dot(&metric.kept(&velocity)) + row.drive).abs() <= STILL * size
         })
@@ -92,6 +92,11 @@ impl Mechanism {
     /// The mechanism's own size of a relative displacement \[rad, m\].
     pub(crate) fn displacement_unit(&self, place: usize) -> f64 {
         if self.frictions[place].tangent.is_angle() { 1.0 } else { self.size_of_parts() }
+    }
+
+    /// The mechanism's own relative velocity of a place \[rad/s, m/s\].
+    pub(crate) fn speed_unit(&self, place: usize) -> f64 {
+        self.displacement_unit(place) / self.units.time
     }
 
     /// What the rest leaves of a place in these modes.

@@ -104,8 +104,7 @@ impl<const W: usize> DigitsMotion<W> {
 
     /// The mechanism's own relative velocity of a place \[rad/s, m/s\].
     pub(super) fn speed_unit(&self, place: usize) -> f64 {
-        let structure = &self.mechanism.structure;
-        structure.displacement_unit(place) / structure.units.time
+        self.mechanism.structure.speed_unit(place)
     }
 
     /// The mechanism's own force of friction of a place \[N·m, N\]: far below it there is none.

@@ -342,8 +342,7 @@ impl<'a> Parser<'a> {
         let first = arguments[0];
         let last = arguments[takes - 1];
         if let ("if", &[from, middle, to]) = (name.as_str(), &ends[..]) {
-            let branches = [from..middle, middle..to];
-            let [holds, fails] = branches;
+            let [holds, fails] = [from..middle, middle..to];
             self.formula.note_bases(first, if is_swapped { [fails, holds] } else { [holds, fails] });
         }
         let node = match name.as_str() {

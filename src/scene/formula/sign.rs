@@ -73,8 +73,8 @@ impl Formula {
         }
     }
 
-    /// Notes the bases of powers on the branches `above` and `below` of a comparison that are held by it;
-    /// branches are ranges of nodes.
+    /// Notes the bases of powers that a comparison holds on its branches, ranges of nodes: that where the
+    /// condition is positive, and that where it is not.
     pub(super) fn note_bases(&mut self, condition: usize, branches: [std::ops::Range<usize>; 2]) {
         for (branch, sign) in branches.into_iter().zip([1.0, -1.0]) {
             for place in branch {

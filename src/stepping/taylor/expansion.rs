@@ -155,10 +155,8 @@ impl<T: Coefficient> Expansion<T> {
     fn work_allows(&self) -> f64 {
         let (order, scale) = (self.series.order(), self.mechanism.energy_scale);
         let allows = |powers: &[T]| {
-            (order + 1 - JUDGES..=order).fold(f64::INFINITY, |least, k| {
-                let size = (powers[k - 1].value() / (k as f64 * scale)).abs();
-                if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
-            })
+            let size = |k: usize| (powers[k - 1].value() / (k as f64 * scale)).abs();
+            allowed_by(order + 1 - JUDGES..order + 1, size)
         };
         let lost = self.series.lost();
         let all = allows(&self.series.power);
@@ -169,12 +167,7 @@ impl<T: Coefficient> Expansion<T> {
     /// change with the load, and beside dry friction their series has circles of its own.
     fn pressures_allow(&self) -> f64 {
         let order = self.series.order();
-        let allows = |place: usize| {
-            (order - JUDGES..order).fold(f64::INFINITY, |least, k| {
-                let size = self.pressure(place, k).abs();
-                if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
-            })
-        };
+        let allows = |place: usize| allowed_by(order - JUDGES..order, |k| self.pressure(place, k).abs());
         (0..self.mechanism.held.len()).map(allows).fold(f64::INFINITY, f64::min)
     }
 
@@ -307,4 +300,12 @@ pub(super) fn minus_log2(size: f64) -> f64 {
     } else {
         (1_f64.to_bits() as i64 - size.to_bits() as i64) as f64 / (1_u64 << 52) as f64
     }
+}
+
+/// log2 of the step at which the last powers of these sizes are one; what is not a number does not count.
+fn allowed_by(powers: std::ops::Range<usize>, size: impl Fn(usize) -> f64) -> f64 {
+    powers.fold(f64::INFINITY, |least, k| {
+        let size = size(k);
+        if size.is_nan() { least } else { least.min(minus_log2(size) / k as f64) }
+    })
 }
