@@ -4,6 +4,7 @@
 use super::formulas::{adaptive, run, scene};
 use super::laws::rk4;
 use driftless::run::{MethodId, Outcome, Request};
+use driftless::stepping::Cause;
 use std::f64::consts::TAU;
 
 /// Mass \[kg\], distance of its centre \[m\], and moment of inertia about the hinge \[kg·m²\].
@@ -139,11 +140,8 @@ fn what_breaks_away_without_an_acceleration_does_not_stick_again_at_once() {
     }
 }
 
-/// A slider-crank at its wall, with friction at the crank pin and on the rail: either sticks and both are at
-/// their limits when the wall takes over the load, which returns with every period; none of them moves again.
-#[test]
-fn supports_at_their_limits_hand_the_load_to_the_wall() {
-    let text = r#"{"name": "crank", "gravity": [-0.95, -9.81],
+/// A slider-crank at its wall, with friction at the crank pin and on the rail.
+const CRANK: &str = r#"{"name": "crank", "gravity": [-0.95, -9.81],
         "bars": [{"name": "crank", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": 0.2},
             {"name": "rod", "mass": 0.5, "centre": [0.25, 0], "inertia": 0.01, "length": 0.5}],
         "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
@@ -158,13 +156,54 @@ fn supports_at_their_limits_hand_the_load_to_the_wall() {
         "torsion_springs": [{"name": "T", "body": "rod", "relative_to": "crank", "stiffness": 1.45,
             "free_angle": -0.72}],
         "start": {"crank": {"phi": 1.77, "omega": 0}, "rod": {"phi": -0.3}}, "until": 4, "every": 4}"#;
-    // The tip at 0.66 m: the law of cosines.
-    let crank = f64::acos((0.66 * 0.66 + 0.04 - 0.25) / (2.0 * 0.66 * 0.2));
-    for method in [MethodId::Dp8, MethodId::Radau(5)] {
-        let outcome = done(text, &adaptive(method, 1e-11));
-        assert!((outcome.last.phi[0] - crank).abs() < 1e-12, "{method}");
+
+/// Its crank's angle with the tip at the wall, 0.66 m from the hinge: the law of cosines.
+fn crank_at_wall() -> f64 {
+    f64::acos((0.66 * 0.66 + 0.04 - 0.25) / (2.0 * 0.66 * 0.2))
+}
+
+/// Either sticks and both are at their limits when the wall takes over the load, which returns with every period;
+/// none of them moves again.
+#[test]
+fn supports_at_their_limits_hand_the_load_to_the_wall() {
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = done(CRANK, &adaptive(method, 1e-11));
+        assert!((outcome.last.phi[0] - crank_at_wall()).abs() < 1e-12, "{method}");
         assert!(outcome.last.omega.iter().all(|omega| omega.abs() < 1e-12), "{method}");
         assert!(outcome.frictions.iter().all(|record| record.t < 1.0), "{method}: {:?}", outcome.frictions);
+    }
+}
+
+#[cfg(feature = "digits")]
+#[test]
+fn supports_at_their_limits_hand_the_load_to_the_wall_in_many_digits() {
+    use super::many_digits::{last, source};
+    use driftless::arithmetic::Real;
+    for digits in [20, 27] {
+        let row = last(&source(CRANK, &[], "4", "4"), digits);
+        let phi = row.bodies[0][0].value();
+        assert!((phi - crank_at_wall()).abs() < 1e-12, "{digits}: {phi}");
+    }
+}
+
+/// A motor presses a rough tip ever harder on its wall: no spring and no missing inertia.
+#[test]
+fn surfaces_that_jam_are_told_from_other_steps_that_shrink() {
+    let text = r#"{"name": "jam", "gravity": [0.39, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.15, 0], "inertia": 0.02, "length": 0.3},
+            {"name": "b", "mass": 0.7, "centre": [0.2, 0], "inertia": 0.02, "length": 0.4}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "a", "point": [0.3, 0]}, {"body": "b", "point": [0, 0]}],
+             "friction": {"radius": 0.02, "kinetic": 0.425, "static": 0.5525}}],
+        "walls": [{"name": "W", "body": "b", "point": [0.4, 0], "restitution": 0,
+            "line": {"through": [-0.19, -0.614], "normal": [-0.819, -0.574]},
+            "friction": {"kinetic": 0.245, "static": 0.392}}],
+        "motors": [{"name": "M", "body": "a", "law": {"start": -1.73, "rate": -4.71}}],
+        "start": {"b": {"phi": -2.07, "omega": -0.37}}, "until": 2, "every": 0.5}"#;
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = run(&scene(text), &adaptive(method, 1e-9));
+        let stop = outcome.stop.expect("a stop");
+        assert!(stop.cause == Cause::Friction && stop.what.contains("jam"), "{method}: {stop:?}");
     }
 }
 

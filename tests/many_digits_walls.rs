@@ -153,7 +153,7 @@ fn a_loop_that_a_motor_drives_into_a_wall_stops() {
     let below = "-0.199666833293656304556921638396431165519618379306";
     let stop = stopped(&parallelogram(r#""acceleration": 1"#, below, r#""restitution": 0.5"#), 30);
     assert_eq!((stop.cause.word(), stop.t), ("resting_contact", 0.0), "{stop}");
-    assert!(stop.what.contains("rests on wall line and the motors leave it no freedom"), "{stop}");
+    assert!(stop.what.contains("rests on wall line and the constraints leave it no freedom"), "{stop}");
 }
 
 /// The two motions that a forecast measures the growth of errors on stop there as well.

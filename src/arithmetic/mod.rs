@@ -179,6 +179,9 @@ impl<T: Scalar> Over<f64> for T {
     }
 }
 
+/// The largest rate of a base in doubles, over itself \[1/s\], whose fractional powers are expanded.
+const STEEPEST: f64 = 1e10;
+
 /// A scalar with an order and a nearest `f64`.
 pub trait Real: Scalar + PartialOrd {
     /// True for `f64` itself, for which there are kernels of lanes.
@@ -188,12 +191,16 @@ pub trait Real: Scalar + PartialOrd {
     const HAS_CONSTANTS: bool = false;
     /// Share of its scale below which the pivot of a constraint counts as zero.
     const DROPPED: f64 = 1e-8;
-    /// The largest rate of a base, over itself \[1/s\], whose powers are expanded: beyond it the series of a
-    /// fractional power leaves the range of exponents.
-    const STEEPEST: f64 = 1e10;
 
     /// The nearest `f64`.
     fn value(self) -> f64;
+
+    /// True for a base above zero so near to it, beside its rate, that its fractional powers are not expanded:
+    /// their series leave the range of exponents, or the base is rounding.
+    #[inline(always)]
+    fn is_steep(self, rate: Self) -> bool {
+        rate.value().abs() > STEEPEST * self.value()
+    }
 
     /// A double-double in this type: the nearest value, and what that leaves over.
     fn split(value: DoubleDouble) -> (Self, Self);

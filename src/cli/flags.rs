@@ -67,7 +67,7 @@ pub enum Command {
     Fit(FitFlags),
     /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
     Compare(Box<CompareFlags>),
-    /// Go on with an interrupted run or sweep: it ends as if nothing had been, byte for byte
+    /// Go on with an interrupted run or sweep: its files are those of one that was not interrupted, byte for byte
     Resume(ResumeFlags),
     /// Join the parts of a sweep: the same table, chart and record as of one process, byte for byte
     Merge(MergeFlags),
@@ -175,18 +175,17 @@ pub struct CheckFlags {
 
 const SIGNS: &str = "\
 Signs, in the directions of the ground, torques counter-clockwise:
-  hinge, weld      force of the first body of `between` on the second, also where the ground is second
-  slider           force across the rail on the body of its `point`
-  motor, lock      torque on its `body`; of a motor on a slider, force along the rail on the body of the \
-  slider's `point`
-  NAME.angle       torque of a weld on the second body, of a locked slider on the body of its `point`; on \
-  the other body
-                   where that is the ground
-  power            what the motor feeds in
-A force or torque is minus the multiplier of its constraint; `on` and `from` name both bodies.  Where \
-constraints are
-redundant, forces that rigid bodies leave open are named as indeterminate; those shown are the ones of least \
-norm.";
+  hinge, weld   force of the first body of `between` on the second, also where
+                the ground is second
+  slider        force across the rail on the body of its `point`
+  motor, lock   torque on its `body`; of a motor on a slider, force along the
+                rail on the body of the slider's `point`
+  NAME.angle    torque of a weld on the second body, of a locked slider on the
+                body of its `point`; on the other body where that is the ground
+  power         what the motor feeds in
+A force or torque is minus the multiplier of its constraint; `on` and `from`
+name both bodies.  Where constraints are redundant, forces that rigid bodies
+leave open are named as indeterminate; those shown are the ones of least norm.";
 
 /// `driftless inspect`.
 #[derive(Debug, Args)]
@@ -401,6 +400,11 @@ pub fn parse(arguments: impl IntoIterator<Item = OsString>) -> Result<Flags, Exi
         }
         let text = error.render().to_string();
         let text = text.trim_end();
+        let is_help = error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand;
+        if is_help && !arguments.iter().any(|argument| argument == "--json") {
+            eprintln!("{text}");
+            return ExitCode::from(Exit::Usage as u8);
+        }
         let failure = Failure::new(Exit::Usage, text.strip_prefix("error: ").unwrap_or(text));
         failure.tell(arguments.iter().any(|argument| argument == "--json"))
     })

@@ -131,7 +131,10 @@ fn located(folder: &Path) -> Result<PathBuf, Failure> {
 /// Why there is nothing to go on with in a folder.
 fn nothing(folder: &Path) -> Failure {
     let text = if !folder.is_dir() {
-        format!("there is no folder {}", folder.display())
+        format!(
+            "there is no folder {}\nhint: name the folder of a run, or one that holds it",
+            folder.display()
+        )
     } else if [RECORD, SWEEP_RECORD].iter().any(|name| folder.join(name).exists()) {
         format!("the run in {} is finished: there is nothing to resume", folder.display())
     } else {

@@ -332,7 +332,9 @@ fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<SweepChart>, Failure
     }
     match SweepChart::new(plan, flags.map.as_deref()) {
         Ok(curve) => Ok(Some(curve)),
-        Err(reason) if flags.html => Err(Failure::new(Exit::Usage, format!("--html: {reason}"))),
+        Err(reason) if flags.html && flags.map.is_none() => {
+            Err(Failure::new(Exit::Usage, format!("--html: {reason}")))
+        }
         Err(reason) if flags.map.is_some() => Err(Failure::new(Exit::Usage, format!("--map: {reason}"))),
         Err(reason) => {
             flags.scene.remark(&format!("no chart: {reason}"));

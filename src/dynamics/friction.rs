@@ -19,6 +19,7 @@
 
 mod combinations;
 mod evaluation;
+pub mod evidence;
 pub mod impact;
 pub mod modes;
 pub mod paradox;

@@ -1,6 +1,6 @@
 //! A fit as a page, a JSON object, a table and charts.
 
-use super::page::{Page, figure, magnitude, rough};
+use super::page::{Page, counted, figure, magnitude, rough};
 #[cfg(feature = "charts")]
 use crate::chart::{self, Band, Bands, ChartError, FILE_RESOLUTION, Picture, plain};
 use crate::run::fit::{Fit, FittedColumn};
@@ -75,10 +75,7 @@ pub fn text(found: &Fit) -> String {
         .collect();
     page.entry("columns", "residuals and the noise they were weighted with");
     page.table(&["column", "rms", "sigma"], &rows);
-    page.entry(
-        "chi square",
-        &format!("{} at {} degrees of freedom", rough(found.chi_square), found.degrees_of_freedom),
-    );
+    page.entry("sigma", &sigma(found));
     if found.segments > 1 {
         let text = format!("{}, tied together within {}", found.segments, magnitude(found.gap));
         page.entry("segments", &text);
@@ -140,16 +137,22 @@ pub fn table(found: &Fit) -> String {
     text
 }
 
+/// Where the noise is from, and chi square where it is given: with that of the residuals it tests nothing.
+fn sigma(found: &Fit) -> String {
+    let freedom = counted(found.degrees_of_freedom as u64, "degree of freedom", "degrees of freedom");
+    match found.columns.iter().all(|column| column.is_given) {
+        true => format!("given: chi square {} at {freedom}", rough(found.chi_square)),
+        false => format!("found from the residuals, {freedom}"),
+    }
+}
+
 /// The fitted motion through the data, and the residuals.
 ///
 /// # Errors
 /// Drawing fails.
 #[cfg(feature = "charts")]
 pub fn charts(found: &Fit) -> Result<Vec<(&'static str, Picture)>, ChartError> {
-    let caption = vec![
-        format!("scene {}", plain(&found.scene.name)),
-        format!("chi square {} at {} degrees of freedom", rough(found.chi_square), found.degrees_of_freedom),
-    ];
+    let caption = vec![format!("scene {}", plain(&found.scene.name)), format!("sigma {}", sigma(found))];
     let unit = |column: &FittedColumn| plain(&column.unit).replace(' ', "·");
     let dots = |values: &mut dyn Iterator<Item = Option<f64>>| {
         found.times.iter().zip(values).filter_map(|(&t, value)| Some([t, value?])).collect::<Vec<_>>()

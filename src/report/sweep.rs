@@ -103,6 +103,9 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
     let threads = counted(totals.threads as u64, "thread", "threads");
     page.entry("cost", &format!("{points}, {steps}, {seconds:.3} s on {threads}, {rate} points a second"));
     page.entry("points", &by_status(totals));
+    if totals.refused + totals.stopped > 0 {
+        page.entry("", "why points were refused or stopped: column `cause` of the table");
+    }
     page.entry(
         "turned over",
         &format!("{} of {points}, by t = {} s", totals.flipped, figure(sweep.plan().until)),
@@ -187,7 +190,7 @@ pub(super) struct Labels {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoChart {
     /// The table has no such column, or it holds words.
-    #[error("the table has no column of numbers `{0}`; there are: {1}")]
+    #[error("the table has no column of numbers `{0}`\nhint: there are: {1}")]
     Column(String, String),
     /// A list of points has no order.
     #[error("the points are a list; a chart shows a grid")]

@@ -78,7 +78,7 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
                     rough(trust.at)
                 ),
             );
-            page.entry("", &format!("no horizon within {} s", rough(trust.at)));
+            page.entry("", &format!("trusted over the whole run, {} s", rough(trust.at)));
         }
         (None, None) => {
             let why = trust.why.as_deref().unwrap_or("nothing was to be compared");

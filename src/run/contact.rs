@@ -72,6 +72,15 @@ const ROUNDS: usize = 100;
 /// leaves where an impact took it off.
 const NO_SPEED: f64 = 1e-13;
 
+/// What is to be done where constraints leave a point at a wall no freedom.
+pub(super) const DRIVEN: &str =
+    "change what drives it there, as a motor, or friction that leaves it one way, or end the run before";
+
+/// What is to be done where a method misses what a wall does.
+pub(super) fn tighter(method: &str) -> &'static str {
+    if method == "taylor" { "tighten the tolerance" } else { "tighten the tolerance, or use --method taylor" }
+}
+
 /// A contact that is held.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Held {
@@ -280,7 +289,7 @@ impl ContactDriver {
                     return Ok(false);
                 }
                 Ok(Halt::Contact(contact)) if self.mechanism.held.contains(&contact) => {
-                    self.settle(None, Some(contact), outcome)?
+                    self.pressure_ends(contact, outcome)?
                 }
                 Ok(Halt::Contact(contact)) => {
                     let approach = self.impact_at(contact, outcome)?;

@@ -8,8 +8,9 @@ use super::contact::ContactDriver;
 use super::running::Outcome;
 use crate::arithmetic::Complex;
 use crate::dynamics::constraint::ConstraintArguments;
-use crate::dynamics::friction::modes::{Modes, NO_SPEED};
-use crate::dynamics::friction::paradox::{HINT, JAMS};
+use crate::dynamics::friction::evidence::NO_SPEED;
+use crate::dynamics::friction::modes::Modes;
+use crate::dynamics::friction::paradox::{HINT, JAMMED, JAMS, REGULAR};
 use crate::dynamics::friction::{CompiledFriction, FrictionMode, FrictionMoment, Transition};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -25,8 +26,6 @@ const KEPT: usize = 1000;
 const AT_REST: f64 = 1e-11;
 /// How many times a force is to grow within a moment for its sign to count as that of rounding.
 const NO_FORCE: f64 = 100.0;
-/// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
-const REGULAR: f64 = 0.3;
 
 /// A place with friction began to stick or to slide.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -187,10 +186,11 @@ impl ContactDriver {
     pub(super) fn friction_event(&mut self, function: usize, outcome: &mut Outcome) -> Result<(), StepError> {
         let motion = self.motion();
         let watch = self.events.as_ref().and_then(|events| events.friction.as_ref());
-        let Some(transition) = watch.and_then(|watch| watch.transition(function, &motion)) else {
-            return Err(self.paradox(outcome, JAMS.into()));
-        };
-        self.settle_at(None, None, transition, outcome)
+        if let Some(transition) = watch.and_then(|watch| watch.transition(function, &motion)) {
+            return self.settle_at(None, None, transition, outcome);
+        }
+        // What rests may do so by other forces.
+        if self.settles_anew(outcome)? { Ok(()) } else { Err(self.paradox(outcome, JAMS.into())) }
     }
 
     /// The contacts held and the modes of the places with friction from the present moment on.
@@ -215,6 +215,18 @@ impl ContactDriver {
             let places = places.join(", ");
             self.paradox(outcome, paradox.message(&places))
         })
+    }
+
+    /// True where friction hardly follows from the present motion.
+    pub(super) fn jams(&mut self) -> bool {
+        if self.mechanism.sliding().next().is_none() {
+            return false;
+        }
+        let motion = self.motion();
+        let [phi, omega] = motion.rounded();
+        let mut kernel = Kernel::<f64>::new(&self.mechanism);
+        kernel.accelerate::<0>(&self.mechanism, motion.time, &phi, &omega, Bias::default());
+        kernel.regularity.abs() < JAMMED
     }
 
     pub(super) fn paradox(&mut self, outcome: &Outcome, what: String) -> StepError {

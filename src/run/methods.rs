@@ -73,8 +73,8 @@ pub const METHODS: &[MethodInfo] = &[
         "everyday runs at 1e-6 to 1e-12 (crate ode_solvers)",
         "no walls, no dry friction, no projection",
     ),
-    adaptive(MethodId::Dp5, "dp5", 5, "as dopri5, with impacts and projection after every step", "anything"),
-    adaptive(MethodId::Dp8, "dp8", 8, "as dop853, with impacts and projection after every step", "anything"),
+    adaptive(MethodId::Dp5, "dp5", 5, "as dopri5, with impacts and projection after every step", "any"),
+    adaptive(MethodId::Dp8, "dp8", 8, "as dop853, with impacts and projection after every step", "any"),
     adaptive(
         MethodId::Taylor,
         "taylor",
@@ -134,7 +134,7 @@ const fn gauss(stages: usize, name: &'static str) -> MethodInfo {
         order: 2 * stages as u32,
         stepping: Stepping::Fixed,
         symplectic: true,
-        purpose: "long horizons: energy stays at rounding",
+        purpose: "long horizons: the energy error stays bounded",
         needs: "no walls, no dry friction",
     }
 }
@@ -146,7 +146,7 @@ const fn rattle(composition: Composition, order: u32, name: &'static str) -> Met
         order,
         stepping: Stepping::Fixed,
         symplectic: true,
-        purpose: "long horizons in unit vectors, constraints kept at both levels",
+        purpose: "long horizons: the energy error stays bounded, constraints kept at both levels",
         needs: "no walls, no dry friction, no dampers",
     }
 }

@@ -419,9 +419,10 @@ fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Resu
     for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
         if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
             let by = if extended { format!("{method} --extended") } else { method.to_string() };
+            let shown = if value.abs() < 1e-3 { format!("{value:e}") } else { value.to_string() };
             return Err(usage(
                 option,
-                format!("{value:e} is not within {least:e} to 0.1, what {by} takes"),
+                format!("{shown} is not within {least:e} to 0.1, what {by} takes"),
                 "1e-9 is a good beginning",
             ));
         }

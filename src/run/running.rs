@@ -288,6 +288,7 @@ impl Running {
                 return Ok(false);
             }
             outcome.ended_by = contact_driver.ended_by.take();
+            let stopped = stopped.map_err(|stop| advised(stop, contact_driver));
             let (has_closed_loops, steps_made) =
                 (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
             let moved = begun.take().and_then(|begun| contact_driver.begun_elsewhere(&begun, outcome));
@@ -304,7 +305,6 @@ impl Running {
             let has_arrived = stopped == Ok(true) && outcome.ended_by.is_none();
             outcome.stop = stopped
                 .err()
-                .map(|stop| advised(stop, has_closed_loops))
                 .or(moved)
                 .or_else(|| if has_arrived { missed(&outcome.plan, self.row, sample) } else { None })
                 .or_else(|| (!sample.is_finite()).then(|| not_finite(&outcome.plan, sample.t)))

@@ -5,6 +5,7 @@
 //! whether it is behind the wall.  Positions and rates are all that is looked at; nothing is shared with the
 //! search for events, whose misses are to be found.
 
+use super::contact::tighter;
 use super::impact_monitor::{gap, gap_rate};
 use crate::dynamics::{BodyAngles, Mechanism};
 use crate::stepping::search::golden_sections;
@@ -152,7 +153,7 @@ impl PassedWall {
             true => format!("a point that is held at wall {wall} is {gap:.3e} m from it"),
             false => format!("a point is {:.3e} m behind wall {wall} and no impact was found", -gap),
         };
-        let hint = "tighten the tolerance, or use --method taylor".into();
+        let hint = tighter(method).into();
         StepError { cause: Cause::WallPassed, method: method.into(), t, step: 0.0, what, hint }
     }
 }

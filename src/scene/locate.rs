@@ -224,10 +224,21 @@ fn syntax_hint(json: &str, at: usize, error: &serde_json::Error) -> &'static str
     } else if rest.starts_with("//") || rest.starts_with("/*") || rest.starts_with('#') {
         "JSON has no comments; use \"description\""
     } else if rest.starts_with(['N', 'I', 'n', 'i']) || rest.starts_with("-I") || before.ends_with('-') {
-        "numbers must be finite and written out: NaN, Infinity and expressions are not JSON"
+        "numbers must be finite and written out; formulas and units go in quotes, as \"pi/2\" or \"90 deg\""
+    } else if error.to_string().starts_with("control character") {
+        match rest.find(|c: char| c.is_ascii_control()).map(|at| rest.as_bytes()[at]) {
+            Some(b'\t') => "write \\t for a tab inside of quotes",
+            _ => "this text is not closed by a quote on its line",
+        }
+    } else if rest.starts_with(|c: char| c.is_ascii_digit())
+        && before.strip_suffix(',').is_some_and(|before| before.ends_with(|c: char| c.is_ascii_digit()))
+    {
+        "decimals are written with a point, as 0.6"
     } else if rest.starts_with(['+', '.', '\'']) {
         "write 0.5, not .5 or +0.5, and put text in double quotes"
-    } else if rest.starts_with('"') || rest.starts_with('{') || rest.starts_with('[') {
+    } else if rest.starts_with(['"', '{', '[']) && before.ends_with(',') {
+        "a bracket or brace before it closes too early"
+    } else if rest.starts_with(['"', '{', '[']) {
         "a comma or colon seems to be missing before it"
     } else {
         "compare with a file in examples/scenes/"

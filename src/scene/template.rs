@@ -220,7 +220,7 @@ pub(super) fn whole(short: &str, tree: &Located) -> Result<String, String> {
         return Err("go on with a key, as in bar1.phi".to_owned());
     }
     let mut found = Vec::new();
-    let mut known: Vec<&str> = SCENE.fields.iter().map(|field| field.name).collect();
+    let mut known = Vec::new();
     for list in LISTS {
         let Some(Value::List(nodes)) = member(tree, list).map(|node| &node.value) else { continue };
         known.extend(nodes.iter().filter_map(name));
@@ -236,7 +236,10 @@ pub(super) fn whole(short: &str, tree: &Located) -> Result<String, String> {
     }
     match &found[..] {
         [only] => Ok(only.clone()),
-        [] => Err(hint(first, &known)),
+        [] => {
+            known.extend(SCENE.fields.iter().map(|field| field.name));
+            Err(hint(first, &known))
+        }
         several => Err(format!("{SEVERAL} {first}; write {}", several.join(" or "))),
     }
 }

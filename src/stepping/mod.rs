@@ -313,7 +313,7 @@ pub enum Cause {
     Sliding,
     /// No motion, or more than one, fits the laws of dry friction: Painlevé's paradox.
     Friction,
-    /// A point came to rest on a wall, and it could not be held there or the motors leave it no freedom.
+    /// A point came to rest on a wall, and it could not be held there or the constraints leave it no freedom.
     RestingContact,
     /// A point was found behind a wall, or away from the wall it is held at: an impact was missed.
     WallPassed,

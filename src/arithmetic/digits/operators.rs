@@ -164,12 +164,19 @@ impl<const W: usize> Over<Digits<W>> for Digits<W> {
     }
 }
 
+/// Part of the bits in which a base is told from rounding.
+const SURE: f64 = 0.75;
+
 impl<const W: usize> Real for Digits<W> {
     const IS_PLAIN: bool = false;
     const HAS_CONSTANTS: bool = true;
     /// Rounding leaves far less of a pivot that is zero.
     const DROPPED: f64 = 1e-40;
-    const STEEPEST: f64 = f64::INFINITY;
+
+    fn is_steep(self, rate: Self) -> bool {
+        let bits = 64.0 * (self.limbs() - 1) as f64;
+        rate.log2() - self.log2() > SURE * bits
+    }
 
     fn value(self) -> f64 {
         if self.kind == DigitsKind::NotFinite {

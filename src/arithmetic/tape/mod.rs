@@ -119,7 +119,7 @@ impl Operation {
 /// equations confirm it.
 #[inline(always)]
 pub fn has_no_powers<T: Real>(base: T, rate: T) -> bool {
-    base <= T::ZERO || rate.value().abs() > T::STEEPEST * base.value()
+    base <= T::ZERO || base.is_steep(rate)
 }
 
 /// A formula with any number of results.

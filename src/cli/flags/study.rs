@@ -79,8 +79,8 @@ pub struct StressFlags {
     /// Scenes [default: the shipped set, whose ends are known]
     #[arg(value_name = "SCENE")]
     pub scenes: Vec<PathBuf>,
-    /// Methods, separated by commas [default: all]
-    #[arg(long, value_name = "NAMES", value_parser = methods(), value_delimiter = ',')]
+    /// Methods, joined by commas [default: all]
+    #[arg(long, value_name = "METHODS", value_parser = methods(), value_delimiter = ',')]
     pub methods: Vec<MethodId>,
     /// Evaluations allowed for each scene and method
     #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS,
@@ -94,10 +94,10 @@ pub struct StressFlags {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Folder under which `stress` is made
-    #[arg(long, value_name = "DIR", default_value = "output")]
+    #[arg(long, help_heading = "Files", value_name = "DIR", default_value = "output")]
     pub out: PathBuf,
     /// Overwrite what is in the folder
-    #[arg(long)]
+    #[arg(long, help_heading = "Files")]
     pub force: bool,
     #[allow(missing_docs)]
     #[cfg(feature = "charts")]
@@ -205,7 +205,7 @@ pub struct SensitivityFlags {
     /// Write and draw the derivatives over time
     #[arg(long)]
     pub over_time: bool,
-    /// Interval of these rows in seconds [default: a two hundredth of the run]
+    /// Interval of these rows in seconds [default: 1/200 of the run]
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
     pub every: Option<f64>,
     /// A number with its standard deviation, for bands of uncertainty over time; repeatable
@@ -257,7 +257,7 @@ pub struct FitFlags {
 /// Where a study of a scene leaves its results.
 #[derive(Clone, Debug, Args)]
 pub struct FolderFlags {
-    /// Folder under which one of the scene is made, with that of the results in it
+    /// Folder for the results, in a folder of the scene's name and one of the study's
     #[arg(long, value_name = "DIR", default_value = "output", help_heading = "Files")]
     pub out: PathBuf,
     /// Overwrite the results that are in the folder

@@ -16,7 +16,8 @@ use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::{Formula, Numbers, Origin};
 use crate::scene::{
-    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Place, PointTable, Scene, Scope, Wall,
+    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Parameter, Place, PointTable, Scene,
+    Scope, Wall,
 };
 use std::sync::Arc;
 
@@ -200,6 +201,8 @@ pub(crate) struct Formulas<C = f64> {
 struct Binder<'a, C> {
     forest: &'a Forest<C>,
     tables: &'a [PointTable<C>],
+    /// Parameters above zero that no event sets.
+    positive: Vec<bool>,
     conditions: Vec<String>,
 }
 
@@ -210,7 +213,11 @@ impl<C: Decimal> Binder<'_, C> {
     }
 
     /// Numbers the conditions of a formula and finds its points.
-    fn placed(&mut self, Bound { formula, meanings }: Bound<C>, owner: &str) -> Expression<C> {
+    fn placed(&mut self, Bound { mut formula, meanings }: Bound<C>, owner: &str) -> Expression<C> {
+        let is_positive = |parameter: usize| self.positive.get(parameter) == Some(&true);
+        formula.note_exponents(
+            |name| matches!(meanings[name], Meaning::Parameter(parameter) if is_positive(parameter)),
+        );
         let first = self.conditions.len();
         self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
         let site = |place| self.forest.site(&place);
@@ -248,7 +255,12 @@ impl<C: Decimal> Formulas<C> {
             return Ok(None);
         }
         let mut names = Names::of(scene);
-        let mut binder = Binder { forest, tables: &scene.tables, conditions: Vec::new() };
+        let is_set =
+            |name: &String| scene.events.iter().any(|event| event.set.iter().any(|(set, _)| set == name));
+        let is_positive =
+            |parameter: &Parameter<C>| parameter.value.value() > 0.0 && !is_set(&parameter.name);
+        let positive = scene.parameters.iter().map(is_positive).collect();
+        let mut binder = Binder { forest, tables: &scene.tables, positive, conditions: Vec::new() };
         let mut signals = Vec::new();
         for signal in &scene.signals {
             let bound = Binder::bind(&names.alone(), &signal.formula, &signal.name)?;

@@ -32,3 +32,7 @@ impl Paradox {
 pub const HINT: &str = "lower the coefficient, or put a spring and a damper where the bodies touch";
 /// What is said where the equations of friction become singular.
 pub const JAMS: &str = "friction no longer follows from the motion: Painlevé's paradox, the surfaces jam";
+/// The determinant of the equations of friction from which on it is far from zero: 1 is that of no friction.
+pub const REGULAR: f64 = 0.3;
+/// The same below which ever smaller steps are that paradox.
+pub const JAMMED: f64 = 1e-2;

@@ -12,7 +12,7 @@
 use super::super::Mechanism;
 use super::super::constraint::ConstraintArguments;
 use super::super::contact::metric::{ContactMetric, MetricRow};
-use super::modes::Evidence;
+use super::evidence::Evidence;
 use super::{FrictionMode, FrictionMoment, Normal, Transition};
 
 /// Acceleration, over that without constraints, up to which the rest leaves a place still.

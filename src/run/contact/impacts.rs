@@ -6,7 +6,10 @@ use super::super::impact_monitor::Claim;
 use super::super::methods::Stabilization;
 use super::super::running::Outcome;
 use super::rest::{Flight, come_to_rest};
-use super::{ContactDriver, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS};
+use super::{
+    ContactDriver, DRIVEN, HOLDS_MOST, Held, ImpactRecord, Jump, KEPT, NO_SPEED, PersistentContact, ROUNDS,
+    tighter,
+};
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::friction::{CompiledFriction, FrictionMode, Normal, Transition};
 use crate::dynamics::impact::Impact;
@@ -84,11 +87,7 @@ impl ContactDriver {
                     "the constraints leave a point that meets wall {} no way back",
                     self.name(contact)
                 );
-                return Err(self.stopped(
-                    &outcome.plan,
-                    what,
-                    "look for motors that drive it there and change their laws, or end the run before",
-                ));
+                return Err(self.stopped(&outcome.plan, what, DRIVEN));
             };
             match striking.pulled(&impact.row_impulses, 1e-12 * impact.impulse) {
                 Some(pulled) => self.release(pulled, outcome)?,
@@ -112,7 +111,7 @@ impl ContactDriver {
                 (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
             return Err(StepError {
                 cause,
-                ..self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method taylor")
+                ..self.stopped(&outcome.plan, what, tighter(&outcome.plan.method.to_string()))
             });
         }
         let t = last.time.hi;
@@ -197,9 +196,11 @@ impl ContactDriver {
             return Ok(());
         }
         let Some(staying) = self.free.staying(&touching, motion.time, &phi, &omega) else {
-            let what =
-                format!("a point rests on wall {} and the motors leave it no freedom", self.names(&touching));
-            return Err(self.stopped(&outcome.plan, what, "change the motors' laws, or end the run before"));
+            let what = format!(
+                "a point rests on wall {} and the constraints leave it no freedom",
+                self.names(&touching)
+            );
+            return Err(self.stopped(&outcome.plan, what, DRIVEN));
         };
         let still: Vec<usize> = (touching.iter().copied())
             .filter(|&contact| {
@@ -219,6 +220,23 @@ impl ContactDriver {
             jumps.at_friction(place);
         }
         Ok(())
+    }
+
+    /// Lets the point of a wall go that ceases to press it, where no supports at their limits can press it in
+    /// another way.
+    pub(super) fn pressure_ends(&mut self, contact: usize, outcome: &mut Outcome) -> Result<(), StepError> {
+        let is_at_limit = |mode: &FrictionMode| matches!(mode, FrictionMode::Strained(_));
+        if self.mechanism.modes.iter().any(is_at_limit) && self.settles_anew(outcome)? {
+            return Ok(());
+        }
+        self.settle(None, Some(contact), outcome)
+    }
+
+    /// Finds anew what holds the points that touch, and which places stick; false where that is as before.
+    pub(in crate::run) fn settles_anew(&mut self, outcome: &mut Outcome) -> Result<bool, StepError> {
+        let before = (self.mechanism.held.clone(), self.mechanism.modes.clone());
+        self.settle(None, None, outcome)?;
+        Ok(before != (self.mechanism.held.clone(), self.mechanism.modes.clone()))
     }
 
     /// Lets the point of a wall go that an impact would pull into it.

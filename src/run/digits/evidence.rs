@@ -11,17 +11,24 @@ use crate::arithmetic::{Complex, Real, Scalar};
 use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
-use crate::dynamics::friction::modes::{ContactSigns, Evidence};
+use crate::dynamics::friction::evidence::{ContactSigns, Evidence};
 use crate::dynamics::friction::{CompiledFriction, FrictionMode, size};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
 
 /// Powers of the rates that accelerations are taken from.
 const POWERS: usize = 2;
+/// log2 of a moment, over the mechanism's own time.
+const A_MOMENT: f64 = -20.0;
+/// The same of the part of a force that is rounding a moment later: the motion up to then is known but for what
+/// is of third order.
+const LATER: f64 = 1.5 * A_MOMENT;
 
 /// What is known of a moment in many digits.
 pub(super) struct InDigits<'a, const W: usize> {
     motion: &'a DigitsMotion<W>,
+    /// Time \[s\].
+    t: Digits<W>,
     /// All coordinates.
     pub posture: DigitsCoordinates<W>,
     z: Vec<Complex<Digits<W>>>,
@@ -33,7 +40,10 @@ pub(super) struct InDigits<'a, const W: usize> {
 
 impl<'a, const W: usize> InDigits<'a, W> {
     pub fn of(motion: &'a DigitsMotion<W>) -> Self {
-        let posture = motion.state_posture();
+        Self::at(motion, motion.state.t, motion.state_posture(), motion.precision.rounding(SURE))
+    }
+
+    fn at(motion: &'a DigitsMotion<W>, t: Digits<W>, posture: DigitsCoordinates<W>, rounding: f64) -> Self {
         let mechanism = &motion.mechanism;
         let z = mechanism.elements(&posture.phi);
         let anchor = |(friction, mode): (&CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| match mode {
@@ -41,7 +51,7 @@ impl<'a, const W: usize> InDigits<'a, W> {
             _ => friction.displacement(&posture.phi, &z),
         };
         let anchors = mechanism.frictions.iter().zip(&mechanism.acting.sliding).map(anchor).collect();
-        Self { motion, posture, z, anchors, rounding: motion.precision.rounding(SURE) }
+        Self { motion, t, posture, z, anchors, rounding }
     }
 
     /// Modes with the displacements of what sticks in all digits.
@@ -66,7 +76,7 @@ impl<'a, const W: usize> InDigits<'a, W> {
         let mut series = Series::of_terms(&mechanism.terms(), Coordinates::All, POWERS);
         series.resolve_reversals(self.rounding);
         let zeros = vec![Digits::ZERO; phi.len()];
-        series.expand_terms(&mechanism.terms(), self.motion.state.t, phi, &zeros, omega);
+        series.expand_terms(&mechanism.terms(), self.t, phi, &zeros, omega);
         series
     }
 
@@ -85,7 +95,7 @@ impl<'a, const W: usize> InDigits<'a, W> {
     /// The sign of the acceleration of what a row measures, where `unit` is the mechanism's own.
     fn speeding(&self, series: &Series<Digits<W>>, row: &ConstraintEquation<Digits<W>>, unit: f64) -> i8 {
         let n = self.z.len();
-        let acceleration = second(series, self.motion.state.t, row);
+        let acceleration = second(series, self.t, row);
         let along = gradient(row, &self.z);
         let accelerations = &series.omega[n..2 * n];
         let parts = along.iter().zip(accelerations).fold(Digits::ZERO, |sum, (&g, &a)| sum + (g * a).abs());
@@ -185,6 +195,18 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         })
     }
 
+    fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
+        let moment = Digits::of(libm::exp2(A_MOMENT) * self.motion.mechanism.structure.units.time);
+        let mut later = self.posture.clone();
+        for ((phi, omega), &load) in later.phi.iter_mut().zip(&mut later.omega).zip(load) {
+            let change = Digits::of(load) * moment;
+            *phi += (*omega + change.scale(0.5)) * moment;
+            *omega += change;
+        }
+        let later = Self::at(self.motion, self.t + moment, later, self.rounding.max(LATER));
+        later.told(closed, modes, touching).is_some_and(|told| told.hold(closed, modes, touching))
+    }
+
     fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], _is_driven: bool) -> bool {
         let mut modes = modes.to_vec();
         modes[place] = FrictionMode::Open;
@@ -197,7 +219,7 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         };
         let DigitsCoordinates { phi, mut omega, .. } = self.posture.clone();
         let mut keeper = DigitsKeeper::new(&mechanism, self.motion.precision);
-        keeper.close(&mechanism, self.motion.state.t, &phi, &mut omega);
+        keeper.close(&mechanism, self.t, &phi, &mut omega);
         self.rate(place, &omega) == 0.0
     }
 }

@@ -28,16 +28,17 @@ use crate::dynamics::Coordinates;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism, ExactStart};
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::friction::Transition;
-use crate::dynamics::friction::paradox::{HINT, JAMS};
+use crate::dynamics::friction::paradox::{HINT, JAMMED, JAMS};
 use crate::dynamics::series::Series;
 use crate::stepping::{Cause, StepError};
 
 /// log2 of the factor by which a step may be longer than the one before.
 const SLACK: f64 = 0.25;
+/// The finest step over the time, where laws do not ask for less.
+const FINEST: f64 = 1e-13;
 /// Changes of what is held at one moment, beyond four a wall.
 const ROUNDS: usize = 16;
-/// The determinant of the equations of friction below which ever smaller steps are Painlevé's paradox.
-const JAMMED: f64 = 1e-2;
+
 /// Where a run is, with all that its next step depends on.
 #[derive(Clone, Debug)]
 pub struct LongState<const W: usize> {
@@ -323,7 +324,7 @@ impl<const W: usize> DigitsMotion<W> {
             let hint = "look for a spring of length zero or a position without inertia";
             return Err(self.stop(Cause::NotFinite, 0.0, "the series is not finite", hint));
         }
-        if step < 1e-13 * seconds.abs().max(1e-3 * self.mechanism.structure.units.time) {
+        if step < self.finest() * seconds.abs().max(1e-3 * self.mechanism.structure.units.time) {
             if self.series.regularity().abs() < JAMMED {
                 return Err(self.stop(Cause::Friction, step, JAMS, HINT));
             }
@@ -336,6 +337,14 @@ impl<const W: usize> DigitsMotion<W> {
             ));
         }
         Ok(step)
+    }
+
+    /// Steps over the time below which a series converges in ever smaller circles: fractional powers begin and
+    /// end at zero in such that only many digits tell apart.
+    fn finest(&self) -> f64 {
+        let least =
+            if self.probe.is_some() { -friction::SURE * self.precision.bits as f64 } else { f64::INFINITY };
+        libm::exp2(least.max(-1000.0)).min(FINEST)
     }
 
     /// Expands the state, and tells how long a step its series makes \[s\].

@@ -14,6 +14,7 @@
 //! it plastically and booked as that of impacts.  Bounces that are left out last `τ = 2 v/(a (1-e))`; what
 //! they would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
 
+use super::super::contact::DRIVEN;
 use super::friction::Flown;
 use super::keep::DigitsKeeper;
 use super::motion::{DigitsMotion, LongState};
@@ -272,9 +273,8 @@ impl<const W: usize> DigitsMotion<W> {
         let Some(forces) = touching.forces() else {
             let name = |&wall: &usize| self.mechanism.structure.contacts[wall].row.name();
             let names = touching.walls.iter().map(name).collect::<Vec<_>>().join(", ");
-            let what = format!("a point rests on wall {names} and the motors leave it no freedom");
-            let hint = "change the motors' laws, or end the run before";
-            return Err(self.stop(Cause::RestingContact, 0.0, &what, hint));
+            let what = format!("a point rests on wall {names} and the constraints leave it no freedom");
+            return Err(self.stop(Cause::RestingContact, 0.0, &what, DRIVEN));
         };
         let least = sure(self);
         let is_pressed = |&(&wall, &force): &(&usize, &Digits<W>)| {

@@ -9,6 +9,7 @@
 //! That there is a zero, and which is the first, is told in doubles ([`search`]): gaps shallower than 1e-12
 //! of the length of a contact are not told from touching, but for those that begin so: see module `touch`.
 
+use super::super::contact::DRIVEN;
 use super::friction_impact;
 use super::motion::DigitsMotion;
 use super::posture::DigitsCoordinates;
@@ -278,7 +279,7 @@ fn has_way_back<const W: usize>(
 fn no_way_back<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> StepError {
     let name = &motion.mechanism.walls[wall].0.name;
     let what = format!("the constraints leave a point that meets wall {name} no way back");
-    let hint = "look for motors that drive it there and change their laws, or end the run before";
+    let hint = DRIVEN;
     motion.stop(Cause::RestingContact, 0.0, &what, hint)
 }
 

@@ -1,18 +1,24 @@
 //! Why a run ends before its horizon, beside the stops of its method.
 
+use super::super::contact::ContactDriver;
 use super::super::drift::Drift;
 use super::super::driver::MOST_TURNS;
 use super::super::methods::{MethodId, Stabilization};
 use super::super::plan::Plan;
 use super::super::sample::Sample;
+use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::stepping::{Cause, StepError};
 
 /// Share of the output interval by which a row may be beside its time.
 const BESIDE: f64 = 1e-6;
 
-/// Steps that shrink where loops and sliders are have another cause than a stiff spring.
-pub(super) fn advised(stop: StepError, has_closed_loops: bool) -> StepError {
-    if stop.cause != Cause::StepTooSmall || !has_closed_loops {
+/// Steps that shrink where surfaces jam, or where loops and sliders are, have another cause than a stiff spring.
+pub(super) fn advised(stop: StepError, at: &mut ContactDriver) -> StepError {
+    let shrinks = stop.cause == Cause::StepTooSmall;
+    if (shrinks || stop.cause == Cause::NotFinite) && at.jams() {
+        return StepError { cause: Cause::Friction, what: JAMS.into(), hint: HINT.into(), ..stop };
+    }
+    if !shrinks || !at.has_closed_loops() {
         return stop;
     }
     let hint =

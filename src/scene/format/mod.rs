@@ -185,7 +185,7 @@ impl FieldShape {
             Self::LawNumber(quantity) => format!("must be a number {quantity}, or a formula"),
             Self::LawPair(quantity) => format!("must be two numbers [x, y], each {quantity}, or formulas"),
             Self::Formula(quantity) if quantity.unit.is_empty() => "must be a formula in quotes".to_owned(),
-            Self::Formula(quantity) => format!("must be a formula in quotes that comes to {}", quantity.unit),
+            Self::Formula(quantity) => format!("must be a formula in quotes whose unit is {}", quantity.unit),
             Self::Parameters => "must be {name: number, or formula of other parameters in quotes}".to_owned(),
             Self::Signals => "must be {name: formula in quotes, or number}".to_owned(),
             Self::Tables => {

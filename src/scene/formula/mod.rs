@@ -134,6 +134,8 @@ pub struct Formula {
     conditions: Vec<usize>,
     /// The nodes that branches hold at zero or above.
     held: Vec<usize>,
+    /// The exponents above zero that do not change with time, though names are in them.
+    fixed: Vec<usize>,
     /// The tables in it.
     tables: Vec<Interpolant>,
 }

@@ -38,6 +38,7 @@ impl<'a> Parser<'a> {
             names: Vec::new(),
             conditions: Vec::new(),
             held: Vec::new(),
+            fixed: Vec::new(),
             tables: Vec::new(),
         };
         Self { text, at: 0, depth: 0, formula, tables }
@@ -57,7 +58,10 @@ impl<'a> Parser<'a> {
                 "write products with *; units stand behind numbers, as 5 mm or 30 deg",
             ),
             b'<' | b'>' => ("a comparison outside of `if`", "write if(a < b, x, y)"),
-            _ => ("this character has no meaning in a formula", "operators are + - * / ^"),
+            _ => (
+                "this character has no meaning in a formula",
+                "operators are + - * / ^, and units are written as in 90 deg or 5 mm",
+            ),
         };
         self.error(self.at, self.at + 1, problem, hint)
     }
@@ -355,6 +359,8 @@ impl<'a> Parser<'a> {
             "tanh" => Node::HyperbolicTangent(first),
             "atan2" => return Ok(self.angle(first, last, (start, end))),
             "pow" => Node::Power(first, last),
+            // What is never below zero has no corner there.
+            "abs" if self.formula.range(first)[0] >= 0.0 => return Ok(first),
             "abs" => Node::Flip(self.condition(first), first),
             "sign" => {
                 let one = self.push(Node::Number(1.0), start, end);

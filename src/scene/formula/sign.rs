@@ -56,7 +56,29 @@ impl Formula {
             Some(power) if power.fract() == 0.0 && power.abs() <= LARGEST_POWER => base.powi(power as i32),
             Some(power) if power > 0.0 && self.is_held_above_zero(a) => base.power_above_zero(exponent),
             Some(0.5) => base.sqrt(),
+            None if self.fixed.contains(&b) && self.is_held_above_zero(a) => base.power_above_zero(exponent),
             _ => (base.ln() * exponent).exp(),
+        }
+    }
+
+    /// Notes the exponents above zero of these names, by number, which are above zero and do not change with time.
+    pub(crate) fn note_exponents(&mut self, is_fixed: impl Fn(usize) -> bool) {
+        let exponents = self.nodes.iter().filter_map(|node| match node {
+            Node::Power(_, exponent) if self.constants[*exponent].is_none() => Some(*exponent),
+            _ => None,
+        });
+        self.fixed = exponents.filter(|&exponent| self.is_above_zero(exponent, &is_fixed)).collect();
+    }
+
+    /// True for sums, products and quotients of numbers and names that are above zero.
+    fn is_above_zero(&self, node: usize, is_name: &impl Fn(usize) -> bool) -> bool {
+        match self.nodes[node] {
+            Node::Number(number) => number > 0.0,
+            Node::Name(name) => is_name(name),
+            Node::Sum(a, b) | Node::Product(a, b) | Node::Quotient(a, b) => {
+                [a, b].into_iter().all(|node| self.is_above_zero(node, is_name))
+            }
+            _ => false,
         }
     }
 
@@ -86,9 +108,10 @@ impl Formula {
         }
     }
 
-    /// True where a node is plus or minus another one, as they are written.
+    /// True where a node is plus or minus another one, or a number above zero times it, as they are written.
     fn is_same(&self, node: usize, other: usize, sign: f64) -> bool {
         let is_zero = |node: usize| self.constants[node] == Some(0.0);
+        let (node, other) = (self.without_factors(node), self.without_factors(other));
         match (self.nodes[node], self.nodes[other]) {
             (_, Node::Difference(a, b)) if is_zero(b) => self.is_same(node, a, sign),
             (_, Node::Difference(a, b)) if is_zero(a) => self.is_same(node, b, -sign),
@@ -100,6 +123,16 @@ impl Formula {
                 self.is_equal(a, d) && self.is_equal(b, c)
             }
             _ => sign > 0.0 && self.is_equal(node, other),
+        }
+    }
+
+    /// A node without the numbers above zero that multiply or divide it.
+    fn without_factors(&self, node: usize) -> usize {
+        let is_above = |node: usize| self.constants[node].is_some_and(|number| number > 0.0);
+        match self.nodes[node] {
+            Node::Product(a, b) | Node::Quotient(a, b) if is_above(b) => self.without_factors(a),
+            Node::Product(a, b) if is_above(a) => self.without_factors(b),
+            _ => node,
         }
     }
 

@@ -80,7 +80,7 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene) -> Result<(), SceneError> 
                 at.source,
                 at.node.span,
                 &at.path,
-                "must be a formula of the state and of what parts carry, by a name of its own",
+                "must be a formula of coordinates, forces and other values of parts, by a name of its own",
                 &error,
             )
         })?;

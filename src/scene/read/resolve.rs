@@ -431,8 +431,8 @@ pub(super) fn fits(
         Some(found) if !found.is(wanted) => {
             let unit = if quantity.unit.is_empty() { "a pure number" } else { quantity.unit };
             let hint = match found.is(Dimension::of("")) {
-                true => format!("numbers without a unit fit anything: 1*({})", formula.text().trim()),
-                false => "numbers without a unit fit anything".to_owned(),
+                true => format!("a number before it gives it the unit: 1*({})", formula.text().trim()),
+                false => format!("write it in {unit}; numbers without a unit are in {unit} as well"),
             };
             Err(FormulaError::new(
                 formula.text(),

@@ -40,7 +40,7 @@ impl TangentFlow {
         let sticking = mechanism.sticking();
         let freedom = (f + sticking).saturating_sub(rows);
         if freedom == 0 {
-            return Err("the motors leave no freedom: neighbouring motions are the same".into());
+            return Err("nothing is free to move: neighbouring motions are the same".into());
         }
         // What switches may tie coordinates later.
         let is_free = tangent.ground.is_none() && mechanism.contacts.is_empty() && !mechanism.is_switched();
@@ -104,7 +104,7 @@ impl TangentFlow {
             _ => (0..mechanism.coordinates()).map(|k| metric.weight(k)).collect(),
         };
         if weights.is_empty() {
-            return Err("the motors leave no freedom: neighbouring motions are the same".into());
+            return Err("nothing is free to move: neighbouring motions are the same".into());
         }
         let rates = vec![0.0; problem.dimension()];
         let ground = (coordinates == Coordinates::All && !mechanism.constraints.is_empty())
