@@ -42,7 +42,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let chart = ConstraintDrift {
         title: "Constraint drift under four stabilizations".into(),
         caption: vec!["scene motor\\_sine, start 10^{−6} rad/s off".into(), "dp8, 10^{−9}".into()],
-        panels: vec![panel(0, "|*C*| [rad]", &outcomes), panel(1, "|*C′*| [rad/s]", &outcomes)],
+        panels: vec![
+            panel(0, "residual |*C*| [rad]", &outcomes),
+            panel(1, "its rate |*C′*| [rad/s]", &outcomes),
+        ],
         log_time: true,
     };
     constraint_drift(&chart, FILE_RESOLUTION)?.write("output/constraint_drift.png".as_ref())?;

@@ -792,6 +792,7 @@ fn odd_pictures(time: &[f64], values: &[f64]) -> Vec<Picture> {
         motors: points.iter().map(|&at| MotorPose { at, angle: at[1], rate: at[0] }).collect(),
         points: points.clone(),
         arms: bars.iter().map(|&bar| (0, bar)).collect(),
+        spirals: points.iter().map(|&at| SpiralPose { at, angle: at[0] }).collect(),
         sliders: points.iter().map(|&at| SliderPose { at, along: at, ground: at[0] > 0.0 }).collect(),
         bars,
     };

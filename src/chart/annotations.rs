@@ -46,7 +46,7 @@ impl Pencil<'_> {
                 }
             }
             let size = [self.sheet.width(name, NAME, false), 0.75 * NAME];
-            let (bounds, cost) = place(here, 5.5, size, self.panel.bounds, &avoid, occupied);
+            let (bounds, cost) = place(here, 5.5, 2, size, self.panel.bounds, &avoid, occupied);
             // A name that would lie on another one is worse than none.
             if cost > 49.0 {
                 continue;

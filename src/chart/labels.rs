@@ -79,18 +79,20 @@ pub(crate) fn spread(wanted: &[f64], gap: f64, top: f64, bottom: f64) -> Vec<f64
     places
 }
 
-/// The best box of `size` beside a point inside `room`: its upper left corner.  `avoid` are directions in
-/// which lines leave the point \[unit vectors, y downwards\].
+/// The best box of `size` beside a point inside `room`, and what it costs.  `avoid` are directions in
+/// which lines leave the point \[unit vectors, y downwards\].  Boxes are tried in so
+/// many rings around it, the first of them at `distance`.
 pub(crate) fn place(
     at: Point,
     distance: f64,
+    rings: u32,
     size: [f64; 2],
     room: [f64; 4],
     avoid: &[Point],
     occupied: &Occupied,
 ) -> ([f64; 4], f64) {
     let mut best = ([0.0; 4], f64::INFINITY);
-    for ring in 0..2 {
+    for ring in 0..rings {
         for k in 0..16 {
             let angle = f64::from(k) * std::f64::consts::PI / 8.0;
             let (away, across) = (angle.cos(), -angle.sin());
@@ -107,7 +109,7 @@ pub(crate) fn place(
                 [room[0] - bounds[0], room[1] - bounds[1], bounds[2] - room[2], bounds[3] - room[3]];
             let overhang = outside.iter().any(|&part| part > 0.0);
             let along: f64 = avoid.iter().map(|d| (d[0] * away + d[1] * across).max(0.0).powi(2)).sum();
-            let preference = 0.4 * f64::from(k.min(16 - k)) / 8.0 + 1.5 * f64::from(ring);
+            let preference = 0.4 * f64::from(k.min(16 - k)) / 8.0 + 3.0 * f64::from(ring) / f64::from(rings);
             let cost = preference + 4.0 * along + occupied.cost(bounds) + if overhang { 500.0 } else { 0.0 };
             if cost < best.1 {
                 best = (bounds, cost);
@@ -138,10 +140,10 @@ mod tests {
         let mut occupied = Occupied::default();
         occupied.line(&[[50.0, 50.0], [100.0, 50.0]]);
         let (bounds, _) =
-            place([50.0, 50.0], 4.0, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[[1.0, 0.0]], &occupied);
+            place([50.0, 50.0], 4.0, 2, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[[1.0, 0.0]], &occupied);
         assert_eq!(occupied.cost(bounds), 0.0);
         occupied.block(bounds);
-        let (other, _) = place([50.0, 50.0], 4.0, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[], &occupied);
+        let (other, _) = place([50.0, 50.0], 4.0, 2, [20.0, 8.0], [0.0, 0.0, 100.0, 100.0], &[], &occupied);
         assert!(
             other[0] >= bounds[2] || other[2] <= bounds[0] || other[1] >= bounds[3] || other[3] <= bounds[1]
         );

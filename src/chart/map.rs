@@ -1,6 +1,8 @@
 //! A value over a rectangle of two others, as colours: nearest cell, no smoothing, a bar that tells the
 //! colours' values.
 
+mod scales;
+
 use super::ChartError;
 use super::axis::{Axis, Scale};
 use super::file::Picture;
@@ -9,7 +11,7 @@ use super::palette::{Colour, EXCLUDED, FAILED, GREY, INK, SPINE, WHITE, even};
 use super::panel::{Panel, WrittenParts, left_room, most_up};
 use super::sheet::{EDGE, NAME, NOTE, Pen, Sheet, TICK, note};
 use super::text::{Align, Lettering, TextLevel};
-use super::ticks::Ticks;
+use super::ticks::{Tick, Ticks};
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Side of the map, at most \[pt\].
@@ -195,6 +197,14 @@ fn told(cell: Cell) -> Cell {
     }
 }
 
+/// The value of a cell that has one.
+fn value(cell: Cell) -> Option<f64> {
+    match told(cell) {
+        Cell::Value(value) => Some(value),
+        _ => None,
+    }
+}
+
 /// Which value has which colour.
 struct Colours {
     axis: Axis,
@@ -207,10 +217,8 @@ struct Colours {
 impl Colours {
     fn of(chart: &Map) -> Self {
         let mut values: Vec<f64> = (chart.cells.iter())
-            .filter_map(|cell| match told(*cell) {
-                Cell::Value(value) if !chart.log || value > 0.0 => Some(value),
-                _ => None,
-            })
+            .filter_map(|cell| value(*cell))
+            .filter(|&value| !chart.log || value > 0.0)
             .collect();
         let is_empty = values.is_empty();
         let range = chart.range.unwrap_or_else(|| {
@@ -231,8 +239,9 @@ impl Colours {
             }
         });
         let scale = if chart.log { Scale::Log } else { Scale::Linear };
-        let beyond =
-            [values.iter().any(|&value| value < range[0]), values.iter().any(|&value| value > range[1])];
+        // A logarithm has no place for zero: it is below everything.
+        let all = || chart.cells.iter().filter_map(|cell| value(*cell));
+        let beyond = [all().any(|value| value < range[0]), all().any(|value| value > range[1])];
         Self {
             axis: Axis { name: chart.value.clone(), scale, from: range[0], to: range[1] },
             dark_high: chart.dark_high,
@@ -244,6 +253,14 @@ impl Colours {
     /// Ticks of a bar so high \[pt\]; those at its ends say where values lie beyond.
     fn ticks(&self, height: f64) -> Ticks {
         let mut ticks = self.axis.ticks(most_up(height));
+        let place = |tick: &Tick| self.axis.fraction(tick.value);
+        let is_log = self.axis.scale == Scale::Log;
+        if is_log && self.beyond[0] && ticks.majors.first().is_some_and(|first| place(first) > 1e-9) {
+            // Of what lies below the lower end has to be told.
+            let lowest = Axis { to: 10.0 * self.axis.from, ..self.axis.clone() }.ticks(20).majors;
+            ticks.majors.retain(|tick| place(tick) > 0.06);
+            ticks.majors.splice(0..0, lowest.into_iter().filter(|tick| place(tick).abs() < 1e-9));
+        }
         for tick in &mut ticks.majors {
             let near = |end: f64| (self.axis.fraction(tick.value) - end).abs() < 1e-9;
             if near(0.0) && self.beyond[0] {
@@ -269,7 +286,6 @@ impl Colours {
 
     fn of_cell(&self, cell: Cell) -> Colour {
         match told(cell) {
-            // A logarithm has no place for zero: it is below everything.
             Cell::Value(value) => self.at(if self.axis.scale == Scale::Log && value <= 0.0 {
                 0.0
             } else {
@@ -407,6 +423,18 @@ mod tests {
             ..chart(vec![Cell::Value(1.0); 4])
         };
         assert!(map(&narrow, 0.5).is_ok());
+    }
+
+    #[test]
+    fn the_lowest_tick_stands_for_zeros_as_well() {
+        let mut cells: Vec<Cell> = (0..16).map(|k| Cell::Value(0.13 * 1.4_f64.powi(k))).collect();
+        let has = |cells: &[Cell], word: &str| {
+            let picture = map(&chart(cells.to_vec()), 1.0).expect("a picture");
+            picture.texts.iter().any(|text| text.text == word)
+        };
+        assert!(has(&cells, "0.1"));
+        cells[3] = Cell::Value(0.0);
+        assert!(has(&cells, "≤ 0.1") && !has(&cells, "0.1"));
     }
 
     #[test]

@@ -77,6 +77,7 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
         }
         // Over the ghosts, or they would erase the hatching.
         pencil.walls(&chart.sketch.walls, &mut occupied)?;
+        pencil.rails(&last.sliders, &mut occupied)?;
         for (k, trail) in chart.trails.iter().enumerate() {
             let trusted = chart.horizon.map_or(trail.len(), |horizon| horizon.min(trail.len()));
             pencil.trail(&trail[trusted.saturating_sub(1)..], pale(trail_colour(k)), 160, &mut occupied)?;

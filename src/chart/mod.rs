@@ -72,7 +72,7 @@ pub use motion::{Animation, MotionGif, motion_apng, motion_gif};
 pub use multipliers::{Multipliers, multipliers};
 pub use outputs::{OutputSeries, OutputsChart, outputs};
 pub use profile::{ProfileChart, profile};
-pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch};
+pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpiralPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
 pub use torque_power::{MotorSeries, TorquePower, force_power, torque_power};
 pub use work_precision::{Cost, WorkPrecision, WorkSeries, work_precision};

@@ -137,6 +137,7 @@ fn animated(
         let Some(pose) = chart.poses.get(k) else { return Ok(sheet.pixels()) };
         let mut occupied = Occupied::default();
         let is_past = chart.horizon.zip(chart.time.get(k)).is_some_and(|(horizon, &time)| time > horizon);
+        pencil.rails(&pose.sliders, &mut occupied)?;
         for (number, trail) in chart.trails.iter().enumerate() {
             let colour = trail_colour(number);
             pencil.trail(

@@ -5,9 +5,10 @@ use super::file::Picture;
 use super::grid::AIR;
 use super::labels::Occupied;
 use super::lines::Point;
-use super::palette::{BLUE, GUIDE, VERMILLION, readable};
+use super::palette::{BLUE, GREY, GUIDE, VERMILLION, readable};
 use super::panel::{Panel, WrittenParts};
 use super::sheet::{Pen, Sheet};
+use super::ticks::figure;
 use super::{ChartError, PAGE};
 use std::f64::consts::TAU;
 
@@ -15,6 +16,8 @@ use std::f64::consts::TAU;
 const SIDE: f64 = 260.0;
 /// A multiplier beyond the circle by more grows.
 const OUTSIDE: f64 = 1e-4;
+/// Sizes that far from 1 are told in three digits.
+const NEAR: f64 = 0.1;
 /// Points of the circle.
 const POINTS: usize = 240;
 
@@ -65,10 +68,14 @@ pub fn multipliers(chart: &Multipliers, px_per_pt: f64) -> Result<Picture, Chart
         sheet.disc(at, 3.2, colour)?;
         // Of a pair one figure is enough.
         if *im >= 0.0 {
-            let words = format!("{size:.4}");
+            // About 1 the digits after it matter.
+            let size = if (size - 1.0).abs() < NEAR { format!("{size:.4}") } else { figure(size) };
+            let words = format!("|*λ*| = {size}");
             panel.note_beside(at, &words, readable(colour), &mut occupied)?;
         }
     }
+    let side = std::f64::consts::FRAC_1_SQRT_2;
+    panel.note_beside(panel.at([side, -side]), "unit circle", GREY, &mut occupied)?;
     Ok(sheet.picture(&chart.title, &chart.caption))
 }
 

@@ -5,7 +5,8 @@ use super::file::Picture;
 use super::grid::{label_room, shortened, stacked};
 use super::labels::Occupied;
 use super::lines::Point;
-use super::palette::{WHITE, marks, readable};
+use super::palette::{MarkStyle, WHITE, marks, readable};
+use super::panel::Panel;
 use super::sheet::Sheet;
 use super::ticks::figure;
 use super::{ChartError, PAGE};
@@ -34,6 +35,8 @@ pub struct OutputsChart {
     pub caption: Vec<String>,
     /// The outputs.
     pub outputs: Vec<OutputSeries>,
+    /// What a panel of several outputs shows; that of their unit where there is none.
+    pub quantity: Option<String>,
     /// Name and unit of what it is drawn over; time in seconds where there is none.
     pub over: Option<[String; 2]>,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
@@ -93,7 +96,10 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
     let y = |(unit, lines): &(&str, Vec<Line>)| {
         let name = match &lines[..] {
             [(output, _)] => format!("{} [{unit}]", shortened(&sheet, &output.name)),
-            _ => format!("[{unit}]"),
+            several => {
+                let names: Vec<&str> = several.iter().map(|(output, _)| output.name.as_str()).collect();
+                named(chart.quantity.as_deref().unwrap_or_else(|| quantity(unit, &names)), unit)
+            }
         };
         Axis::fit(&name, lines.iter().flat_map(|one| &one.1).map(|p| p[1]))
     };
@@ -119,24 +125,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
                 ends.push((end[1], shortened(&sheet, &output.name), mark(output)));
             }
         }
-        let largest = |output: &OutputSeries| output.extremes.iter().map(|e| e[0].abs()).fold(0.0, f64::max);
-        let most = lines.iter().map(|one| largest(one.0)).fold(0.0, f64::max);
-        for (output, _) in lines.iter().filter(|one| lines.len() <= RINGED || largest(one.0) == most) {
-            let colour = mark(output).colour;
-            let ringed = |e: &&[f64; 2]| e[0].is_finite() && (lines.len() <= RINGED || e[0].abs() == most);
-            for &[value, t] in output.extremes.iter().filter(ringed) {
-                let at = panel.at([t, value]);
-                sheet.disc(at, 3.4, WHITE)?;
-                sheet.ring(at, 2.4, colour, 1.2)?;
-                occupied.block([at[0] - 3.4, at[1] - 3.4, at[0] + 3.4, at[1] + 3.4]);
-            }
-            let peak = output.extremes.iter().max_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
-            if let Some(&[value, t]) = peak.filter(|peak| peak[0].is_finite()) {
-                let said = if *unit == "1" { figure(value) } else { format!("{} {unit}", figure(value)) };
-                let note = format!("{said} at {} {over_unit}", figure(t));
-                panel.note_beside(panel.at([t, value]), &note, readable(colour), &mut occupied)?;
-            }
-        }
+        extremes(&sheet, panel, (lines, unit, &over_unit), &mark, &mut occupied)?;
         panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;
         if lines.iter().flat_map(|one| &one.1).all(|p| !p[1].is_finite()) {
             panel.empty("no data")?;
@@ -146,4 +135,101 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         }
     }
     Ok(sheet.picture(&chart.title, &caption))
+}
+
+/// Rings at the extremes of the lines of a panel, and a figure beside the largest of each that has rings.
+fn extremes(
+    sheet: &Sheet,
+    panel: &Panel,
+    (lines, unit, over_unit): (&[Line], &str, &str),
+    mark: &dyn Fn(&OutputSeries) -> MarkStyle,
+    occupied: &mut Occupied,
+) -> Result<(), ChartError> {
+    let largest = |output: &OutputSeries| output.extremes.iter().map(|e| e[0].abs()).fold(0.0, f64::max);
+    let most = lines.iter().map(|one| largest(one.0)).fold(0.0, f64::max);
+    let shown = || lines.iter().map(|one| one.0).filter(|one| lines.len() <= RINGED || largest(one) == most);
+    let peak = |output: &OutputSeries| {
+        let peak = output.extremes.iter().max_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
+        peak.copied().filter(|peak| peak[0].is_finite())
+    };
+    for output in shown() {
+        let ringed = |e: &&[f64; 2]| e[0].is_finite() && (lines.len() <= RINGED || e[0].abs() == most);
+        for &[value, t] in output.extremes.iter().filter(ringed) {
+            let at = panel.at([t, value]);
+            sheet.disc(at, 3.4, WHITE)?;
+            sheet.ring(at, 2.4, mark(output).colour, 1.2)?;
+            occupied.block([at[0] - 3.4, at[1] - 3.4, at[0] + 3.4, at[1] + 3.4]);
+        }
+    }
+    // All rings have their places before the first figure.
+    for (output, [value, t]) in shown().filter_map(|output| Some((output, peak(output)?))) {
+        let said = if unit == "1" { figure(value) } else { format!("{} {unit}", figure(value)) };
+        let note = format!("{said} at {} {over_unit}", figure(t));
+        panel.note_beside(panel.at([t, value]), &note, readable(mark(output).colour), occupied)?;
+    }
+    Ok(())
+}
+
+/// What outputs of a unit are.
+fn quantity(unit: &str, names: &[&str]) -> &'static str {
+    match unit {
+        "N" => "force",
+        "N·m" => "torque",
+        "W" => "power",
+        "J" => "energy",
+        "s" => "time",
+        "m" if names.iter().all(|name| name.ends_with(".x") || name.ends_with(".y")) => "position",
+        "m" => "length",
+        "m/s" => "velocity",
+        "m/s²" => "acceleration",
+        "rad" => "angle",
+        "rad/s" => "angular rate",
+        "rad/s²" => "angular acceleration",
+        _ => "value",
+    }
+}
+
+/// The name of an axis; numbers without a unit have none in it.
+fn named(quantity: &str, unit: &str) -> String {
+    if matches!(unit, "" | "1") { quantity.to_owned() } else { format!("{quantity} [{unit}]") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A straight line that has its largest value at 1 s.
+    fn series(name: &str, unit: &str) -> OutputSeries {
+        OutputSeries {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            time: vec![0.0, 1.0, 2.0],
+            value: vec![0.0, 1.0, 0.5],
+            extremes: vec![[0.0, 0.0], [1.0, 1.0]],
+        }
+    }
+
+    #[test]
+    fn axes_of_several_outputs_name_their_quantity() {
+        let words = |outputs: Vec<OutputSeries>, quantity: Option<String>| -> Vec<String> {
+            let chart = OutputsChart { outputs, quantity, ..OutputsChart::default() };
+            let picture = outputs_of(&chart);
+            picture.texts.into_iter().map(|text| text.text).collect()
+        };
+        let has = |words: &[String], wanted: &str| words.iter().any(|word| word == wanted);
+        let forces = words(vec![series("A", "N"), series("B", "N")], None);
+        assert!(has(&forces, "force [N]"), "{forces:?}");
+        let places = words(vec![series("tip.x", "m"), series("tip.y", "m")], None);
+        assert!(has(&places, "position [m]"), "{places:?}");
+        let lengths = words(vec![series("tip.x", "m"), series("spring", "m")], None);
+        assert!(has(&lengths, "length [m]"), "{lengths:?}");
+        let changes = words(vec![series("a", "rad"), series("b", "rad")], Some("change".to_owned()));
+        assert!(has(&changes, "change [rad]"), "{changes:?}");
+        let pure = words(vec![series("a", "1"), series("b", "1")], None);
+        assert!(has(&pure, "value"), "{pure:?}");
+    }
+
+    fn outputs_of(chart: &OutputsChart) -> Picture {
+        outputs(chart, 1.0).expect("a picture")
+    }
 }

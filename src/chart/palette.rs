@@ -31,6 +31,9 @@ pub(crate) const VERMILLION: Colour = RGBColor(0xD5, 0x5E, 0x00);
 pub(crate) const EXCLUDED: Colour = RGBColor(0xD3, 0xD7, 0xDC);
 pub(crate) const FAILED: Colour = RGBColor(0xDE, 0x95, 0xBE);
 
+/// The seventh series: far enough from a dark blue, which black is not.
+const NEUTRAL: Colour = RGBColor(0x8A, 0x92, 0x9B);
+
 /// Colours from dark (0) to light (1) in even steps of lightness, also to the colour-blind: viridis, by S.
 /// van der Walt and N. Smith (2015).
 pub(crate) fn even(share: f64) -> Colour {
@@ -79,7 +82,7 @@ const FREE: [(Colour, MarkerShape); 7] = [
     (ORANGE, MarkerShape::Ring),
     (PURPLE, MarkerShape::Diamond),
     (SKY, MarkerShape::Down),
-    (INK, MarkerShape::Disc),
+    (NEUTRAL, MarkerShape::Disc),
 ];
 
 /// The fixed colour and shape of a method or stabilization, found by the beginning of its name.

@@ -19,6 +19,11 @@ const GAP: f64 = 3.5;
 /// From the panel's right edge to the words of an end label \[pt\].
 pub(crate) const LEADER: f64 = 11.5;
 
+/// Rings of places tried for a label beside a point, and the distance from which on a line leads to it
+/// \[pt\].
+const RINGS: u32 = 10;
+const FAR: f64 = 12.0;
+
 /// Dashes of the first, second, … series of one colour.
 pub(crate) const TURNS: [&[f64]; 4] = [&[], &[6.0, 3.2], &[2.0, 3.0], &[7.0, 3.0, 1.5, 3.0]];
 
@@ -346,9 +351,16 @@ impl<'a> Panel<'a> {
         colour: Colour,
         occupied: &mut Occupied,
     ) -> Result<(), ChartError> {
-        let size = [self.sheet.width(words, NOTE, false), 0.8 * NOTE];
-        let (bounds, _) = super::labels::place(at, 5.0, size, self.bounds, &[], occupied);
+        let size = [self.sheet.width(words, NOTE, false), NOTE];
+        let (bounds, _) = super::labels::place(at, 5.0, RINGS, size, self.bounds, &[], occupied);
         occupied.block(bounds);
+        let near = [at[0].clamp(bounds[0], bounds[2]), at[1].clamp(bounds[1], bounds[3])];
+        let apart = [near[0] - at[0], near[1] - at[1]];
+        let length = apart[0].hypot(apart[1]);
+        if length > FAR {
+            let from = [at[0] + 3.4 / length * apart[0], at[1] + 3.4 / length * apart[1]];
+            self.sheet.line(&[from, near], &Pen::new(colour, 0.6))?;
+        }
         let lettering = Lettering { halo: true, ..note(colour, Align::Left, TextLevel::Middle) };
         self.sheet.words(words, lettering, [bounds[0], 0.5 * (bounds[1] + bounds[3])])
     }

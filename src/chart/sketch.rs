@@ -1,5 +1,7 @@
 //! The drawing of a mechanism in a pose: bars, hinges, ground, springs, motors, walls, trails.
 
+mod parts;
+
 use super::ChartError;
 use super::labels::Occupied;
 use super::lines::{Point, clip};
@@ -65,6 +67,8 @@ pub struct Pose {
     pub hinges: Vec<[f64; 2]>,
     /// Both ends of each spring (x, y) \[m\].
     pub springs: Vec<[[f64; 2]; 2]>,
+    /// The torsion springs.
+    pub spirals: Vec<SpiralPose>,
     /// The motors.
     pub motors: Vec<MotorPose>,
     /// The points of interest (x, y) \[m\].
@@ -80,6 +84,15 @@ pub struct SliderPose {
     pub along: [f64; 2],
     /// Whether the rail is fixed to the ground.
     pub ground: bool,
+}
+
+/// A torsion spring.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SpiralPose {
+    /// The place about which it turns its bar (x, y) \[m\].
+    pub at: [f64; 2],
+    /// Absolute angle of the bar, counter-clockwise from +x \[rad\].
+    pub angle: f64,
 }
 
 /// A motor.
@@ -124,39 +137,6 @@ impl Pencil<'_> {
         let arms = pose.arms.iter().map(|(_, ends)| ends);
         for bar in pose.bars.iter().chain(arms).filter(|bar| finite(&bar[..])) {
             self.sheet.line(&bar.map(|end| self.at(end)), &pen)?;
-        }
-        Ok(())
-    }
-
-    /// Rails of the ground from frame to frame, those of bodies a block's length to both sides; and the
-    /// blocks.
-    fn sliders(&self, sliders: &[SliderPose], occupied: &mut Occupied) -> Result<(), ChartError> {
-        for slider in sliders.iter().filter(|slider| finite(&[slider.at, slider.along])) {
-            let length = slider.along[0].hypot(slider.along[1]);
-            if length == 0.0 {
-                continue;
-            }
-            let unit = slider.along.map(|x| x / length);
-            let ([dx, dy], [x, y]) = (self.view.direction(unit), self.at(slider.at));
-            let pen = Pen::new(mix(SPINE, WHITE, 0.25), 0.9 * self.size.max(0.7));
-            if slider.ground {
-                let reach = self.view.reach() + slider.at[0].hypot(slider.at[1]);
-                let ends = [-reach, reach]
-                    .map(|s| self.view.fractions([slider.at[0] + s * unit[0], slider.at[1] + s * unit[1]]));
-                for piece in clip(ends) {
-                    let line = [self.panel.page(piece[0]), self.panel.page(piece[1])];
-                    occupied.line(&line);
-                    self.sheet.line(&line, &pen)?;
-                }
-            }
-            let corner =
-                |along: f64, across: f64| [x + along * dx - across * dy, y + along * dy + across * dx];
-            let (half, wide) = (8.0 * self.size, 4.6 * self.size);
-            let block = [corner(-half, -wide), corner(half, -wide), corner(half, wide), corner(-half, wide)];
-            self.sheet.polygon(&block, mix(SPINE, WHITE, 0.7))?;
-            self.sheet
-                .line(&[block[0], block[1], block[2], block[3], block[0]], &Pen::new(INK, 0.9 * self.size))?;
-            occupied.block(around([x, y], half));
         }
         Ok(())
     }
@@ -262,7 +242,7 @@ impl Pencil<'_> {
             )?;
             occupied.block([x - 1.8 * half, y - height - 5.0 * size, x + 1.8 * half + 3.0, y - 2.0]);
         }
-        self.sliders(&pose.sliders, occupied)?;
+        self.blocks(&pose.sliders, occupied)?;
         let bars = pose.arms.iter().copied().chain(pose.bars.iter().copied().enumerate());
         for (k, bar) in bars.filter(|(_, bar)| finite(&bar[..])) {
             let ends = bar.map(|end| self.at(end));
@@ -280,6 +260,9 @@ impl Pencil<'_> {
         for (spring, ends) in sketch.springs.iter().zip(&pose.springs).filter(|(_, ends)| finite(&ends[..])) {
             self.spring(spring, ends.map(|end| self.at(end)), occupied)?;
         }
+        for spiral in pose.spirals.iter().filter(|spiral| finite(&[spiral.at, [spiral.angle, 0.0]])) {
+            self.spiral(spiral, occupied)?;
+        }
         for motor in pose.motors.iter().filter(|motor| finite(&[motor.at, [motor.angle, motor.rate]])) {
             self.motor(motor, sketch.hinges.len() < NAMES, occupied)?;
         }
@@ -288,54 +271,6 @@ impl Pencil<'_> {
         }
         for (k, &at) in pose.points.iter().enumerate().filter(|(_, at)| finite(&[**at])) {
             self.sheet.disc(self.at(at), 3.3 * size, mix(trail_colour(k), INK, 0.1))?;
-        }
-        Ok(())
-    }
-
-    fn spring(
-        &self,
-        spring: &SpringSketch,
-        [from, to]: [Point; 2],
-        occupied: &mut Occupied,
-    ) -> Result<(), ChartError> {
-        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let length = dx.hypot(dy);
-        for (k, at) in [from, to].into_iter().enumerate().filter(|(k, _)| spring.ground[*k]) {
-            let away = if k == 0 { dy } else { -dy };
-            // The hatching lies on the side the spring does not leave to.
-            let up = if away >= 0.0 { -1.0 } else { 1.0 };
-            let half = 7.5 * self.size;
-            self.hatched(
-                [at[0] - half, at[1]],
-                [at[0] + half, at[1]],
-                [0.0, up],
-                3.6 * self.size,
-                4.4 * self.size,
-            )?;
-            occupied.block([at[0] - half, at[1] - 5.0, at[0] + half, at[1] + 5.0]);
-        }
-        let (along, across) = if length > 0.0 {
-            ([dx / length, dy / length], [-dy / length, dx / length])
-        } else {
-            ([0.0; 2], [0.0; 2])
-        };
-        let lead = (0.15 * length).min(8.0 * self.size);
-        let waves = 11;
-        let mut line = vec![from];
-        for k in 0..=waves {
-            let s = lead + (length - 2.0 * lead) * f64::from(k) / f64::from(waves);
-            let swing = if k == 0 || k == waves { 0.0 } else { 4.6 * self.size * f64::from(1 - 2 * (k % 2)) };
-            line.push([
-                from[0] + s * along[0] + swing * across[0],
-                from[1] + s * along[1] + swing * across[1],
-            ]);
-        }
-        line.push(to);
-        self.sheet.line(&line, &Pen::new(WHITE, 3.2 * self.size))?;
-        self.sheet.line(&line, &Pen::new(mix(GREEN, INK, 0.15), 1.6 * self.size))?;
-        occupied.line(&line);
-        for at in [from, to] {
-            self.sheet.disc(at, 2.1 * self.size, INK)?;
         }
         Ok(())
     }

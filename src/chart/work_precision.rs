@@ -237,7 +237,7 @@ fn along(
         )
     });
     let places = ranks.map(|(rank, &at)| {
-        let (bounds, cost) = place(at, 6.5, size, room, &[], occupied);
+        let (bounds, cost) = place(at, 6.5, 2, size, room, &[], occupied);
         (bounds, cost + rank)
     });
     let Some((bounds, _)) = places.min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };

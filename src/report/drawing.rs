@@ -2,7 +2,10 @@
 
 use crate::arithmetic::Complex;
 #[cfg(feature = "charts")]
-use crate::chart::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpringSketch, WallSketch, plain};
+use crate::chart::{
+    HingeSketch, MotorPose, OutputSeries, Pose, Sketch, SliderPose, SpiralPose, SpringSketch, WallSketch,
+    plain,
+};
 use crate::dynamics::Mechanism;
 #[cfg(feature = "charts")]
 use crate::dynamics::compile::Joint;
@@ -17,6 +20,25 @@ pub(super) struct MechanismDrawing<'a> {
     pub scene: &'a Scene,
     /// Its equations.
     pub mechanism: &'a Mechanism,
+}
+
+/// Names of outputs in a title that can take so many letters; of more the first ones are named, and how many
+/// there are besides.
+#[cfg(feature = "charts")]
+const LETTERS: usize = 34;
+
+/// The names of outputs in a title, with markup.
+#[cfg(feature = "charts")]
+pub(super) fn names_of(outputs: &[OutputSeries]) -> String {
+    let mut names = String::new();
+    for (k, OutputSeries { name, .. }) in outputs.iter().enumerate() {
+        if k > 0 && names.len() + name.len() > LETTERS {
+            return format!("{names} and {} more", outputs.len() - k);
+        }
+        names += if k > 0 { ", " } else { "" };
+        names += name;
+    }
+    names
 }
 
 #[cfg(feature = "charts")]
@@ -76,6 +98,7 @@ impl MechanismDrawing<'_> {
         let both = |point: Complex<f64>| [point.re, point.im];
         let on = |body: usize, offset: Complex<f64>| both(translations[body] + offset * z[body]);
         let place = |place: &Place| both(self.mechanism.place(place, &z, &translations));
+        let origin = |bar: usize| self.mechanism.bodies[bar].ends[0];
         let at = |joint: &Joint| joint.at.0.map_or(both(joint.at.1), |body| on(body, joint.at.1));
         let motors = self.scene.motors.iter().filter_map(|motor| {
             let joint = self.mechanism.joints.iter().find(|joint| joint.outer == Some(motor.bar))?;
@@ -87,6 +110,14 @@ impl MechanismDrawing<'_> {
                 .collect(),
             hinges: self.mechanism.own_joints().map(at).collect(),
             springs: self.springs().map(|between| between.each_ref().map(place)).collect(),
+            spirals: (self.torsion_springs())
+                .map(|(bar, other)| {
+                    let joint = self.mechanism.joints.iter().find(|joint| {
+                        joint.between == [Some(bar), other] || joint.between == [other, Some(bar)]
+                    });
+                    SpiralPose { at: joint.map_or_else(|| on(bar, origin(bar)), at), angle: phi[bar] }
+                })
+                .collect(),
             motors: motors.collect(),
             arms: self.arms().map(|(bar, [from, to])| (bar, [on(bar, from), on(bar, to)])).collect(),
             sliders: (self.scene.sliders.iter())
@@ -183,6 +214,15 @@ impl MechanismDrawing<'_> {
             _ => None,
         });
         self.scene.springs.iter().map(|spring| spring.between).chain(laws)
+    }
+
+    /// The bar of every torsion spring and the one its angle is measured from, those by formulas last.
+    pub fn torsion_springs(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
+        let laws = self.scene.laws.iter().filter_map(|law| match &law.load {
+            Load::TorsionSpring { bar, relative_to, .. } => Some((*bar, *relative_to)),
+            _ => None,
+        });
+        self.scene.torsion_springs.iter().map(|spring| (spring.bar, spring.relative_to)).chain(laws)
     }
 
     /// What joins the origin of a bar with its hinges, spring ends and points that lie off it, counted from

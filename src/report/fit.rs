@@ -170,10 +170,18 @@ pub fn charts(found: &Fit) -> Result<Vec<(&'static str, Picture)>, ChartError> {
         zero: true,
         ..Band::default()
     };
-    let chart =
-        |title: &str, bands: Vec<Band>| Bands { title: title.into(), caption: caption.clone(), bands };
-    let fits = chart("Fitted motion and data", found.columns.iter().map(fitted).collect());
-    let residuals = chart("Residuals: data less fitted motion", found.columns.iter().map(left).collect());
+    let chart = |title: &str, key: &str, bands: Vec<Band>| Bands {
+        title: title.into(),
+        caption: [caption.clone(), vec![key.to_owned()]].concat(),
+        bands,
+    };
+    let fits = chart(
+        "Fitted motion and data",
+        "dots: data, line: fitted motion",
+        found.columns.iter().map(fitted).collect(),
+    );
+    let residuals =
+        chart("Residuals: data minus fitted motion", "", found.columns.iter().map(left).collect());
     Ok(vec![
         ("fit", chart::bands(&fits, FILE_RESOLUTION)?),
         ("residuals", chart::bands(&residuals, FILE_RESOLUTION)?),

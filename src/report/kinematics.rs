@@ -1,7 +1,7 @@
 //! What `kinematics` found, as a page, a JSON object, a table and charts.
 
 #[cfg(feature = "charts")]
-use super::drawing::MechanismDrawing;
+use super::drawing::{MechanismDrawing, names_of};
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{
@@ -223,10 +223,18 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
             value: found.positions.iter().map(|at| at.column(column)).collect(),
             extremes: vec![*min, *max],
         });
+    // An output may be what the table has as the force of the drive: one curve is enough.
+    let mut outputs: Vec<OutputSeries> = outputs.collect();
+    let force = outputs.first().cloned().unwrap_or_default();
+    outputs.retain(|output| {
+        output.name == force.name || output.unit != force.unit || !is_same(&output.value, &force.value)
+    });
+    let range = if found.is_turn && found.limits.is_empty() { "one turn" } else { "the range" };
     let outputs = OutputsChart {
-        title: format!("Over the range of {}", plain(&found.drive)),
+        title: format!("{} over {range} of {}", names_of(&outputs), plain(&found.drive)),
         caption,
-        outputs: outputs.collect(),
+        outputs,
+        quantity: None,
         over: Some([plain(&found.drive), found.unit.to_owned()]),
         horizon: None,
     };
@@ -234,6 +242,13 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
         ("mechanism", chart::mechanism(&mechanism, FILE_RESOLUTION)?),
         ("kinematics", chart::outputs(&outputs, FILE_RESOLUTION)?),
     ])
+}
+
+/// Whether two curves cannot be told apart.
+#[cfg(feature = "charts")]
+fn is_same(a: &[f64], b: &[f64]) -> bool {
+    let size = a.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-9 * size || a.is_nan() && b.is_nan())
 }
 
 /// Eight poses at equal distances, the first of the range last and in full.

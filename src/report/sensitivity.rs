@@ -6,7 +6,7 @@ use crate::chart::{
     self, Band, Bands, BarGroup, Bars, ChartError, FILE_RESOLUTION, OutputSeries, OutputsChart, Picture,
     plain,
 };
-use crate::run::sensitivity::{Measured, Regime, Sensitivity, Spectrum};
+use crate::run::sensitivity::{InputNumber, Measured, Regime, Sensitivity, Spectrum};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -19,6 +19,13 @@ fn ratio(of: &str, to: &str) -> String {
     match (of, to) {
         (of, "") => of.to_owned(),
         (of, to) if of == to => "1".to_owned(),
+        // A rate by its quantity: rad/s by rad is 1/s.
+        (of, to) if of.strip_prefix(to).is_some_and(|rest| rest.starts_with('/')) => {
+            format!("1{}", &of[to.len()..])
+        }
+        (of, to) if to.strip_prefix(of).is_some_and(|rest| rest.starts_with('/')) => {
+            to[of.len() + 1..].to_owned()
+        }
         ("1" | "", to) => format!("1/({to})"),
         (of, to) if to.contains([' ', '/', '·']) => format!("{of}/({to})"),
         (of, to) => format!("{of}/{to}"),
@@ -153,23 +160,26 @@ pub fn table(found: &Sensitivity, deviations: &[f64]) -> String {
 #[cfg(feature = "charts")]
 pub fn charts(found: &Sensitivity, deviations: &[f64]) -> Result<Charts, ChartError> {
     let caption = vec![format!("scene {}", plain(&found.scene.name))];
+    let bars = |measured: &Measured| -> Vec<(String, f64)> {
+        let of = |(k, input): (usize, &InputNumber)| {
+            let slope = measured.slopes.get(k).copied().unwrap_or(f64::NAN);
+            (plain(&input.path), percent(input.value) * slope)
+        };
+        let mut bars: Vec<_> = found.inputs.iter().enumerate().map(of).collect();
+        // The largest first, those that are not known last.
+        let size = |bar: &(String, f64)| if bar.1.is_nan() { -1.0 } else { bar.1.abs() };
+        bars.sort_by(|a, b| size(b).total_cmp(&size(a)));
+        bars
+    };
     let group = |measured: &Measured| BarGroup {
         name: plain(&measured.name),
         unit: plain(&measured.unit).replace(' ', "·"),
-        bars: found
-            .inputs
-            .iter()
-            .enumerate()
-            .map(|(k, input)| {
-                let slope = measured.slopes.get(k).copied().unwrap_or(f64::NAN);
-                (plain(&input.path), percent(input.value) * slope)
-            })
-            .collect(),
+        bars: bars(measured),
     };
     let of_percent =
         "change for 1 % more of each number, or a hundredth of its unit where it is 0".to_owned();
     let bars = Bars {
-        title: "Sensitivities".into(),
+        title: titled(found),
         caption: [caption.clone(), vec![of_percent.clone()]].concat(),
         groups: found.measures.iter().map(group).collect(),
     };
@@ -182,7 +192,7 @@ pub fn charts(found: &Sensitivity, deviations: &[f64]) -> Result<Charts, ChartEr
     for (k, [name, unit]) in found.outputs.iter().enumerate() {
         for (j, input) in found.inputs.iter().enumerate() {
             series.push(OutputSeries {
-                name: format!("{} by {}", plain(name), plain(&input.path)),
+                name: format!("{} by {}", plain(name), plain(short(&input.path))),
                 unit: plain(unit).replace(' ', "·"),
                 time: time.clone(),
                 value: found.rows.iter().map(|row| percent(input.value) * row.slopes[k][j]).collect(),
@@ -194,6 +204,7 @@ pub fn charts(found: &Sensitivity, deviations: &[f64]) -> Result<Charts, ChartEr
         title: "Sensitivities over time".into(),
         caption: [caption.clone(), vec![of_percent]].concat(),
         outputs: series,
+        quantity: Some("change".to_owned()),
         ..OutputsChart::default()
     };
     all.push(("sensitivity_time", chart::outputs(&over_time, FILE_RESOLUTION)?));
@@ -214,6 +225,23 @@ pub fn charts(found: &Sensitivity, deviations: &[f64]) -> Result<Charts, ChartEr
         all.push(("uncertainty", chart::bands(&chart, FILE_RESOLUTION)?));
     }
     Ok(all)
+}
+
+/// A title with the time of what is derived, where all is of one time.
+#[cfg(feature = "charts")]
+fn titled(found: &Sensitivity) -> String {
+    let mut times = found.measures.iter().map(|measured| measured.t).filter(|t| t.is_finite());
+    match times.next() {
+        Some(first) if times.all(|t| t == first) => format!("Sensitivities at {} s", figure(first)),
+        _ => format!("Sensitivities within {} s", figure(found.until)),
+    }
+}
+
+/// A path without the list it begins with: `spring.stiffness` of `springs.spring.stiffness`.
+#[cfg(feature = "charts")]
+fn short(path: &str) -> &str {
+    path.split_once('.')
+        .map_or(path, |(list, rest)| if list != "start" && rest.contains('.') { rest } else { path })
 }
 
 /// One object of a spectrum.
@@ -301,6 +329,7 @@ pub fn spectrum_charts(found: &Spectrum) -> Result<Charts, ChartError> {
             format!("their sum {} 1/s", magnitude(found.sum)),
         ],
         outputs: (0..found.exponents.len()).map(series).collect(),
+        quantity: Some("exponent".to_owned()),
         ..OutputsChart::default()
     };
     Ok(vec![("lyapunov", chart::outputs(&chart, FILE_RESOLUTION)?)])

@@ -14,7 +14,7 @@ use crate::scene::Scene;
 pub fn chart(scene: &Scene, mechanism: &Mechanism) -> Result<Picture, ChartError> {
     let start = mechanism.start(scene);
     let [phi, omega] = start.rounded();
-    drawn(scene, mechanism, &phi, &omega, "Start", Vec::new())
+    drawn(scene, mechanism, &phi, &omega, &format!("Start of {}", plain(&scene.name)), Vec::new())
 }
 
 /// The configuration that comes closest to a start that fits not.

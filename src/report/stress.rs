@@ -133,7 +133,7 @@ pub fn matrix(plan: &Stress, lines: &[StressLine]) -> Result<Picture, ChartError
     let chart = OutcomeMatrix {
         title: "Stiff and extreme scenes by every method".into(),
         caption: vec![
-            "errors of the end in rad, or of rates over themselves".into(),
+            "error at the end: angles in rad, rates relative".into(),
             format!("refined until confirmed, at most {} evaluations a cell", plan.max_evaluations),
         ],
         rows: lines.iter().map(|line| plain(&line.scene)).collect(),

@@ -291,11 +291,8 @@ impl SweepChart {
                 }
             })
             .collect();
-        let title = if is_flip {
-            "Time until a bar first turns over".to_owned()
-        } else {
-            format!("{} over the sweep", statistic(&bare))
-        };
+        let title =
+            if is_flip { "Time until a bar first turns over".to_owned() } else { titled(&bare, sweep) };
         let plan = sweep.plan();
         let mut caption = vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(plan))];
         caption.push(format!(
@@ -310,44 +307,42 @@ impl SweepChart {
         Labels { title, caption, value: name, axes, is_log, is_flip, never }
     }
 
+    /// The map of a sweep over two values.
+    pub(super) fn map(&self, labels: &Labels) -> Option<Map> {
+        let [x, y] = &labels.axes[..] else { return None };
+        let cells =
+            self.seen.iter().zip(&self.failed).map(|(&value, &failed)| match (value.is_nan(), failed) {
+                (false, _) => Cell::Value(value),
+                (true, true) => Cell::Failed,
+                (true, false) => Cell::Never,
+            });
+        Some(Map {
+            title: labels.title.clone(),
+            caption: labels.caption.clone(),
+            x: x.clone(),
+            y: y.clone(),
+            cells: cells.collect(),
+            value: labels.value.clone(),
+            log: labels.is_log,
+            dark_high: labels.is_flip,
+            range: None,
+            words: [labels.never.clone(), "left out".to_owned(), "stopped or refused".to_owned()],
+        })
+    }
+
     /// Draws what was seen.
     ///
     /// # Errors
     /// Drawing fails; `Ok` with the reason where there is nothing to show.
     pub fn draw(&self, sweep: &Sweep) -> Result<Result<Picture, NoChart>, ChartError> {
-        let Labels { title, mut caption, value: name, axes, is_log: log, is_flip, never } =
-            self.labels(sweep);
-        if is_flip && self.seen.iter().all(|time| time.is_nan()) {
+        let labels = self.labels(sweep);
+        if labels.is_flip && self.seen.iter().all(|time| time.is_nan()) {
             return Ok(Err(NoChart::Nothing(listed(sweep))));
         }
-        let picture = match &axes[..] {
-            [x, y] => {
-                let cells = self.seen.iter().zip(&self.failed).map(|(&value, &failed)| {
-                    match (value.is_nan(), failed) {
-                        (false, _) => Cell::Value(value),
-                        (true, true) => Cell::Failed,
-                        (true, false) => Cell::Never,
-                    }
-                });
-                let words = [never, "left out".to_owned(), "stopped or refused".to_owned()];
-                let (x, y, cells) = (x.clone(), y.clone(), cells.collect());
-                chart::map(
-                    &Map {
-                        title,
-                        caption,
-                        x,
-                        y,
-                        cells,
-                        value: name,
-                        log,
-                        dark_high: is_flip,
-                        range: None,
-                        words,
-                    },
-                    FILE_RESOLUTION,
-                )
-            }
-            _ => {
+        let picture = match self.map(&labels) {
+            Some(map) => chart::map(&map, FILE_RESOLUTION),
+            None => {
+                let Labels { title, mut caption, value: name, axes, is_log: log, never, .. } = labels;
                 if self.seen.iter().any(|value| value.is_nan()) {
                     caption.push(format!("dots on the upper edge: {never}"));
                 }
@@ -391,12 +386,17 @@ fn listed(sweep: &Sweep) -> String {
 /// A column's name as the name of an axis.
 #[cfg(feature = "charts")]
 fn spaced(name: &str) -> String {
-    if name.contains("drift") { name.replace('_', " ").replace(" [1]", "") } else { plain(name) }
+    if !name.contains("drift") {
+        return plain(name);
+    }
+    // Of the energy it is told as a share of the scene's scale of energy.
+    let name = name.replace('_', " ").replace(" [1]", "");
+    if name == "energy drift" { format!("relative {name}") } else { name }
 }
 
-/// A column in words: `max:O` is the largest O.
+/// What a column is, and of which time: `max:O` is the largest O over the run, an angle that at its end.
 #[cfg(feature = "charts")]
-fn statistic(column: &str) -> String {
+fn titled(column: &str, sweep: &Sweep) -> String {
     let of = |(kind, name)| match kind {
         "min" => Some(format!("Least {name}")),
         "max" => Some(format!("Largest {name}")),
@@ -404,7 +404,17 @@ fn statistic(column: &str) -> String {
         "rms" => Some(format!("Rms of {name}")),
         _ => None,
     };
-    column.split_once(':').and_then(of).unwrap_or_else(|| capital(column))
+    let until = figure(sweep.plan().until);
+    let over = column.split_once(':').and_then(of);
+    let over = over.or_else(|| column.contains("drift").then(|| format!("Largest {column}")));
+    match over {
+        Some(over) => format!("{over} over {until} s"),
+        None if matches!(column, "steps" | "horizon" | "t") => {
+            format!("{} of runs of {until} s", capital(column))
+        }
+        None if sweep.ends_at_flips() => format!("{} at the end", capital(column)),
+        None => format!("{} at {until} s", capital(column)),
+    }
 }
 
 #[cfg(feature = "charts")]

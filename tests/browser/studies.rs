@@ -121,3 +121,40 @@ fn cells_of_a_map_move() {
     assert!(told.as_str().expect("words").contains("nearest point whose motion is kept"), "{told}");
     assert!(tab.complaints().is_empty());
 }
+
+#[test]
+fn points_that_turn_over_at_once_are_not_said_to_stay() {
+    let Some(mut browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = scene("free");
+    let vary = ["--vary", "bar1.phi=-pi..pi:5", "--vary", "bar2.phi=-pi..pi:5"];
+    let arguments = [&["sweep", &scene, "--html", "--no-charts", "-q", "--until", "4"], &vary[..]].concat();
+    let page = pages(&arguments, folder.path()).remove(0);
+    let table = std::fs::read_to_string(page.with_file_name("sweep.csv")).expect("a table");
+    let flips =
+        table.lines().next().and_then(|head| head.split(',').position(|name| name == "flip_time [s]"));
+    let flips = flips.expect("a column");
+    let at_once: Vec<usize> = (table.lines().skip(1).enumerate())
+        .filter(|(_, line)| line.split(',').nth(flips) == Some("0.0"))
+        .map(|(number, _)| number)
+        .collect();
+    assert!(!at_once.is_empty(), "{table}");
+    let mut tab = browser.tab(DESK);
+    tab.open(&page, "");
+    for number in at_once {
+        let told = tab.eval(&format!("driftless.described({number})"));
+        assert!(told.as_str().expect("words").ends_with(": flip time 0 s"), "{told}");
+        let colours = tab.eval(&format!(
+            "[driftless.colour({number}), driftless.shade(0)].map((c) => c.join()).join(' ')"
+        ));
+        let colours = colours.as_str().expect("words").split_once(' ').expect("two");
+        assert_eq!(colours.0, colours.1, "point {number}");
+    }
+    // The ticks of the axes are those of the picture, and the colours have their unit.
+    let ticks = tab.eval("driftless.told.axes[1].ticks.map(([, text]) => text).join()");
+    assert!(ticks.as_str().expect("words").contains("−π/2,0,π/2"), "{ticks}");
+    assert_eq!(tab.eval("driftless.told.colours.name"), "flip time [s]");
+    let first = tab.eval("driftless.told.colours.ticks[0][1]");
+    assert!(first.as_str().expect("words").starts_with("≤ "), "{first}");
+    assert!(tab.complaints().is_empty());
+}

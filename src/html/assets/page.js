@@ -1033,6 +1033,23 @@ function entitled({ scene, description }, caption) {
 
 /** A power of ten on a linear axis of decimal logarithms, or what lies between two. */
 const power = (log) => tenTo(log) || Number((10 ** log).toPrecision(2)).toExponential();
+
+/** Places of ticks on such an axis: powers of ten, twice and five times them where they are few, else round numbers. */
+function decadeTicks(low, high) {
+  const span = high - low;
+  if (span > 3) {
+    const step = Math.ceil(span / 8);
+    return Array.from({ length: Math.floor(high / step) - Math.ceil(low / step) + 1 }, (_, k) => (Math.ceil(low / step) + k) * step);
+  }
+  if (span > 0.9) {
+    const decades = Array.from({ length: Math.ceil(span) + 2 }, (_, k) => Math.floor(low) + k);
+    return decades.flatMap((decade) => [0, Math.log10(2), Math.log10(5)].map((part) => decade + part)).filter((at) => at >= low && at <= high);
+  }
+  const [from, to] = [10 ** low, 10 ** high];
+  const size = 10 ** Math.floor(Math.log10((to - from) / 4));
+  const step = [1, 2, 5, 10].map((factor) => factor * size).find((step) => step >= (to - from) / 6);
+  return Array.from({ length: Math.max(0, Math.floor(to / step) - Math.ceil(from / step) + 1) }, (_, k) => Math.log10((Math.ceil(from / step) + k) * step));
+}
 const SHAPES = [
   (ctx, x, y, r) => ctx.arc(x, y, r, 0, 2 * Math.PI),
   (ctx, x, y, r) => ctx.rect(x - 0.9 * r, y - 0.9 * r, 1.8 * r, 1.8 * r),
@@ -1075,7 +1092,7 @@ class Scatter {
     const colours = palette();
     const axis = { stroke: colours.grey, grid: { stroke: colours.grid, width: 1 }, ticks: { stroke: colours.grid, width: 1 }, font: "11px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 20 };
     const scale = (isLog) => ({
-      incrs: isLog ? [0.1, 0.2, 0.5, 1, 2, 3, 5, 10, 20, 50, 100] : undefined,
+      ...(isLog && { splits: (_, axis, low, high) => decadeTicks(low, high) }),
       values: (_, splits) => splits.map((value) => (isLog ? power(value) : tick(value, splits))),
     });
     const sorted = [...this.points].sort((a, b) => a.x - b.x);
@@ -1328,8 +1345,21 @@ class FieldMap {
     this.element.append(make("h3", { text: page.told.title }), this.canvas, this.tip);
     home.append(this.element);
     this.margin = [62, 10, 74, 44];
+    this.font = "11px system-ui, sans-serif";
+    this.measure();
     this.listen();
     this.show();
+  }
+
+  /** Room for the labels of the upright axis and of the colours, and for the names beside them. */
+  measure() {
+    const context = this.canvas.getContext("2d");
+    context.font = this.font;
+    const widest = (ticks) => ticks.reduce((width, [, text]) => Math.max(width, context.measureText(text).width), 0);
+    const { axes, colours } = this.page.told;
+    this.margin[0] = Math.ceil(widest(axes[1].ticks)) + 30;
+    this.room = Math.ceil(widest(colours.ticks));
+    this.margin[2] = 14 + 12 + 8 + this.room + 24;
   }
 
   /** The points as a picture, a pixel each. */
@@ -1381,43 +1411,54 @@ class FieldMap {
     context.strokeStyle = colours.grey;
     context.strokeRect(left - 0.5, top - 0.5, width + 1, height + 1);
     context.fillStyle = colours.grey;
-    context.font = "11px system-ui, sans-serif";
-    const parts = 4;
-    for (let n = 0; n <= parts; n++) {
-      const mark = (axis) => tick(axis.from + (n / parts) * (axis.to - axis.from), [axis.from, axis.from + (axis.to - axis.from) / 100]);
-      context.textAlign = n === 0 ? "left" : n === parts ? "right" : "center";
-      context.fillText(mark(x), left + (n / parts) * width, top + height + 15);
-      context.textAlign = "right";
-      context.fillText(mark(y), left - 5, top + height - (n / parts) * height + (n === parts ? 9 : n ? 4 : 0));
+    context.font = this.font;
+    context.textAlign = "center";
+    for (const [share, text] of x.ticks) {
+      context.fillRect(Math.round(left + share * width) - 0.5, top + height, 1, 4);
+      context.fillText(text, left + share * width, top + height + 17);
+    }
+    context.textAlign = "right";
+    for (const [share, text] of y.ticks) {
+      const at = top + (1 - share) * height;
+      context.fillRect(left - 4, Math.round(at) - 0.5, 4, 1);
+      context.fillText(text, left - 8, at + 4);
     }
     context.font = "12px system-ui, sans-serif";
     context.textAlign = "center";
-    context.fillText(labelled(x), left + 0.5 * width, top + height + 34);
-    context.save();
-    context.translate(12, top + 0.5 * height);
-    context.rotate(-0.5 * Math.PI);
-    context.fillText(labelled(y), 0, 0);
-    context.restore();
+    context.fillText(labelled(x), left + 0.5 * width, top + height + 36);
+    this.upright(context, labelled(y), [12, top + 0.5 * height]);
     this.scale(context, [left + width + 14, top, height], colours);
     for (const index of told.cells) this.ring(context, index, colours.paper, 2.6);
     this.ring(context, this.page.asked, "#ffffff", 7.5);
     this.ring(context, this.page.asked, "#d55e00", 6);
   }
 
+  /** Words that run upwards. */
+  upright(context, text, [x, y]) {
+    context.save();
+    context.translate(x, y);
+    context.rotate(-0.5 * Math.PI);
+    context.textAlign = "center";
+    context.fillText(text, 0, 0);
+    context.restore();
+  }
+
   scale(context, [left, top, height], colours) {
-    const { low, high, told } = this.page;
+    const { name, ticks } = this.page.told.colours;
     for (let k = 0; k < height; k++) {
       context.fillStyle = `rgb(${this.page.shade(1 - k / height).join(",")})`;
       context.fillRect(left, top + k, 12, 1.5);
     }
     context.fillStyle = colours.grey;
     context.textAlign = "left";
-    context.font = "11px system-ui, sans-serif";
-    for (const share of [0, 0.5, 1]) {
-      const value = low + share * (high - low);
-      const text = Number((told.log ? 10 ** value : value).toPrecision(2));
-      context.fillText(String(text), left + 16, top + (1 - share) * (height - 8) + 8);
+    context.font = this.font;
+    for (const [share, text] of ticks) {
+      const at = top + (1 - share) * height;
+      context.fillRect(left + 12, Math.round(at) - 0.5, 4, 1);
+      context.fillText(text, left + 20, at + 4);
     }
+    context.font = "12px system-ui, sans-serif";
+    this.upright(context, name, [left + 20 + this.room + 16, top + 0.5 * height]);
   }
 
   ring(context, index, colour, radius) {
@@ -1471,10 +1512,14 @@ class SweepPage {
     this.told = told;
     this.bytes = bytes;
     const table = told.tables[told.tables.length - 1];
-    [this.values, this.failed] = table.columns.map((column) => unpacked(column, table.rows, bytes));
+    let zeros;
+    [this.values, this.failed, zeros] = table.columns.map((column) => unpacked(column, table.rows, bytes));
+    // The logarithm of a zero is below all others.
+    zeros.forEach((isZero, k) => isZero && (this.values[k] = -Infinity));
     const known = this.values.filter((value) => Number.isFinite(value));
     this.low = known.reduce((a, b) => Math.min(a, b), Infinity);
     this.high = known.reduce((a, b) => Math.max(a, b), -Infinity);
+    if (told.colours) [this.low, this.high] = [told.colours.from, told.colours.to];
     if (!(this.high > this.low)) [this.low, this.high] = known.length ? [this.low, this.low + 1] : [0, 1];
     this.page = new Page();
     byId("main").hidden = false;
@@ -1508,7 +1553,7 @@ class SweepPage {
 
   colour(index) {
     const value = this.values[index];
-    if (Number.isFinite(value)) return this.shade((value - this.low) / (this.high - this.low));
+    if (!Number.isNaN(value)) return this.shade((value - this.low) / (this.high - this.low));
     if (this.failed[index]) return [213, 94, 0];
     return isDark() ? [70, 78, 88] : [214, 218, 222];
   }
@@ -1531,12 +1576,12 @@ class SweepPage {
   profile(home) {
     const [axis] = this.told.axes;
     const kept = new Set(this.told.cells);
-    // Points without a number stand on the upper edge.
-    const edge = this.high + 0.06 * (this.high - this.low);
+    // Points without a number stand on the upper edge, zeros among logarithms on the lower one.
+    const air = 0.06 * (this.high - this.low);
     const points = Array.from(this.values, (value, index) => ({
-      series: Number.isFinite(value) ? this.told.value : this.failed[index] ? "failed" : "none",
+      series: !Number.isNaN(value) ? this.told.value : this.failed[index] ? "failed" : "none",
       x: axisValue(axis, index),
-      y: Number.isFinite(value) ? value : edge,
+      y: Number.isNaN(value) ? this.high + air : Math.max(value, this.low - air),
       isMarked: kept.has(index) && kept.size < this.values.length,
       index,
       text: this.described(index),
@@ -1553,7 +1598,7 @@ class SweepPage {
     const number = this.values[index];
     const [name, unit] = value.replace("]", "").split(" [");
     const known = `${name} ${Number((log ? 10 ** number : number).toPrecision(4))}${unit && unit !== "1" ? ` ${unit}` : ""}`;
-    const told = Number.isFinite(number) ? known : this.failed[index] ? "stopped or refused" : never;
+    const told = !Number.isNaN(number) ? known : this.failed[index] ? "stopped or refused" : never;
     return `${places.join(", ")}: ${told}`;
   }
 

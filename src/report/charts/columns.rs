@@ -53,6 +53,6 @@ impl Finished<'_> {
             value: rows.iter().map(|row| row[*k]).collect(),
             extremes: Vec::new(),
         });
-        self.over_time("Columns", outputs.collect(), more)
+        self.over_time(outputs.collect(), more)
     }
 }

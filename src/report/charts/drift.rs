@@ -82,20 +82,20 @@ fn units(mechanism: &Mechanism) -> Vec<&'static str> {
 
 /// Name of the axis of violations at one level.
 fn defect_name(level: usize, unit: &str) -> String {
-    if level == 0 { format!("|*C*| [{unit}]") } else { format!("|*C′*| [{unit}/s]") }
+    if level == 0 { format!("residual |*C*| [{unit}]") } else { format!("its rate |*C′*| [{unit}/s]") }
 }
 
 impl Finished<'_> {
     pub fn energy_drift(&self) -> EnergyDrift {
         let Outcome { plan, drift, last, .. } = self.outcome;
-        let kind = if drift.kind == "energy" { "Energy" } else { "Energy minus work" };
+        let kind = if drift.kind == "energy" { "energy" } else { "energy balance" };
+        let most = if drift.energy.max == 0.0 {
+            "exactly 0".to_owned()
+        } else {
+            format!("at most {}", power(drift.energy.max))
+        };
         EnergyDrift {
-            title: if drift.energy.max == 0.0 {
-                format!("{kind} is kept exactly over {} s", figure(last.t))
-            } else {
-                let share = power(drift.energy.max);
-                format!("{kind} keeps to {share} of its scale over {} s", figure(last.t))
-            },
+            title: format!("Relative error of the {kind}: {most} over {} s", figure(last.t)),
             caption: self.caption(Some(format!("scale {} J", figure(self.mechanism.energy_scale)))),
             quantity: drift.kind.to_owned(),
             series: vec![DriftSeries {
@@ -133,13 +133,10 @@ impl Finished<'_> {
         units.retain(|unit| of(unit).next().is_some());
         let most = |unit: &'static str| of(unit).map(|r| drift.constraints[r].1[0].max).fold(0.0, f64::max);
         let kept: Vec<String> = units.iter().map(|unit| format!("{} {unit}", power(most(unit)))).collect();
-        let kept = if kept.is_empty() {
-            "are kept exactly".to_owned()
-        } else {
-            format!("keep to {}", kept.join(" and "))
-        };
+        let kept =
+            if kept.is_empty() { "exactly 0".to_owned() } else { format!("at most {}", kept.join(" and ")) };
         ConstraintDrift {
-            title: format!("Constraints {kept} over {} s", figure(self.outcome.last.t)),
+            title: format!("Constraint residuals: {kept} over {} s", figure(self.outcome.last.t)),
             caption: self.caption(exactly_kept(self.mechanism, &off)),
             panels: units.into_iter().flat_map(|unit| [panel(unit, 0), panel(unit, 1)]).collect(),
             log_time: is_long(&drift.energy),

@@ -149,6 +149,23 @@ const GHOST: f64 = 0.4;
 /// Ghosts shown.
 const GHOSTS: usize = 5;
 
+/// The last of some samples, as far back as the fastest body turns by `PATH`.
+fn last_stretch<'a>(samples: impl DoubleEndedIterator<Item = &'a Sample>) -> Vec<&'a Sample> {
+    let mut turned = 0.0;
+    let mut path: Vec<&Sample> = Vec::new();
+    for sample in samples.rev() {
+        if let Some(after) = path.last() {
+            turned += furthest(sample, after);
+        }
+        if turned > PATH {
+            break;
+        }
+        path.push(sample);
+    }
+    path.reverse();
+    path
+}
+
 /// A run and all that belongs to it.
 struct Finished<'a> {
     scene: &'a Scene,
@@ -213,28 +230,45 @@ impl Finished<'_> {
     }
 
     /// All samples of the window asked for, or the last ones, as far back as the fastest body turns by
-    /// `PATH`.
-    fn path(&self) -> Vec<&Sample> {
-        if self.outcome.trace.window.is_some() {
-            return self.outcome.trace.part.iter().collect();
+    /// `PATH`; where none of these can be trusted, the last ones that can.  And what to say about it.
+    fn path(&self) -> (Vec<&Sample>, Option<String>) {
+        let trace = &self.outcome.trace;
+        if trace.window.is_some() {
+            return (trace.part.iter().collect(), Some(self.chosen_window()));
         }
-        let mut turned = 0.0;
-        let mut path: Vec<&Sample> = Vec::new();
-        for sample in self.outcome.trace.tail.iter().rev() {
-            if let Some(after) = path.last() {
-                turned += furthest(sample, after);
-            }
-            if turned > PATH {
-                break;
-            }
-            path.push(sample);
+        let whole = figure(self.outcome.last.t);
+        let last = last_stretch(trace.tail.iter());
+        let begin = last.first().map_or(0.0, |sample| sample.t);
+        if let Some(horizon) = self.horizon(begin).0 {
+            let trusted = self.before(horizon);
+            let span = rough(span(&trusted));
+            return (
+                trusted,
+                Some(format!("{span} s before the trust horizon, {} s of {whole} s", rough(horizon))),
+            );
         }
-        path.reverse();
-        path
+        let more = match begin > 0.0 {
+            true => format!("last {} s of {whole} s", rough(span(&last))),
+            false => format!("all {whole} s"),
+        };
+        (last, Some(more))
+    }
+
+    /// The last samples up to a time, of those that lie closest together there.
+    fn before(&self, horizon: f64) -> Vec<&Sample> {
+        let trace = &self.outcome.trace;
+        let is_known = |sample: &&Sample| sample.t <= horizon;
+        if trace.tail.front().is_some_and(|first| first.t < horizon) {
+            last_stretch(trace.tail.iter().filter(is_known))
+        } else if trace.head.last().is_some_and(|last| last.t >= horizon) {
+            last_stretch(trace.head.iter().filter(is_known))
+        } else {
+            last_stretch(trace.whole.iter().filter(is_known))
+        }
     }
 
     fn mechanism_chart(&self) -> MechanismChart {
-        let path = self.path();
+        let (path, more) = self.path();
         let coarse = is_coarse(&path);
         let drawing = self.drawing();
         let traced = drawing.traced();
@@ -262,11 +296,7 @@ impl Finished<'_> {
         let end = path.last().map_or(self.outcome.last.t, |sample| sample.t);
         let title = (drawing.title().filter(|_| !coarse))
             .unwrap_or_else(|| format!("The mechanism at {} s", figure(end)));
-        let more = match self.outcome.trace.window {
-            Some(_) => Some(self.chosen_window()),
-            None => (!coarse)
-                .then(|| format!("last {} s of {} s", rough(span(&path)), figure(self.outcome.last.t))),
-        };
+        let more = more.filter(|_| !coarse || self.outcome.trace.window.is_some());
         let (horizon, past) = self.horizon(end);
         let trusted = horizon
             .filter(|_| !coarse)

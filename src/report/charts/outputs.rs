@@ -2,6 +2,7 @@
 
 use super::Finished;
 use crate::chart::{MotorSeries, OutputSeries, OutputsChart, TorquePower, plain};
+use crate::report::drawing::names_of;
 use crate::report::page::figure;
 
 impl Finished<'_> {
@@ -60,16 +61,17 @@ impl Finished<'_> {
                 .filter(seen)
                 .collect(),
         });
-        self.over_time("Outputs", outputs.collect(), more)
+        self.over_time(outputs.collect(), more)
     }
 
     /// The chart of series of the run.
-    pub fn over_time(&self, what: &str, outputs: Vec<OutputSeries>, more: Option<String>) -> OutputsChart {
+    pub fn over_time(&self, outputs: Vec<OutputSeries>, more: Option<String>) -> OutputsChart {
         let end = outputs.iter().filter_map(|output| output.time.last()).copied().fold(0.0, f64::max);
         let (horizon, past) = self.horizon(end);
         OutputsChart {
             over: None,
-            title: format!("{what} over {} s", figure(self.outcome.last.t)),
+            quantity: None,
+            title: format!("{} over {} s", names_of(&outputs), figure(self.outcome.last.t)),
             caption: self.caption(more).into_iter().chain(past).collect(),
             outputs,
             horizon,

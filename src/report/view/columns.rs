@@ -105,7 +105,8 @@ pub(super) fn columns(mechanism: &Mechanism) -> Vec<ShownColumn> {
             _ if ["kinetic", "potential", "work", "friction"].contains(&name) => Role::Part,
             _ => Role::Output,
         };
-        columns.push(shown(role));
+        let name = if role == Role::Energy { "energy drift" } else { name };
+        columns.push(ShownColumn { name: name.to_owned(), ..shown(role) });
     }
     columns.extend(poses);
     columns

@@ -57,7 +57,7 @@ impl Viewed {
         let mut charts = Vec::new();
         for (role, title) in [
             (Role::Angle, "Angles"),
-            (Role::Rate, "Rates"),
+            (Role::Rate, "Angular rates"),
             (Role::Energy, "Energy drift"),
             (Role::Residual, "Constraint residuals"),
             (Role::Torque, "Motors"),

@@ -29,12 +29,21 @@ pub fn holds(sweep: &Sweep) -> Result<(), ViewError> {
 /// The page: a click on a point shows its motion, or that of the nearest of which it is kept.
 pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals) -> Document {
     let labels = curve.labels(sweep);
-    let axes: Vec<Value> = (sweep.grid().axes().iter().zip(sweep.variables()))
+    let mut axes: Vec<Value> = (sweep.grid().axes().iter().zip(sweep.variables()))
         .map(|(axis, variable)| {
             json!({"name": variable.path, "unit": variable.unit, "from": axis.from, "to": axis.to,
                 "count": axis.count})
         })
         .collect();
+    let mut colours = Value::Null;
+    if let Some(map) = curve.map(&labels) {
+        let ([x, y, bar], ends) = map.scales();
+        for (axis, scale) in axes.iter_mut().zip([x, y]) {
+            axis["ticks"] = json!(scale.ticks);
+        }
+        let ends = ends.map(|end| logarithm(end, labels.is_log));
+        colours = json!({"name": bar.name, "ticks": bar.ticks, "from": ends[0], "to": ends[1]});
+    }
     let rows = (sweep.plan().until / EVERY).clamp(ROWS[0], ROWS[1]);
     let mut cells = Vec::new();
     let mut runs = Vec::new();
@@ -51,7 +60,8 @@ pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals) -> Document {
     let values: Vec<f64> = curve.values().iter().map(|&value| logarithm(value, labels.is_log)).collect();
     tables.push(vec![
         column(&labels.value, values, labels.is_log),
-        column("failed", curve.failed().iter().map(|&failed| f64::from(u8::from(failed))).collect(), false),
+        column("failed", flags(curve.failed().iter().copied()), false),
+        column("zero", flags(curve.values().iter().map(|&value| labels.is_log && value == 0.0)), false),
     ]);
     let told = |run: &Viewed| {
         let mut told = run.data();
@@ -61,15 +71,16 @@ pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals) -> Document {
     };
     let caption: Vec<_> = labels.caption.iter().map(|words| crate::chart::unmarked(words)).collect();
     Document {
-        title: format!("{}: {}", sweep.scene().name, labels.title),
+        title: format!("{}: {}", sweep.scene().name, crate::chart::unmarked(&labels.title)),
         data: json!({
             "kind": "sweep",
             "scene": sweep.scene().name,
             "description": sweep.scene().description,
-            "title": labels.title,
+            "title": crate::chart::unmarked(&labels.title),
             "caption": caption.join(" · "),
             "axes": axes,
-            "value": labels.value,
+            "colours": colours,
+            "value": crate::chart::unmarked(&labels.value),
             "log": labels.is_log,
             "high_is_dark": labels.is_flip,
             "never": labels.never,
@@ -115,6 +126,11 @@ fn chosen(counts: &[u64], values: &[f64]) -> Vec<u64> {
     points.sort_unstable();
     points.dedup();
     points
+}
+
+/// 1 where something holds, else 0.
+fn flags(values: impl Iterator<Item = bool>) -> Vec<f64> {
+    values.map(|value| f64::from(u8::from(value))).collect()
 }
 
 fn logarithm(value: f64, is_log: bool) -> f64 {

@@ -297,6 +297,11 @@ impl Sweep {
         Self { ends_at_flips: true, ..self }
     }
 
+    /// Whether points end when a bar turns over.
+    pub fn ends_at_flips(&self) -> bool {
+        self.ends_at_flips
+    }
+
     /// The same with a note among those of its plan.
     #[must_use]
     pub fn noted(mut self, note: String) -> Self {
