@@ -195,7 +195,7 @@ pub trait Real: Scalar + PartialOrd {
     /// The nearest `f64`.
     fn value(self) -> f64;
 
-    /// True for a base above zero so near to it, beside its rate, that its fractional powers are not expanded:
+    /// True for a base so near above zero, beside its rate, that its fractional powers are not expanded:
     /// their series leave the range of exponents, or the base is rounding.
     #[inline(always)]
     fn is_steep(self, rate: Self) -> bool {

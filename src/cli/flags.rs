@@ -67,7 +67,7 @@ pub enum Command {
     Fit(FitFlags),
     /// Run a scene with every method at all its settings: error, drift and run time, and what to choose
     Compare(Box<CompareFlags>),
-    /// Go on with an interrupted run or sweep: its files are those of one that was not interrupted, byte for byte
+    /// Go on with an interrupted run or sweep: byte for byte the files of one without interruption
     Resume(ResumeFlags),
     /// Join the parts of a sweep: the same table, chart and record as of one process, byte for byte
     Merge(MergeFlags),

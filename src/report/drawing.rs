@@ -217,6 +217,7 @@ impl MechanismDrawing<'_> {
     }
 
     /// The bar of every torsion spring and the one its angle is measured from, those by formulas last.
+    #[cfg(feature = "charts")]
     pub fn torsion_springs(&self) -> impl Iterator<Item = (usize, Option<usize>)> {
         let laws = self.scene.laws.iter().filter_map(|law| match &law.load {
             Load::TorsionSpring { bar, relative_to, .. } => Some((*bar, *relative_to)),

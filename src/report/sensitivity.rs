@@ -6,7 +6,9 @@ use crate::chart::{
     self, Band, Bands, BarGroup, Bars, ChartError, FILE_RESOLUTION, OutputSeries, OutputsChart, Picture,
     plain,
 };
-use crate::run::sensitivity::{InputNumber, Measured, Regime, Sensitivity, Spectrum};
+#[cfg(feature = "charts")]
+use crate::run::sensitivity::InputNumber;
+use crate::run::sensitivity::{Measured, Regime, Sensitivity, Spectrum};
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 

@@ -274,7 +274,7 @@ impl<C: Decimal> Formulas<C> {
             let (potential, place) = match &law.load {
                 Load::Force { bar, point, force: [x, y], follows } => {
                     let site = forest.site(&Place { bar: Some(*bar), point: *point });
-                    let force = [expression(x)?, expression(y)?];
+                    let force = Box::new([expression(x)?, expression(y)?]);
                     (None, Acts::Point { site, follows: *follows, force })
                 }
                 Load::Torque { bar, relative_to, torque } => {

@@ -15,7 +15,7 @@ pub(super) enum Acts<C = f64> {
     Point {
         site: Site<C>,
         follows: bool,
-        force: [Expression<C>; 2],
+        force: Box<[Expression<C>; 2]>,
     },
     Torque {
         body: usize,
@@ -49,7 +49,7 @@ impl<C> ForceLaw<C> {
     /// Its formulas in the order in which they were bound.
     pub fn expressions(&self) -> impl Iterator<Item = &Expression<C>> {
         let acting: Vec<&Expression<C>> = match &self.place {
-            Acts::Point { force: [x, y], .. } => vec![x, y],
+            Acts::Point { force, .. } => force.iter().collect(),
             Acts::Torque { torque, .. } => vec![torque],
             Acts::Span { tension, .. } => tension.iter().collect(),
             Acts::Nowhere => Vec::new(),

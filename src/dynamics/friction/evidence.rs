@@ -1,4 +1,4 @@
-//! What the equations tell of a combination of modes of places with dry friction: signs, and what is rounding.
+//! What the equations tell of modes of places with dry friction: signs, and what is rounding.
 //!
 //! The combinations are the same for all numbers, see [`modes`](super::modes); this is what is told of one in
 //! the numbers of a run, [`Evidence`], and that of doubles.

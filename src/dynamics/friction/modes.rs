@@ -74,7 +74,7 @@ struct FittingMotion {
     load: Vec<f64>,
     /// True where a closed contact does not press.
     ceases: bool,
-    /// True where all rest, and forces hardly follow from those at their limits: there are other ways to share
+    /// True where all rest, and forces hardly follow from those at limits: there are other ways to share
     /// the load.
     is_loose: bool,
 }

@@ -20,8 +20,8 @@ use crate::dynamics::series::Series;
 const POWERS: usize = 2;
 /// log2 of a moment, over the mechanism's own time.
 const A_MOMENT: f64 = -20.0;
-/// The same of the part of a force that is rounding a moment later: the motion up to then is known but for what
-/// is of third order.
+/// The same of the part of a force that is rounding a moment later: the motion up to then is known but for
+/// what is of third order.
 const LATER: f64 = 1.5 * A_MOMENT;
 
 /// What is known of a moment in many digits.

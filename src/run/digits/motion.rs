@@ -339,8 +339,8 @@ impl<const W: usize> DigitsMotion<W> {
         Ok(step)
     }
 
-    /// Steps over the time below which a series converges in ever smaller circles: fractional powers begin and
-    /// end at zero in such that only many digits tell apart.
+    /// The finest step over the time that is not one of ever smaller circles: fractional powers begin and end
+    /// at zero by such as only many digits tell apart.
     fn finest(&self) -> f64 {
         let least =
             if self.probe.is_some() { -friction::SURE * self.precision.bits as f64 } else { f64::INFINITY };

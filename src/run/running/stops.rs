@@ -12,7 +12,7 @@ use crate::stepping::{Cause, StepError};
 /// Share of the output interval by which a row may be beside its time.
 const BESIDE: f64 = 1e-6;
 
-/// Steps that shrink where surfaces jam, or where loops and sliders are, have another cause than a stiff spring.
+/// Steps that shrink where surfaces jam, or near singular positions, have another cause than a stiff spring.
 pub(super) fn advised(stop: StepError, at: &mut ContactDriver) -> StepError {
     let shrinks = stop.cause == Cause::StepTooSmall;
     if (shrinks || stop.cause == Cause::NotFinite) && at.jams() {

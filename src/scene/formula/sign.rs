@@ -61,7 +61,7 @@ impl Formula {
         }
     }
 
-    /// Notes the exponents above zero of these names, by number, which are above zero and do not change with time.
+    /// Notes the exponents of these names, by number, which are above zero and do not change with time.
     pub(crate) fn note_exponents(&mut self, is_fixed: impl Fn(usize) -> bool) {
         let exponents = self.nodes.iter().filter_map(|node| match node {
             Node::Power(_, exponent) if self.constants[*exponent].is_none() => Some(*exponent),
