@@ -441,7 +441,7 @@ fn a_motor_that_leaves_no_freedom_is_a_typed_stop() {
         scene.motors.push(Motor { name: "motor".into(), bar: 0, relative_to: None, law });
         let stop = run(&scene, &by(method, 5.0, 0.1, 1e-10)).stop.expect("a stop");
         assert_eq!((stop.cause, stop.t), (Cause::RestingContact, 0.0));
-        assert!(stop.what.contains("wall") && stop.hint.contains("motors"), "{stop}");
+        assert!(stop.what.contains("wall") && stop.hint.contains("motor"), "{stop}");
     }
 }
 

@@ -382,7 +382,7 @@ fn a_slider_motor_that_pushes_into_a_wall_is_a_typed_stop() {
         let (outcome, _) = seen(&scene, method, 4.0, 0.1, 1e-10);
         let stop = outcome.stop.expect("a stop");
         close(stop.t, 2.0, 1e-9, "time");
-        assert!(stop.what.contains("stop") && stop.hint.contains("motors"), "{stop}");
+        assert!(stop.what.contains("stop") && stop.hint.contains("motor"), "{stop}");
     }
 }
 

@@ -99,7 +99,8 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
             .push(format!("Baumgarte's time constant is {found:.3e} s, five mean steps of a pilot run"));
         plan.time_constant = Some(found);
     }
-    let projected = plan.stabilization == Stabilization::Projection;
+    // A saved plan may ask for it where there is nothing to be projected, and no energy kept of it.
+    let projected = plan.stabilization == Stabilization::Projection && mechanism.has_work_integral();
     let problem = || sized!(n, form(mechanism, plan.stabilization, plan.time_constant.unwrap_or(1.0)));
     Ok(match plan.method {
         MethodId::Custom => {
@@ -138,7 +139,7 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
                 Stabilization::None if mechanism.constraints.is_empty() && mechanism.frictions.is_empty() => {
                     driver(sized!(n, eliminated(mechanism)), taylor, start)
                 }
-                Stabilization::Projection => driver(problem(), Projected::new(taylor), start),
+                _ if projected => driver(problem(), Projected::new(taylor), start),
                 _ => driver(problem(), taylor, start),
             }
         }

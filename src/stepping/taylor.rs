@@ -209,7 +209,9 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         let mut event = None;
         if self.by_series {
             if problem.mechanism().needs_confirmation() {
-                h = self.confirmed(problem, state, h);
+                // What takes less than the resolution of time is passed by it.
+                let least = super::finest(state, problem.time_unit()).min(h);
+                h = self.confirmed(problem, state, h).max(least);
             }
             if problem.events() > 0 {
                 (h, event) = self.meet(problem, state, h)?;
