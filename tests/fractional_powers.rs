@@ -145,6 +145,21 @@ fn powers_of_magnitudes_swing_with_the_period_of_their_closed_form() {
     }
 }
 
+/// Of a square there is a magnitude as well: it touches zero, and its power is that of the magnitude alone.
+#[test]
+fn powers_of_magnitudes_of_squares_pass_zero() {
+    let last = |law: &str| {
+        let torque = format!(
+            r#""torques": [{{"name": "T", "body": "bar", "torque": "1 N*m*(-sign(bar.phi))*{law}"}}]"#
+        );
+        let outcome = run(&scene(&rotor([0.0, 1.3], 4.0, &torque)), &adaptive(MethodId::Taylor, 1e-12));
+        assert!(outcome.stop.is_none(), "{law}: {:?}", outcome.stop);
+        outcome.last.phi[0]
+    };
+    let [square, plain] = [last("abs(bar.phi^2)^0.75"), last("abs(bar.phi)^1.5")];
+    assert!((square - plain).abs() < 1e-10, "{square} for {plain}");
+}
+
 /// Powers of what may be below zero are no numbers there: the run ends where the base passes zero.
 #[test]
 fn powers_of_negative_numbers_are_refused_as_before() {

@@ -80,8 +80,8 @@ pub(crate) fn spread(wanted: &[f64], gap: f64, top: f64, bottom: f64) -> Vec<f64
 }
 
 /// The best box of `size` beside a point inside `room`, and what it costs.  `avoid` are directions in
-/// which lines leave the point \[unit vectors, y downwards\].  Boxes are tried in so
-/// many rings around it, the first of them at `distance`.
+/// which lines leave the point \[unit vectors, y downwards\].  Boxes are tried in so many rings around it,
+/// the first of them at `distance`.
 pub(crate) fn place(
     at: Point,
     distance: f64,

@@ -108,10 +108,11 @@ impl Pencil<'_> {
         let mut line = vec![from];
         for k in 0..=waves {
             let s = lead + (length - 2.0 * lead) * f64::from(k) / f64::from(waves);
-            let swing = if k == 0 || k == waves { 0.0 } else { 4.6 * self.size * f64::from(1 - 2 * (k % 2)) };
+            let offset =
+                if k == 0 || k == waves { 0.0 } else { 4.6 * self.size * f64::from(1 - 2 * (k % 2)) };
             line.push([
-                from[0] + s * along[0] + swing * across[0],
-                from[1] + s * along[1] + swing * across[1],
+                from[0] + s * along[0] + offset * across[0],
+                from[1] + s * along[1] + offset * across[1],
             ]);
         }
         line.push(to);

@@ -38,7 +38,7 @@ pub struct ContactSigns {
 impl ContactSigns {
     /// True where no closed contact pulls, none of those that touch is gone into, and what sticks is within
     /// its limit.
-    pub(crate) fn hold(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> bool {
+    pub(super) fn hold(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> bool {
         let leaves = |(contact, &sign): (&usize, &i8)| closed.contains(contact) || sign >= 0;
         let grips =
             |(mode, &grip): (&FrictionMode, &i8)| !matches!(mode, FrictionMode::Stick(_)) || grip >= 0;
@@ -56,8 +56,20 @@ pub trait Evidence {
     /// What the equations tell; `None` where they have no finite solution.
     fn told(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> Option<ContactSigns>;
 
+    /// The same a moment later, with these accelerations up to then.
+    fn told_later(
+        &self,
+        closed: &[usize],
+        modes: &[FrictionMode],
+        touching: &[usize],
+        load: &[f64],
+    ) -> Option<ContactSigns>;
+
     /// False where contacts would have to pull a moment later, or what sticks is beyond its limit.
-    fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool;
+    fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
+        let later = self.told_later(closed, modes, touching, load);
+        later.is_some_and(|told| told.hold(closed, modes, touching))
+    }
 
     /// True where a place that is held by contacts, constraints and the others in these modes has no
     /// acceleration; of what motors hold less is asked.
@@ -148,14 +160,18 @@ impl Evidence for InDoubles<'_> {
         Some(ContactSigns { regularity, pressures, leaving, grips, speeding, load: kernel.load })
     }
 
-    fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
+    fn told_later(
+        &self,
+        closed: &[usize],
+        modes: &[FrictionMode],
+        touching: &[usize],
+        load: &[f64],
+    ) -> Option<ContactSigns> {
         let FrictionMoment { t, phi, omega, .. } = self.at;
         let (t, [phi, omega]) = self.mechanism.a_moment_later(t, [phi, omega], load);
         let z = self.mechanism.elements(&phi);
         let at = FrictionMoment { t, phi: &phi, z: &z, omega: &omega };
-        let later = InDoubles { mechanism: self.mechanism, at };
-        let told = later.told(closed, modes, touching);
-        told.is_some_and(|told| told.hold(closed, modes, touching))
+        InDoubles { mechanism: self.mechanism, at }.told(closed, modes, touching)
     }
 
     fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], is_driven: bool) -> bool {

@@ -112,10 +112,7 @@ impl Mechanism {
             // What gives way moves nothing that rests where supports can share the load in another way.
             (None, Some(_)) => {
                 let [found, _] = self.fitting(evidence, at, before, contacts, Transition::default())?;
-                let rests = |((closed, modes), motion): &Fit| {
-                    evidence.lasts(closed, modes, contacts[1], &motion.load)
-                };
-                found.filter(rests)
+                found.filter(|fit| lasts(evidence, fit, contacts[1]))
             }
             (found, _) => found,
         };
@@ -161,8 +158,7 @@ impl Mechanism {
             let fit = fits.next();
             // Where one gives way, others at their limits leave more than one way to share the load, with
             // walls or without: one that still does so a moment later is taken.
-            let lasts =
-                |((closed, modes), motion): &Fit| evidence.lasts(closed, modes, touching, &motion.load);
+            let lasts = |fit: &Fit| lasts(evidence, fit, touching);
             let is_at_limits = |fit: &Fit| transition.breaks.is_some() || fit.1.ceases;
             let doubts = |fit: &Fit| fit.1.is_loose || is_at_limits(fit) && !lasts(fit);
             let is_in_doubt = fit.as_ref().is_some_and(doubts);
@@ -301,6 +297,11 @@ impl Mechanism {
         let is_loose = told.regularity.abs() < REGULAR && !modes.iter().any(slides);
         fit.then(|| FittingMotion { ceases: told.pressures.contains(&0), is_loose, load: told.load })
     }
+}
+
+/// Whether modes that fit still do so a moment later.
+fn lasts(evidence: &dyn Evidence, ((closed, modes), motion): &Fit, touching: &[usize]) -> bool {
+    evidence.lasts(closed, modes, touching, &motion.load)
 }
 
 /// Whether two motions have the same accelerations.

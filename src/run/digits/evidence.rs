@@ -195,7 +195,13 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         })
     }
 
-    fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
+    fn told_later(
+        &self,
+        closed: &[usize],
+        modes: &[FrictionMode],
+        touching: &[usize],
+        load: &[f64],
+    ) -> Option<ContactSigns> {
         let moment = Digits::of(libm::exp2(A_MOMENT) * self.motion.mechanism.structure.units.time);
         let mut later = self.posture.clone();
         for ((phi, omega), &load) in later.phi.iter_mut().zip(&mut later.omega).zip(load) {
@@ -204,7 +210,7 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
             *omega += change;
         }
         let later = Self::at(self.motion, self.t + moment, later, self.rounding.max(LATER));
-        later.told(closed, modes, touching).is_some_and(|told| told.hold(closed, modes, touching))
+        later.told(closed, modes, touching)
     }
 
     fn is_still(&self, place: usize, closed: &[usize], modes: &[FrictionMode], _is_driven: bool) -> bool {

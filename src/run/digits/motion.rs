@@ -342,9 +342,11 @@ impl<const W: usize> DigitsMotion<W> {
     /// The finest step over the time that is not one of ever smaller circles: fractional powers begin and end
     /// at zero by such as only many digits tell apart.
     fn finest(&self) -> f64 {
-        let least =
-            if self.probe.is_some() { -friction::SURE * self.precision.bits as f64 } else { f64::INFINITY };
-        libm::exp2(least.max(-1000.0)).min(FINEST)
+        if self.probe.is_none() {
+            return FINEST;
+        }
+        let least = libm::exp2(-friction::SURE * self.precision.bits as f64);
+        least.clamp(f64::MIN_POSITIVE, FINEST)
     }
 
     /// Expands the state, and tells how long a step its series makes \[s\].

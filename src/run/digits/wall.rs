@@ -279,8 +279,7 @@ fn has_way_back<const W: usize>(
 fn no_way_back<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> StepError {
     let name = &motion.mechanism.walls[wall].0.name;
     let what = format!("the constraints leave a point that meets wall {name} no way back");
-    let hint = DRIVEN;
-    motion.stop(Cause::RestingContact, 0.0, &what, hint)
+    motion.stop(Cause::RestingContact, 0.0, &what, DRIVEN)
 }
 
 /// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap

@@ -359,8 +359,10 @@ impl<'a> Parser<'a> {
             "tanh" => Node::HyperbolicTangent(first),
             "atan2" => return Ok(self.angle(first, last, (start, end))),
             "pow" => Node::Power(first, last),
-            // What is never below zero has no corner there.
-            "abs" if self.formula.range(first)[0] >= 0.0 => return Ok(first),
+            // What branches hold at zero or above has no corner there.
+            "abs" if self.formula.has_condition(first) && self.formula.range(first)[0] >= 0.0 => {
+                return Ok(first);
+            }
             "abs" => Node::Flip(self.condition(first), first),
             "sign" => {
                 let one = self.push(Node::Number(1.0), start, end);

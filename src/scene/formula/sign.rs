@@ -153,7 +153,7 @@ impl Formula {
     }
 
     /// True where branches are chosen in a node.
-    fn has_condition(&self, node: usize) -> bool {
+    pub(super) fn has_condition(&self, node: usize) -> bool {
         matches!(self.nodes[node], Node::Flip(..) | Node::Select(..))
             || self.nodes[node].operands().into_iter().flatten().any(|node| self.has_condition(node))
     }

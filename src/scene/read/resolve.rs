@@ -432,6 +432,7 @@ pub(super) fn fits(
             let unit = if quantity.unit.is_empty() { "a pure number" } else { quantity.unit };
             let hint = match found.is(Dimension::of("")) {
                 true => format!("a number before it gives it the unit: 1*({})", formula.text().trim()),
+                false if quantity.unit.is_empty() => "write it without a unit".to_owned(),
                 false => format!("write it in {unit}; numbers without a unit are in {unit} as well"),
             };
             Err(FormulaError::new(
