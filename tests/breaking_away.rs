@@ -223,3 +223,40 @@ fn a_bar_breaks_away_in_many_digits_at_the_same_time_whatever_their_number() {
         }
     }
 }
+
+/// A box on two floors that shake apart: the friction of the bounces that end at one corner carries its sliding
+/// beyond rest, and the other one still bounces.
+#[cfg(feature = "digits")]
+#[test]
+fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
+    use super::many_digits::{last, source};
+    use driftless::arithmetic::Real;
+    let floor = |name: &str, x: f64, law: &str, mu: f64| {
+        format!(
+            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "law": "{law}", "restitution": 0.8,
+            "line": {{"through": [0, 0], "normal": [0, 1]}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
+        )
+    };
+    let floors = [
+        floor("left", -0.15, "0.0172*sin(8.21*t)", 0.284),
+        floor("right", 0.15, "0.0148*sin(10.83*t)", 0.536),
+    ];
+    let text = format!(
+        r#"{{"name": "box", "gravity": [0, -9.81], "bars": [{{"name": "box", "mass": 1, "centre": [0, 0],
+            "inertia": 0.01, "length": 0.3}}], "walls": [{}, {},
+            {{"name": "side", "body": "box", "point": [0.15, -0.1], "restitution": 0.8,
+            "line": {{"through": [0.5, 0], "normal": [-1, 0]}}, "friction": {{"kinetic": 0.806}}}}],
+        "start": {{"box": {{"phi": 0.02, "omega": 1.57, "origin": [0.19, 0.43], "velocity": [-0.17, 0.07]}}}},
+        "until": 2, "every": 2}}"#,
+        floors[0], floors[1]
+    );
+    let row = last(&source(&text, &[], "2", "2"), 22);
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = done(&text, &adaptive(method, 1e-9));
+        let off = [0, 1].map(|what| {
+            let found = if what == 0 { outcome.last.phi[0] } else { outcome.last.omega[0] };
+            found - row.bodies[0][what].value()
+        });
+        assert!(off.iter().all(|off| off.abs() < 1e-12), "{method}: {off:?}");
+    }
+}

@@ -234,8 +234,17 @@ impl ContactDriver {
 
     /// Finds anew what holds the points that touch, and which places stick; false where that is as before.
     pub(in crate::run) fn settles_anew(&mut self, outcome: &mut Outcome) -> Result<bool, StepError> {
+        self.settles_by(Transition::default(), outcome)
+    }
+
+    /// The same where a place with friction begins to stick or to slide.
+    pub(in crate::run) fn settles_by(
+        &mut self,
+        transition: Transition,
+        outcome: &mut Outcome,
+    ) -> Result<bool, StepError> {
         let before = (self.mechanism.held.clone(), self.mechanism.modes.clone());
-        self.settle(None, None, outcome)?;
+        self.settle_at(None, None, transition, outcome)?;
         Ok(before != (self.mechanism.held.clone(), self.mechanism.modes.clone()))
     }
 
