@@ -260,3 +260,43 @@ fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
         assert!(off.iter().all(|off| off.abs() < 1e-12), "{method}: {off:?}");
     }
 }
+
+/// A box in the corner of a slope, where what holds two of its corners cannot hold them without the third, whose
+/// bounces end: flights beside them would take a million joules off.
+#[cfg(feature = "digits")]
+#[test]
+fn friction_beside_bounces_that_end_takes_energy_off_only() {
+    use super::many_digits::{last, source};
+    use driftless::arithmetic::Real;
+    let slope = [-0.34289780745545134, 0.9393727128473789];
+    let wall = |name: &str, x: f64, through: f64, normal: [f64; 2], [mu, mu0]: [f64; 2]| {
+        format!(
+            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": 0.5,
+            "line": {{"through": [{through}, 0], "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu0}}}}}"#
+        )
+    };
+    let walls = [
+        wall("lower", -0.15, 0.0, slope, [0.162, 0.162]),
+        wall("upper", 0.15, 0.0, slope, [0.348, 0.4524]),
+        wall("top", 0.15, 0.9, [-slope[1], slope[0]], [0.774, 0.774]),
+        wall("bottom", -0.15, -0.9, [slope[1], -slope[0]], [0.144, 0.1872]),
+    ];
+    let text = format!(
+        r#"{{"name": "chute", "gravity": [0, -9.81], "bars": [{{"name": "box", "mass": 1, "centre": [0, 0],
+            "inertia": 0.01, "length": 0.3}}], "walls": [{}],
+        "start": {{"box": {{"phi": 0.35, "omega": -0.79, "origin": [0, 0.29], "velocity": [-0.13, -0.88]}}}},
+        "until": 1.3, "every": 1.3}}"#,
+        walls.join(", ")
+    );
+    let outcome = done(&text, &adaptive(MethodId::Taylor, 1e-11));
+    for digits in [22, 30] {
+        let row = last(&source(&text, &[], "1.3", "1.3"), digits);
+        let lost = row.friction.expect("friction").value();
+        // What friction takes within bounces that are left out counts as lost in impacts there.
+        assert!(
+            (lost - outcome.last.friction).abs() < 1e-5,
+            "{digits}: {lost} J, {} J",
+            outcome.last.friction
+        );
+    }
+}

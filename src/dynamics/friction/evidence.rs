@@ -65,6 +65,11 @@ pub trait Evidence {
         load: &[f64],
     ) -> Option<ContactSigns>;
 
+    /// False where contacts would have to pull, or what sticks is beyond its limit.
+    fn hold_so(&self, closed: &[usize], modes: &[FrictionMode]) -> bool {
+        self.told(closed, modes, &[]).is_some_and(|told| told.hold(closed, modes, &[]))
+    }
+
     /// False where contacts would have to pull a moment later, or what sticks is beyond its limit.
     fn lasts(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize], load: &[f64]) -> bool {
         let later = self.told_later(closed, modes, touching, load);
@@ -99,6 +104,11 @@ impl Mechanism {
         let phi = phi.iter().zip(omega).zip(load).map(moved).collect();
         let omega = omega.iter().zip(load).map(|(omega, a)| omega + h * a).collect();
         (t + h, [phi, omega])
+    }
+
+    /// [`Evidence::hold_so`] in doubles.
+    pub(crate) fn hold_so(&self, at: FrictionMoment, closed: &[usize], modes: &[FrictionMode]) -> bool {
+        InDoubles { mechanism: self, at }.hold_so(closed, modes)
     }
 
     /// The relative velocity \[rad/s, m/s\] of every place, zero where it is rounding.

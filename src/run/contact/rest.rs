@@ -21,7 +21,7 @@ use super::{ContactDriver, NO_SPEED};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::contact::metric::MetricRow;
-use crate::dynamics::friction::{FrictionMode, Normal};
+use crate::dynamics::friction::{FrictionMode, FrictionMoment, Normal};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
 
@@ -80,7 +80,10 @@ impl Flight {
             MetricRow::of(&wall.row, motion.time, ConstraintArguments { phi: &phi, z: &z, omega: &omega });
         let inward = -(dot(&along, &course.accelerations) + row.convective);
         let last = 2.0 * speed / (inward * (1.0 - wall.restitution));
-        (inward > 0.0 && last.is_finite()).then_some(Self { contact, last, course })
+        // Others at their limits may not share the load without it.
+        let at = FrictionMoment { t: motion.time, phi: &phi, z: &z, omega: &omega };
+        let is_motion = inward > 0.0 && last.is_finite() && held.hold_so(at, &others, &modes);
+        is_motion.then_some(Self { contact, last, course })
     }
 }
 

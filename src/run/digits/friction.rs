@@ -14,6 +14,7 @@ use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::compile::exact::Acting;
+use crate::dynamics::friction::evidence::Evidence;
 use crate::dynamics::friction::paradox::HINT;
 use crate::dynamics::friction::{self, FrictionMode, FrictionMoment, Normal, Transition};
 use crate::dynamics::kernel::dot;
@@ -219,7 +220,9 @@ impl<const W: usize> DigitsMotion<W> {
         let series = evidence.series(&mechanism);
         let inward = -second(&series, self.state.t, &mechanism.walls[wall].0);
         let last = speed.scale(2.0) / (inward * (Digits::ONE - restitution));
-        (inward > Digits::ZERO).then_some((last, series))
+        // Others at their limits may not share the load without it.
+        let is_motion = inward > Digits::ZERO && evidence.hold_so(&others, &modes);
+        is_motion.then_some((last, series))
     }
 
     /// What flights change while bounces last, beside what is so where these walls hold their points at once.
