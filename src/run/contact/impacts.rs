@@ -175,7 +175,7 @@ impl ContactDriver {
     }
 
     /// The same where a place with friction begins to stick or to slide.
-    pub(in crate::run) fn settle_at(
+    fn settle_at(
         &mut self,
         struck: Option<usize>,
         released: Option<usize>,
