@@ -117,9 +117,14 @@ impl Pencil<'_> {
         }
         let words = format!("{length} m");
         let wide = (length * scale).max(self.sheet.width(&words, CAPTION, false));
-        let corners = [left + 8.0, right - 8.0 - wide].map(|x| [x, bottom - 22.0, x + wide, bottom - 6.0]);
-        let [first, second] = corners.map(|bounds| occupied.cost(bounds));
-        let bounds = if first <= second { corners[0] } else { corners[1] };
+        // A corner where one is free, else a place between them.
+        let (first, last) = (left + 8.0, right - 8.0 - wide);
+        let places = [0.0, 1.0, 0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875]
+            .map(|share| first + share * (last - first).max(0.0))
+            .map(|x| [x, bottom - 22.0, x + wide, bottom - 6.0]);
+        let cost = |bounds: &&[f64; 4]| occupied.cost(**bounds);
+        let cheapest = places.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        let bounds = cheapest.copied().unwrap_or(places[0]);
         occupied.block(bounds);
         let (middle, y) = (0.5 * (bounds[0] + bounds[2]), bounds[3] - 2.0);
         let [from, to] = [-0.5, 0.5].map(|share| middle + share * length * scale);

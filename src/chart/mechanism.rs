@@ -6,7 +6,7 @@ use super::grid::AIR;
 use super::labels::Occupied;
 use super::panel::{Panel, WrittenParts, left_room, pale};
 use super::sheet::{EDGE, Sheet};
-use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
+use super::sketch::{Pencil, Pose, Sketch, sides_of_supports, symbol_size, trail_colour};
 use super::view::View;
 use super::{ChartError, PAGE};
 
@@ -70,7 +70,9 @@ pub fn mechanism(chart: &MechanismChart, px_per_pt: f64) -> Result<Picture, Char
 
     let mut occupied = Occupied::default();
     let size = poses.last().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));
-    let pencil = Pencil { sheet: &sheet, panel: &panel, view, size };
+    let shown = poses.last().map_or(&[][..], std::slice::from_ref);
+    let sides = sides_of_supports(&chart.sketch, shown, &view);
+    let pencil = Pencil { sheet: &sheet, panel: &panel, view, size, sides };
     if let Some((last, before)) = poses.split_last() {
         for (k, pose) in before.iter().enumerate() {
             pencil.ghost(pose, 1.0 - k as f64 / before.len() as f64)?;

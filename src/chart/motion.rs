@@ -8,7 +8,7 @@ use super::labels::Occupied;
 use super::palette::{GREY, GRID};
 use super::panel::{Panel, pale};
 use super::sheet::{CAPTION, EDGE, Pen, Sheet};
-use super::sketch::{Pencil, Pose, Sketch, symbol_size, trail_colour};
+use super::sketch::{Pencil, Pose, Sketch, sides_of_supports, symbol_size, trail_colour};
 use super::text::{Align, Lettering, TextLevel};
 use super::ticks::decimal;
 use super::view::View;
@@ -125,9 +125,13 @@ fn animated(
         &Pen::new(GRID, 0.75),
     )?;
     let size = 0.8 * chart.poses.first().map_or(1.0, |pose| symbol_size(pose, view.scale(width)));
-    let pencil = Pencil { sheet: &sheet, panel: &panel, view, size };
+    let sides = sides_of_supports(&chart.sketch, &chart.poses, &view);
+    let pencil = Pencil { sheet: &sheet, panel: &panel, view, size, sides };
     let mut occupied = Occupied::default();
     pencil.walls(&chart.sketch.walls, &mut occupied)?;
+    if let Some(pose) = chart.poses.first() {
+        pencil.block_supports(&chart.sketch, pose, &mut occupied);
+    }
     pencil.compass(&mut occupied)?;
     pencil.scale_bar(&mut occupied)?;
     let background = sheet.pixels();

@@ -1,6 +1,7 @@
 //! The drawing of a mechanism in a pose: bars, hinges, ground, springs, motors, walls, trails.
 
 mod parts;
+mod supports;
 
 use super::ChartError;
 use super::labels::Occupied;
@@ -12,6 +13,8 @@ use super::panel::Panel;
 use super::sheet::{NAME, Pen, Sheet};
 use super::text::{Align, Lettering, TextLevel};
 use super::view::View;
+
+pub(crate) use supports::sides_of_supports;
 
 /// What does not change while a mechanism moves.
 #[derive(Clone, Debug, Default)]
@@ -116,6 +119,8 @@ pub(crate) struct Pencil<'a> {
     pub view: View,
     /// Size of symbols, 1 for bars of usual length on the page.
     pub size: f64,
+    /// For each hinge, the direction on the page in which its support lies.
+    pub sides: Vec<Point>,
 }
 
 pub(crate) fn trail_colour(k: usize) -> Colour {
@@ -222,26 +227,7 @@ impl Pencil<'_> {
         occupied: &mut Occupied,
     ) -> Result<(), ChartError> {
         let size = self.size;
-        for (_, &at) in
-            sketch.hinges.iter().zip(&pose.hinges).filter(|(hinge, at)| hinge.ground && finite(&[**at]))
-        {
-            let [x, y] = self.at(at);
-            let (half, height) = (6.5 * size, 10.0 * size);
-            self.sheet
-                .polygon(&[[x, y], [x - half, y - height], [x + half, y - height]], mix(SPINE, WHITE, 0.7))?;
-            self.sheet.line(
-                &[[x - half, y - height], [x, y], [x + half, y - height]],
-                &Pen::new(INK, 0.9 * size),
-            )?;
-            self.hatched(
-                [x - 1.8 * half, y - height],
-                [x + 1.8 * half, y - height],
-                [0.0, -1.0],
-                3.6 * size,
-                4.4 * size,
-            )?;
-            occupied.block([x - 1.8 * half, y - height - 5.0 * size, x + 1.8 * half + 3.0, y - 2.0]);
-        }
+        self.supports(sketch, pose, occupied)?;
         self.blocks(&pose.sliders, occupied)?;
         let bars = pose.arms.iter().copied().chain(pose.bars.iter().copied().enumerate());
         for (k, bar) in bars.filter(|(_, bar)| finite(&bar[..])) {

@@ -199,6 +199,12 @@ function palette() {
   return { ink: colour("ink"), grey: colour("grey"), grid: colour("grid"), paper: colour("paper"), pale: colour("pale"), panel: colour("panel") };
 }
 
+/** The side of a support from the sum of the directions of the bars attached to it, and their number: as in charts. */
+function sideOfSupport([x, y, count]) {
+  if (!(Math.hypot(x, y) > 0.2 * count)) return [0, -1];
+  return Math.abs(x) > 1.001 * Math.abs(y) ? [-Math.sign(x), 0] : [0, -Math.sign(y)];
+}
+
 /** Draws mechanisms on a canvas: gravity points down, a metre is as long to the right as it is upwards. */
 class Stage {
   constructor(canvas, runs) {
@@ -219,8 +225,11 @@ class Stage {
     const box = [Infinity, -Infinity, Infinity, -Infinity];
     for (const run of this.runs) {
       const stride = Math.max(1, Math.floor(run.t.length / 400));
+      const sides = run.geometry.hinges.map(() => [0, 0, 0]);
       for (let row = 0; row < run.t.length; row += stride) {
-        for (const point of drawnPoints(run.geometry, run.motion.atRow(row))) {
+        const pose = run.motion.atRow(row);
+        run.geometry.hinges.forEach((hinge, k) => hinge.ground && this.addAttached(sides[k], run.geometry, located(hinge.at, pose), pose));
+        for (const point of drawnPoints(run.geometry, pose)) {
           const [u, h] = this.rotated(point);
           box[0] = Math.min(box[0], u);
           box[1] = Math.max(box[1], u);
@@ -228,10 +237,29 @@ class Stage {
           box[3] = Math.max(box[3], h);
         }
       }
+      run.sides = sides.map(sideOfSupport);
     }
     const size = Math.max(box[1] - box[0], box[3] - box[2]);
     const air = size > 0 && Number.isFinite(size) ? 0.08 * size : 1;
     this.box = Number.isFinite(size) ? [box[0] - air, box[1] + air, box[2] - air, box[3] + air] : [-1, 1, -1, 1];
+  }
+
+  /** Adds the directions on the canvas from a hinge to the middles of the bars that go through it, and their number. */
+  addAttached(sum, geometry, hinge, pose) {
+    const bars = [...geometry.bodies.map(({ ends }, k) => [k, ends]), ...geometry.arms];
+    for (const [body, ends] of bars) {
+      const [from, to] = barEnds(body, ends, pose);
+      const along = [to[0] - from[0], to[1] - from[1]], there = [hinge[0] - from[0], hinge[1] - from[1]];
+      const length = Math.hypot(...along);
+      const share = Math.min(1, Math.max(0, (there[0] * along[0] + there[1] * along[1]) / length ** 2));
+      const apart = Math.hypot(there[0] - share * along[0], there[1] - share * along[1]);
+      const middle = [0.5 * along[0] - there[0], 0.5 * along[1] - there[1]];
+      if (!(apart < 1e-3 * length && Math.hypot(...middle) > 1e-3 * length)) continue;
+      const [x, y] = this.direction(middle);
+      sum[0] += x;
+      sum[1] += y;
+      sum[2] += 1;
+    }
   }
 
   rotated([x, y]) {
@@ -330,7 +358,7 @@ class Stage {
       const run = this.runs[k];
       const tint = this.runs.length > 1 ? seriesColour(k) : null;
       if (withTrails) this.trails(run, t, tint);
-      this.mechanism(run.geometry, run.motion.at(t), tint, k > 0);
+      this.mechanism(run, run.motion.at(t), tint, k > 0);
     }
     const { horizon } = this.runs[0];
     if (horizon !== null && t > horizon) {
@@ -395,14 +423,14 @@ class Stage {
   }
 
   /** In full, or as a ghost: bars alone, in one colour. */
-  mechanism(geometry, pose, tint, isGhost) {
+  mechanism({ geometry, sides }, pose, tint, isGhost) {
     const { size, colours } = this;
     if (isGhost) {
       geometry.bodies.forEach((body, k) => this.line(barEnds(k, body.ends, pose).map((end) => this.at(end)), tint, 2.2 * size));
       return;
     }
     const place = (where) => this.at(located(where, pose));
-    for (const hinge of geometry.hinges) if (hinge.ground) this.support(place(hinge.at));
+    geometry.hinges.forEach((hinge, k) => hinge.ground && this.support(place(hinge.at), sides[k]));
     for (const slider of geometry.sliders) this.slider(slider, pose);
     const bar = (body, ends) => {
       const [from, to] = barEnds(body, ends, pose).map((end) => this.at(end));
@@ -421,10 +449,11 @@ class Stage {
     }
   }
 
-  support([x, y]) {
+  support(foot, side) {
     const half = 8 * this.size, height = 12 * this.size;
-    this.line([[x, y], [x - half, y - height], [x + half, y - height], [x, y]], this.colours.ink, 1.2);
-    this.hatched([x - 1.7 * half, y - height], [x + 1.7 * half, y - height], [0, -1], 5 * this.size, 6 * this.size);
+    const on = (along, away) => [foot[0] - along * side[1] + away * side[0], foot[1] + along * side[0] + away * side[1]];
+    this.line([foot, on(-half, height), on(half, height), foot], this.colours.ink, 1.2);
+    this.hatched(on(-1.7 * half, height), on(1.7 * half, height), side, 5 * this.size, 6 * this.size);
   }
 
   slider(slider, pose) {
