@@ -4,7 +4,7 @@ use super::error::SceneError;
 use super::locate::{Located, Member, Text, Texts, Value, push_index, push_key};
 use super::number;
 use super::read::nearest;
-use super::template::{is_number, whole};
+use super::template::{ShortNameError, is_number, whole};
 use std::str::FromStr;
 
 /// One value of a scene set from outside, as `PATH=VALUE`.
@@ -115,17 +115,15 @@ pub(super) fn put(
 ) -> Result<(), SceneError> {
     let path = match whole(&set.path, tree) {
         Ok(path) => path,
-        Err(hint) if hint.starts_with(SEVERAL) => {
-            return Err(source.refusal(
-                value.span,
-                &set.path,
-                "is ambiguous",
-                "must mean one value of the scene",
-                &hint,
-            ));
+        Err(ShortNameError::Several(hint)) => {
+            let allowed = "must mean one value of the scene";
+            return Err(source.refusal(value.span, &set.path, "is ambiguous", allowed, &hint));
+        }
+        Err(ShortNameError::NoKey { keys, hint, .. }) => {
+            return Err(source.refusal(value.span, &set.path, "is not a known key", &keys, &hint));
         }
         // The walk along the path says what is wrong with it.
-        Err(_) => set.path.clone(),
+        Err(ShortNameError::Unknown(_)) => set.path.clone(),
     };
     let typed = if let Value::Text(text) = &value.value { number(text) } else { None };
     let span = value.span;
@@ -135,9 +133,6 @@ pub(super) fn put(
         None => Ok(()),
     }
 }
-
-/// How a hint at several things of one name begins.
-pub(super) const SEVERAL: &str = "several things are called";
 
 /// Puts `value` into `tree` at a whole path.
 fn place(source: &Texts, tree: &mut Located, path: &str, value: Located) -> Result<(), SceneError> {

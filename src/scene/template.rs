@@ -10,11 +10,11 @@ mod walk;
 pub(super) use walk::FormatWalk;
 
 use super::error::SceneError;
-use super::format::{LAW, SCENE, START};
+use super::format::{FieldShape, KeyTable, LAW, SCENE, START, TRAVEL_LAW, kind};
 use super::formula::Formula;
 use super::locate::{Located, Value};
-use super::read::{parse_scene, put_together, read_text, source_name};
-use super::set::{Override, SEVERAL, hint, name};
+use super::read::{listed, nearest, parse_scene, put_together, read_text, source_name};
+use super::set::{Override, hint, name};
 use super::{Output, Scene};
 use std::path::Path;
 
@@ -156,8 +156,10 @@ impl Template {
             )
         };
         let allowed = "must be a path to a number, as start.bar1.phi or springs.spring.stiffness";
-        let path =
-            whole(name, &tree).map_err(|hint| refused("nothing has that name".into(), allowed, hint))?;
+        let path = whole(name, &tree).map_err(|error| {
+            let (problem, hint) = error.in_words();
+            refused(problem.unwrap_or_else(|| "nothing has that name".into()), allowed, hint)
+        })?;
         let unit = FormatWalk { tree: &tree }
             .unit(&path)
             .map_err(|(problem, hint)| refused(problem, allowed, hint))?;
@@ -206,8 +208,67 @@ impl Template {
     }
 }
 
-/// A short name written out; else a hint at what is near.
-pub(super) fn whole(short: &str, tree: &Located) -> Result<String, String> {
+/// Why a short name cannot be written out.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum ShortNameError {
+    /// Nothing has that name; a hint.
+    Unknown(String),
+    /// Several parts have it; a hint.
+    Several(String),
+    /// The part has no such key, and neither has what its short names may leave out.
+    NoKey {
+        /// What has no such key.
+        problem: String,
+        /// What the keys are.
+        keys: String,
+        /// The nearest of them, or all.
+        hint: String,
+    },
+}
+
+impl ShortNameError {
+    /// What is wrong, where more than the hint is known, and the hint.
+    fn in_words(self) -> (Option<String>, String) {
+        match self {
+            Self::Unknown(hint) | Self::Several(hint) => (None, hint),
+            Self::NoKey { problem, hint, .. } => (Some(problem), hint),
+        }
+    }
+}
+
+/// The table that the short names of the elements of a list may leave out, with what it is called.
+fn left_out(list: &str, table: &KeyTable) -> Option<(&'static str, &'static KeyTable)> {
+    match list {
+        "bars" => Some(("its start", &START)),
+        "motors" if table.field("slider").is_some() => Some(("its law", &TRAVEL_LAW)),
+        "motors" => Some(("its law", &LAW)),
+        _ => None,
+    }
+}
+
+/// Refuses a short name whose key neither the part nor what may be left out has.
+fn judged(list: &str, node: &Located, key: &str) -> Result<(), ShortNameError> {
+    let Some(FieldShape::List { of, .. }) = SCENE.field(list).map(|field| &field.shape) else {
+        return Ok(());
+    };
+    let Some(table) = kind(of, |key| member(node, key).is_some()) else { return Ok(()) };
+    let Some((what, inner)) = left_out(list, table) else { return Ok(()) };
+    if inner.field(key).is_some() || of.iter().any(|table| table.field(key).is_some()) {
+        return Ok(());
+    }
+    let known: Vec<&str> = table.fields.iter().chain(inner.fields).map(|field| field.name).collect();
+    Err(ShortNameError::NoKey {
+        problem: format!("{} has no `{key}`", table.title),
+        keys: format!("{} has the keys {}, and {what} {}", table.title, table.keys(), inner.keys()),
+        hint: match nearest(key, known.iter().copied()) {
+            Some(near) => format!("did you mean `{near}`?"),
+            None => format!("there are: {}", listed(&known)),
+        },
+    })
+}
+
+/// A short name written out; else what is wrong with it.
+pub(super) fn whole(short: &str, tree: &Located) -> Result<String, ShortNameError> {
     let first = short.split(['.', '[']).next().unwrap_or("");
     if SCENE.field(first).is_some() {
         return Ok(short.to_owned());
@@ -217,14 +278,15 @@ pub(super) fn whole(short: &str, tree: &Located) -> Result<String, String> {
         return Ok(format!("parameters.{first}"));
     }
     if rest.is_empty() {
-        return Err("go on with a key, as in bar1.phi".to_owned());
+        return Err(ShortNameError::Unknown("go on with a key, as in bar1.phi".to_owned()));
     }
-    let mut found = Vec::new();
+    let (mut found, mut nodes_found) = (Vec::new(), Vec::new());
     let mut known = Vec::new();
     for list in LISTS {
         let Some(Value::List(nodes)) = member(tree, list).map(|node| &node.value) else { continue };
         known.extend(nodes.iter().filter_map(name));
-        if nodes.iter().any(|node| name(node) == Some(first)) {
+        if let Some(node) = nodes.iter().find(|node| name(node) == Some(first)) {
+            nodes_found.push((list, node));
             found.push(match list {
                 "bars" if START.field(rest.split('[').next().unwrap_or("")).is_some() => {
                     format!("start.{first}.{rest}")
@@ -235,12 +297,19 @@ pub(super) fn whole(short: &str, tree: &Located) -> Result<String, String> {
         }
     }
     match &found[..] {
-        [only] => Ok(only.clone()),
+        [only] => {
+            let key = rest.split(['.', '[']).next().unwrap_or("");
+            nodes_found.iter().try_for_each(|(list, node)| judged(list, node, key))?;
+            Ok(only.clone())
+        }
         [] => {
             known.extend(SCENE.fields.iter().map(|field| field.name));
-            Err(hint(first, &known))
+            Err(ShortNameError::Unknown(hint(first, &known)))
         }
-        several => Err(format!("{SEVERAL} {first}; write {}", several.join(" or "))),
+        several => Err(ShortNameError::Several(format!(
+            "several things are called {first}; write {}",
+            several.join(" or ")
+        ))),
     }
 }
 
@@ -295,6 +364,10 @@ mod tests {
             ("free", "start.bar1.phy", "`phi`"),
             ("free", "start.bar1", "phi, omega"),
             ("free", "bra1.phi", "`bar1`"),
+            ("free", "bar1.phii", "did you mean `phi`?"),
+            ("free", "bar1.foo", "inertia, phi, omega, origin, velocity"),
+            ("motor", "motor.rat", "did you mean `rate`?"),
+            ("motor", "motor.foo", "law, start, rate, acceleration, sines"),
             ("free", "bars.bar1.desity", "`density`"),
             ("free", "bars[2].length", "there are 2"),
             ("free", "gravity", "gravity[0]"),

@@ -52,8 +52,20 @@ impl fmt::Display for FormulaError {
     }
 }
 
-/// A hint at the nearest of the known names.
+/// A hint at the nearest of the known names: of a known part, at what it has.
 pub(crate) fn meant(name: &str, known: &[&str]) -> String {
+    if let Some((part, quantity)) = name.rsplit_once('.') {
+        let quantities: Vec<&str> = (known.iter())
+            .filter_map(|known| known.rsplit_once('.').filter(|(other, _)| *other == part))
+            .map(|(_, quantity)| quantity)
+            .collect();
+        if !quantities.is_empty() {
+            return match crate::scene::read::nearest(quantity, quantities.iter().copied()) {
+                Some(near) => format!("did you mean {part}.{near}?"),
+                None => format!("{part} has {}", quantities.join(", ")),
+            };
+        }
+    }
     match crate::scene::read::nearest(name, known.iter().copied()) {
         Some(near) => format!("did you mean {near}?"),
         None if known.is_empty() => "nothing has a name here".into(),
