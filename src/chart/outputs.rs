@@ -41,6 +41,9 @@ pub struct OutputsChart {
     pub over: Option<[String; 2]>,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
+    /// The time from which on the values choose the ranges of the upright axes; what leaves them before is cut
+    /// at the frame \[s\].
+    pub settled_from: Option<f64>,
 }
 
 /// An output and what is drawn of it.
@@ -101,7 +104,13 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
                 named(chart.quantity.as_deref().unwrap_or_else(|| quantity(unit, &names)), unit)
             }
         };
-        Axis::fit(&name, lines.iter().flat_map(|one| &one.1).map(|p| p[1]))
+        let points = || lines.iter().flat_map(|one| &one.1);
+        match chart.settled_from {
+            None => Axis::fit(&name, points().map(|p| p[1])),
+            Some(from) => {
+                Axis::fit(&name, settled(points().filter(|p| p[0] >= from).map(|p| p[1])).into_iter())
+            }
+        }
     };
     let mut caption = chart.caption.clone();
     if chart.outputs.iter().any(|output| !output.extremes.is_empty()) {
@@ -168,6 +177,14 @@ fn extremes(
         panel.note_beside(panel.at([t, value]), &note, readable(mark(output).colour), occupied)?;
     }
     Ok(())
+}
+
+/// The ends of settled values with a fifth of their range of air, in which is seen how they settle.
+fn settled(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    let ends = |[low, high]: [f64; 2], value: f64| [low.min(value), high.max(value)];
+    let [low, high] = values.filter(|value| value.is_finite()).fold([f64::INFINITY, f64::NEG_INFINITY], ends);
+    let air = 0.2 * (high - low);
+    [low - air, high + air]
 }
 
 /// What outputs of a unit are.

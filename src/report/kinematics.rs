@@ -237,6 +237,7 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
         quantity: None,
         over: Some([plain(&found.drive), found.unit.to_owned()]),
         horizon: None,
+        settled_from: None,
     };
     Ok(vec![
         ("mechanism", chart::mechanism(&mechanism, FILE_RESOLUTION)?),

@@ -134,6 +134,19 @@ pub fn magnitude(x: f64) -> String {
     }
 }
 
+/// A number and its uncertainty with the same decimals, as far as two digits of the uncertainty reach:
+/// `1.15` and `0.24`.
+pub fn with_uncertainty(x: f64, uncertainty: f64) -> [String; 2] {
+    let size = uncertainty.abs();
+    if !(1e-9..1e6).contains(&size) || !(x.abs() < 1e6) {
+        return [figure(x), magnitude(uncertainty)];
+    }
+    let decimals = (1 - size.log10().floor() as i32).clamp(0, 9) as usize;
+    // No sign before a zero.
+    let x = if x.abs() < 0.5 * 10_f64.powi(-(decimals as i32)) { 0.0 } else { x };
+    [format!("{x:.decimals$}"), format!("{uncertainty:.decimals$}")]
+}
+
 fn not_finite(x: f64) -> &'static str {
     match x {
         f64::INFINITY => "infinite",
@@ -165,6 +178,21 @@ mod tests {
             (magnitude(2.14e-13), rough(10.4609), rough(10_000.0)),
             ("2.1e-13".into(), "10.5".into(), "10000".into())
         );
+    }
+
+    #[test]
+    fn a_number_has_the_decimals_of_its_uncertainty() {
+        for (x, uncertainty, shown) in [
+            (1.153, 0.24, ["1.15", "0.24"]),
+            (1.153, 0.0024, ["1.1530", "0.0024"]),
+            (-0.000_01, 0.03, ["0.000", "0.030"]),
+            (153.2, 12.4, ["153", "12"]),
+            (2.0, 0.0, ["2", "0"]),
+            (2.0, 3e-14, ["2", "3.0e-14"]),
+            (2.0, f64::INFINITY, ["2", "infinite"]),
+        ] {
+            assert_eq!(with_uncertainty(x, uncertainty), shown);
+        }
     }
 
     #[test]

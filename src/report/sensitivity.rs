@@ -1,6 +1,6 @@
 //! Sensitivities and Lyapunov spectra as pages, JSON objects, tables and charts.
 
-use super::page::{Page, counted, figure, magnitude, rough};
+use super::page::{Page, counted, figure, magnitude, rough, with_uncertainty};
 #[cfg(feature = "charts")]
 use crate::chart::{
     self, Band, Bands, BarGroup, Bars, ChartError, FILE_RESOLUTION, OutputSeries, OutputsChart, Picture,
@@ -275,7 +275,10 @@ pub fn spectrum_text(found: &Spectrum) -> String {
     page.entry("motion", &regime);
     page.entry("integrated", &format!("{} s", figure(found.until)));
     let rows: Vec<Vec<String>> = (found.exponents.iter().zip(&found.errors).enumerate())
-        .map(|(k, (exponent, error))| vec![(k + 1).to_string(), figure(*exponent), rough(*error)])
+        .map(|(k, (exponent, error))| {
+            let [exponent, error] = with_uncertainty(*exponent, *error);
+            vec![(k + 1).to_string(), exponent, error]
+        })
         .collect();
     page.table(&["exponent", "[1/s]", "± [1/s]"], &rows);
     page.entry(
@@ -327,11 +330,12 @@ pub fn spectrum_charts(found: &Spectrum) -> Result<Charts, ChartError> {
         title: "Lyapunov exponents".into(),
         caption: vec![
             format!("scene {}", plain(&found.scene.name)),
-            "means from the start on".to_owned(),
+            "means from the start on, scaled to their second half".to_owned(),
             format!("their sum {} 1/s", magnitude(found.sum)),
         ],
         outputs: (0..found.exponents.len()).map(series).collect(),
         quantity: Some("exponent".to_owned()),
+        settled_from: found.rows.last().map(|row| 0.5 * row.0),
         ..OutputsChart::default()
     };
     Ok(vec![("lyapunov", chart::outputs(&chart, FILE_RESOLUTION)?)])

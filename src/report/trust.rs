@@ -1,6 +1,6 @@
 //! How far a run may be trusted, in numbers and in words.
 
-use super::page::{Page, magnitude, rough};
+use super::page::{Page, magnitude, rough, with_uncertainty};
 use crate::dynamics::Mechanism;
 use crate::run::Outcome;
 use crate::run::trust::{HORIZON, How, LOST, Trust};
@@ -116,7 +116,7 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));
     }
     if let Some(found) = trust.lyapunov {
-        let (exponent, uncertainty) = (rough(found.exponent), magnitude(found.uncertainty));
+        let [exponent, uncertainty] = with_uncertainty(found.exponent, found.uncertainty);
         page.entry(
             "lyapunov",
             &format!("largest exponent {exponent} ± {uncertainty} per s, over {} s", rough(found.until)),

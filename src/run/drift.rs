@@ -9,6 +9,7 @@ use super::plan::Plan;
 use super::sample::Sample;
 use crate::arithmetic::sum::larger;
 use crate::dynamics::Mechanism;
+use crate::scene::about;
 
 /// Intervals the horizon is divided into.
 const INTERVALS: usize = 64;
@@ -148,14 +149,18 @@ impl Limits {
             let explained =
                 if self.energy.is_none() && limit < ENERGY_MOST { " of errors at the tolerance" } else { "" };
             let limit = if explained.is_empty() { format!("{limit:e}") } else { format!("{limit:.1e}") };
-            return Err(format!("{kind} is off by {off:.2e} of the scale, the limit{explained} is {limit}"));
+            return Err(format!(
+                "{kind} is off by {} of the scale, the limit{explained} is {limit}",
+                about(off)
+            ));
         }
         for (name, left, unit) in constraints {
             let (most, levels) = self.constraint.map_or((POSITION_MOST * unit, 1), |limit| (limit, 2));
             for (left, level) in left.into_iter().zip(["position", "velocity"]).take(levels) {
                 if beyond(left, most) {
                     return Err(format!(
-                        "constraint {name} is violated by {left:.2e} at {level} level, the limit is {most:e}"
+                        "constraint {name} is violated by {} at {level} level, the limit is {most:e}",
+                        about(left)
                     ));
                 }
             }

@@ -8,6 +8,7 @@
 use super::contact::tighter;
 use super::impact_monitor::{gap, gap_rate};
 use crate::dynamics::{BodyAngles, Mechanism};
+use crate::scene::about;
 use crate::stepping::search::golden_sections;
 use crate::stepping::{Cause, StepError};
 
@@ -150,8 +151,8 @@ impl PassedWall {
     pub fn stop(self, method: &str) -> StepError {
         let Self { t, wall, gap, is_held } = self;
         let what = match is_held {
-            true => format!("a point that is held at wall {wall} is {gap:.3e} m from it"),
-            false => format!("a point is {:.3e} m behind wall {wall} and no impact was found", -gap),
+            true => format!("a point that is held at wall {wall} is {} m from it", about(gap)),
+            false => format!("a point is {} m behind wall {wall} and no impact was found", about(-gap)),
         };
         let hint = tighter(method).into();
         StepError { cause: Cause::WallPassed, method: method.into(), t, step: 0.0, what, hint }

@@ -75,6 +75,7 @@ impl Finished<'_> {
             caption: self.caption(more).into_iter().chain(past).collect(),
             outputs,
             horizon,
+            settled_from: None,
         }
     }
 }

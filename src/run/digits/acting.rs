@@ -19,6 +19,7 @@ use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::CompileError;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::dynamics::series::Series;
+use crate::scene::about;
 use crate::stepping::{Cause, StepError};
 
 /// Part of the digits in which the laws of motors agree on both sides of a corner.
@@ -98,7 +99,8 @@ impl<const W: usize> DigitsMotion<W> {
             {
                 let does = if was_off { "switches on" } else { "moves" };
                 let (name, by) = (&row.name, -gap.value());
-                let what = format!("an event {does} wall {name}, behind which its point is by {by:.3e} m");
+                let what =
+                    format!("an event {does} wall {name}, behind which its point is by {} m", about(by));
                 let hint = "let the event be while the point is in front of it";
                 return Err(unsuited(self, &what, hint));
             }
@@ -193,7 +195,8 @@ impl<const W: usize> DigitsMotion<W> {
             let row = &self.mechanism.structure.constraints[r];
             let (off, unit) = (residuals[r].value(), if row.is_in_radians() { 1.0 } else { size });
             if off.is_nan() || off.abs() > MEETS * unit {
-                let what = format!("an event closes {}, which is off by {off:.3e} {}", row.name, row.unit());
+                let off = about(off);
+                let what = format!("an event closes {}, which is off by {off} {}", row.name, row.unit());
                 return Err(self.stop(Cause::Unsuited, 0.0, &what, "let the event be where it meets"));
             }
         }

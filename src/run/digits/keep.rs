@@ -15,6 +15,7 @@ use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::{schur, tree};
+use crate::scene::about;
 use crate::stepping::{Cause, StepError};
 
 /// Newton iterations at most.
@@ -88,7 +89,7 @@ impl<const W: usize> DigitsKeeper<W> {
                 }
             }
             if size > 0.5 * self.rounding {
-                let what = format!("the start is off its constraints by {:.3e}", libm::exp2(size));
+                let what = format!("the start is off its constraints by {}", about(libm::exp2(size)));
                 let hint = "give fewer of its angles and rates, or such as fit";
                 return Err(stop(0.0, what, hint));
             }

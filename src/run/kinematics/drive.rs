@@ -3,7 +3,7 @@
 use crate::arithmetic::Complex;
 use crate::dynamics::compile::CompileError;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::scene::{self, Law, Motor, Scene};
+use crate::scene::{self, Law, Motor, Scene, about};
 use std::f64::consts::TAU;
 use std::str::FromStr;
 use std::sync::Arc;
@@ -84,7 +84,7 @@ pub enum KinematicsError {
         left: usize,
     },
     /// The start does not fit.
-    #[error("constraint `{row}` is off by {left:.3e} at the start of the range")]
+    #[error("constraint `{row}` is off by {} at the start of the range", about(*left))]
     Start {
         /// The row.
         row: String,

@@ -10,6 +10,7 @@ use crate::run::allowance::{Allowance, AllowanceMoment, EnergyLimit};
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip;
 use crate::run::plan::Plan;
+use crate::scene::about;
 use crate::stepping::taylor::batch::{BatchMember, TakenStep, read};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
@@ -125,8 +126,10 @@ impl Lane {
                 Some(stop(Cause::NotFinite, what, "look for rates far out of proportion"))
             }
             None if point.energy > limit => {
-                let what =
-                    format!("energy is off by {:.2e} of the scale, the limit is {limit:.1e}", point.energy);
+                let what = format!(
+                    "energy is off by {} of the scale, the limit is {limit:.1e}",
+                    about(point.energy)
+                );
                 Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
             }
             None => None,

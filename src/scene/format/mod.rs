@@ -239,7 +239,7 @@ impl QuantityRange {
 }
 
 /// A number to four digits, for what is measured rather than given.
-pub(super) fn about(number: f64) -> String {
+pub(crate) fn about(number: f64) -> String {
     plain(format!("{number:.3e}").parse().unwrap_or(number))
 }
 
