@@ -196,6 +196,7 @@ impl Mechanism {
         if let Some(next) = mechanism.on_branches_after(&start, true)? {
             mechanism = next;
         }
+        mechanism.check_forces(scene, &start)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&start);
         mechanism.scale_contacts(&start);
         mechanism.units = Units::new(&mechanism, scene, &start);

@@ -3,7 +3,9 @@
 //! Written over the scalar trait and used in double-double by the monitors: at 1e-15 of the scale an energy
 //! evaluated in plain doubles shows its own rounding.
 
+use super::compile::CompileError;
 use super::constraint::ConstraintArguments;
+use super::force::UserForce;
 use super::force::action::Applied;
 use super::kernel::{Kernel, dot};
 use super::{Mechanism, Motion, Time, tree};
@@ -62,6 +64,22 @@ impl Mechanism {
             force.magnitudes(start.time.hi, ConstraintArguments { phi: &phi, z: &z, omega: &omega })
         });
         magnitudes.map(|[force, torque]| force * size + torque).sum()
+    }
+
+    /// Refuses forces of formulas that have no finite value at the start.
+    pub(super) fn check_forces(&self, scene: &Scene, start: &Motion) -> Result<(), CompileError> {
+        let [phi, omega] = start.rounded();
+        let z = self.elements(&phi);
+        // Springs of no length stop with a message of their own.
+        let acting = |force: &&UserForce| force.span.is_none() && !scene.is_inactive(&force.name);
+        for force in self.forces.iter().filter(acting) {
+            let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
+            let value = force.magnitudes(start.time.hi, at).into_iter().find(|value| !value.is_finite());
+            if let Some(value) = value {
+                return Err(CompileError::NotFinite { force: force.name.clone(), value });
+            }
+        }
+        Ok(())
     }
 
     /// The scene's start as a motion: found from the rows where a part of it can be, else as given.

@@ -2,6 +2,7 @@
 
 use super::DENSE_LIMIT;
 use crate::dynamics::assembly::Closest;
+use crate::scene::about;
 
 /// Why a scene has no equations.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -23,9 +24,9 @@ pub enum CompileError {
     Massless(String),
     /// No start closes the rows, or none near what is given.
     #[error(
-        "no start fits: constraint `{row}` is off by {left:.3e} {unit} at the nearest\n{closest}\nhint: \
+        "no start fits: constraint `{row}` is off by {} {unit} at the nearest\n{closest}\nhint: \
             check lengths and places, and whether what `start` gives can be reached; `driftless check SCENE \
-            --chart FILE` draws the closest"
+            --chart FILE` draws the closest", about(*left)
     )]
     Impossible {
         /// The row that is off most.
@@ -39,8 +40,8 @@ pub enum CompileError {
     },
     /// No rates keep the rows at the start.
     #[error(
-        "no rates fit the start: constraint `{row}` slips by {left:.3e} {unit}\nhint: check motors against \
-            locks, and whether the start is a dead centre for the motor"
+        "no rates fit the start: constraint `{row}` slips by {} {unit}\nhint: check motors against \
+            locks, and whether the start is a dead centre for the motor", about(*left)
     )]
     ImpossibleRates {
         /// The row that slips most.
@@ -79,11 +80,23 @@ pub enum CompileError {
             direction there; start elsewhere, move an end, or set both to 0"
     )]
     SpringWithoutLength(String),
+    /// A force or torque of a formula has no finite value at the start.
+    #[error(
+        "`{force}` is {} at the start\nhint: its formula divides by zero there, or takes a root, logarithm or \
+            power of a number that has none; start elsewhere, or change the formula",
+        if value.is_nan() { "not a number" } else { "infinite" }
+    )]
+    NotFinite {
+        /// The part.
+        force: String,
+        /// Its magnitude: infinite, or not a number.
+        value: f64,
+    },
     /// A rigid spring that vibrates is not the only constraint.
     #[error(
-        "rigid spring `{spring}` starts with {energy:.3e} J of vibration, and its mean force is known only \
+        "rigid spring `{spring}` starts with {} J of vibration, and its mean force is known only \
             where no other constraint, wall or damper is\nhint: start it at its free length and without a \
-            rate along it, or leave its `model` out"
+            rate along it, or leave its `model` out", about(*energy)
     )]
     NotAlone {
         /// The spring.
@@ -111,8 +124,8 @@ pub enum CompileError {
     NoSuchBar(String),
     /// A point starts behind its wall.
     #[error(
-        "wall `{wall}` has its point {gap:.3e} m behind it at the start\nhint: start elsewhere, move the \
-            wall, or turn its normal"
+        "wall `{wall}` has its point {} m behind it at the start\nhint: start elsewhere, move the \
+            wall, or turn its normal", about(*gap)
     )]
     BehindWall {
         /// The wall.
@@ -125,6 +138,9 @@ pub enum CompileError {
 /// The lists of a scene whose parts are constraints.
 const CONSTRAINTS: &[&str] = &["motors", "locks", "hinges", "sliders", "welds", "springs"];
 
+/// Those whose parts are forces or torques by formulas.
+const FORCES: &[&str] = &["forces", "torques", "springs", "torsion_springs", "potentials"];
+
 impl CompileError {
     /// The name of the part that is at fault, and the lists of the scene it may be in; `None` where it is not
     /// one alone.
@@ -136,6 +152,7 @@ impl CompileError {
             }
             Self::Massless(bar) => Some((&["bars"], bar)),
             Self::SpringWithoutLength(spring) | Self::NotAlone { spring, .. } => Some((&["springs"], spring)),
+            Self::NotFinite { force, .. } => Some((FORCES, force)),
             Self::FrictionOnCurve(wall) | Self::BehindWall { wall, .. } => Some((&["walls"], wall)),
             _ => None,
         }

@@ -368,10 +368,10 @@ impl Formula {
                     self.pure(number, of(b))?;
                     match (of(a), self.constants[b]) {
                         (Some(a), Some(power)) => Some(a.power(power)),
-                        (a, _) => {
-                            self.pure(number, a)?;
-                            a
+                        (Some(a), None) if !a.is(Dimension::NONE) => {
+                            return Err(self.misfit(number, &Mismatch::Base(a)));
                         }
+                        (a, _) => a,
                     }
                 }
                 Node::Exponential(a)
@@ -412,8 +412,16 @@ impl Formula {
 
     fn misfit(&self, node: usize, mismatch: &Mismatch) -> FormulaError {
         let (start, end) = self.places[node];
-        let hint = "numbers without a unit fit anything, as in sin(1*t); units stand behind numbers, as 5 mm \
-            or 30 deg";
+        let hint = match mismatch {
+            Mismatch::Base(_) => {
+                "the unit of such a power is not known: divide its base by a number with its unit, as in \
+                    (x/1 m)^p"
+            }
+            _ => {
+                "numbers without a unit fit anything, as in sin(1*t); units stand behind numbers, as 5 mm or \
+                    30 deg"
+            }
+        };
         FormulaError::new(&self.text, start as usize, end as usize, mismatch.to_string(), hint.into())
     }
 }

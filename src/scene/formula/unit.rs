@@ -145,6 +145,8 @@ pub(super) enum Mismatch {
     Sum(Dimension, Dimension),
     /// An argument or exponent.
     Pure(Dimension),
+    /// The base of a power whose exponent is no number that is known before.
+    Base(Dimension),
 }
 
 impl fmt::Display for Mismatch {
@@ -152,6 +154,7 @@ impl fmt::Display for Mismatch {
         match self {
             Self::Sum(a, b) => write!(f, "puts {a} and {b} together"),
             Self::Pure(a) => write!(f, "takes a pure number, not {a}"),
+            Self::Base(a) => write!(f, "raises {a} to a power that is not a plain number"),
         }
     }
 }
