@@ -42,7 +42,12 @@ pub fn object(found: &PeriodicMotions) -> Value {
         "scene": found.scene.name,
         "degrees_of_freedom": found.degrees_of_freedom,
         "period": found.period,
-        "starts": {"tried": found.starts[0], "settled": found.starts[1], "unstable": found.unstable},
+        "starts": {
+            "tried": found.starts[0],
+            "settled": found.starts[1],
+            "unstable": found.unstable,
+            "at_rest": found.at_rest.unwrap_or(0),
+        },
         "periodic_motions": found.motions.iter().map(motion).collect::<Vec<_>>(),
         "left_out": found.left_out,
     })
@@ -99,10 +104,16 @@ pub fn text(found: &PeriodicMotions) -> String {
         page.entry("more", &format!("{} in the record", counted(untold as u64, "motion", "motions")));
     }
     if found.motions.is_empty() {
-        page.entry(
-            "",
-            "no periodic motion was found: more --starts, or a multiple of the --period, may find one",
-        );
+        let advice = match found.at_rest {
+            None => "more --starts, or a multiple of the --period, may find one",
+            Some(_) => "nothing drives the scene, so that the --period must be a motion's own, to ten digits",
+        };
+        page.entry("", &format!("no periodic motion was found: {advice}"));
+    }
+    if let Some(count) = found.at_rest.filter(|count| *count > 0) {
+        let starts = counted(count as u64, "start", "starts");
+        let how = "came to an equilibrium; `driftless modes` without --period lists these";
+        page.entry("", &format!("{starts} {how}"));
     }
     if found.unstable > 0 {
         let growth = "small differences grow more than ten thousandfold within a period";

@@ -26,7 +26,7 @@ use self::search::EquilibriumSearch;
 use super::kinematics::left_out;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{Mechanism, Time};
-use crate::scene::Scene;
+use crate::scene::{Law, Scene};
 use serde::Serialize;
 use std::sync::Arc;
 
@@ -183,6 +183,12 @@ pub enum ModesError {
     Rigid,
 }
 
+/// A motor whose law changes with time, if there is one.
+fn moving(mechanism: &Mechanism) -> Option<&str> {
+    let moves = |law: &Law| [0.0, 0.37, 1.9].iter().any(|&t| law.rates::<f64>(Time::of(t)).0 != 0.0);
+    mechanism.constraints.iter().find(|row| row.law.as_ref().is_some_and(moves)).map(|row| row.name())
+}
+
 /// Looks for equilibria from the start of a scene and from `starts` other positions of a fixed set.
 ///
 /// # Errors
@@ -191,13 +197,8 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     if mechanism.integrals().next().is_some() {
         return Err(ModesError::Integrals);
     }
-    for row in &mechanism.constraints {
-        if let Some(law) = &row.law {
-            let rates = [0.0, 0.37, 1.9].map(|t| law.rates::<f64>(Time::of(t)).0);
-            if rates.iter().any(|rate| *rate != 0.0) {
-                return Err(ModesError::Moving(row.name().to_owned()));
-            }
-        }
+    if let Some(name) = moving(mechanism) {
+        return Err(ModesError::Moving(name.to_owned()));
     }
     let start = mechanism.start(scene);
     let [first, _] = start.rounded();

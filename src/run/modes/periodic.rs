@@ -11,7 +11,7 @@
 
 use super::local::Local;
 use super::period::{check_period, common_period};
-use super::{DISTINCT, ModesError, Stability};
+use super::{DISTINCT, ModesError, Stability, moving};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -105,6 +105,9 @@ pub struct PeriodicMotions {
     pub starts: [usize; 2],
     /// How many were left since small differences grow too far within a period.
     pub unstable: usize,
+    /// How many came to an equilibrium of a scene that nothing drives, which has every period; none where
+    /// something drives it, as rest is a motion like others there.
+    pub at_rest: Option<usize>,
     /// What of the scene has no part in this.
     pub left_out: Vec<&'static str>,
 }
@@ -144,12 +147,18 @@ pub fn periodic(
         Shooting { local, whole: mechanism, plan, period, unit_rate: TAU / period, unstable: 0 };
     let mut found: Vec<PeriodicMotion> = Vec::new();
     let mut count = [0, 0];
+    let is_driven = moving(mechanism).is_some() || shooting.local.depends_on_time(&first[0]);
+    let mut at_rest = (!is_driven).then_some(0);
     let settled = shooting.settled(&first);
     let near = [Some(first.clone()), settled];
     for (k, begin) in near.into_iter().chain(shooting.others(scene, starts)).enumerate() {
         let Some(begin) = begin else { continue };
         count[0] += 1;
         let Some(motion) = shooting.close(begin, k < 2 && found.is_empty(), freedom) else { continue };
+        if let Some(at_rest) = at_rest.as_mut().filter(|_| shooting.is_rest(&motion)) {
+            *at_rest += 1;
+            continue;
+        }
         count[1] += 1;
         // Of a family one is enough.
         let is_known =
@@ -170,6 +179,7 @@ pub fn periodic(
         motions: found,
         starts: count,
         unstable: shooting.unstable,
+        at_rest,
         left_out: if scene.events.is_empty() { Vec::new() } else { vec!["events"] },
     })
 }
@@ -400,6 +410,16 @@ impl Shooting<'_> {
         let rates = |rate: f64| (0..self.local.unit.len()).map(move |k| if k < bodies { rate } else { 0.0 });
         let others = self.whole.other_assemblies(scene, starts).into_iter().enumerate();
         others.map(|(k, phi)| Some([phi, rates(if k % 2 == 0 { turning } else { 0.0 }).collect()])).collect()
+    }
+
+    /// True where nothing moves in a period.
+    fn is_rest(&self, motion: &PeriodicMotion) -> bool {
+        let begin = [motion.phi.clone(), motion.omega.clone()];
+        // A quarter of a period is a whole one of motions four times as fast.
+        let states = course(self.whole, &self.plan, &begin, &[0.25, 0.39].map(|share| share * self.period));
+        let stays =
+            |then: &[Vec<f64>; 2]| self.apart(&begin, then).iter().all(|apart| apart.amax() < DISTINCT);
+        states.is_ok_and(|states| states.iter().all(stays))
     }
 
     /// True where two motions are the same at t = 0.
