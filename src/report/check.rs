@@ -95,7 +95,7 @@ pub(super) fn assembly(mechanism: &Mechanism) -> Value {
 
 /// Degrees of freedom, rows that say nothing new, and what of the start is not as given.
 fn freedom(page: &mut Page, mechanism: &Mechanism) {
-    let Assembly { changes, singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
+    let Assembly { singular, degrees_of_freedom: free, .. } = &mechanism.assembly;
     let redundant = mechanism.redundant();
     let free = &(free - mechanism.integrals);
     let coordinates = mechanism.coordinates() - mechanism.integrals;
@@ -118,7 +118,12 @@ fn freedom(page: &mut Page, mechanism: &Mechanism) {
     if !singular.is_empty() {
         page.entry("singular", &format!("{} at the start", singular.join(", ")));
     }
-    for (number, change) in changes.iter().enumerate() {
+    start_changes(page, mechanism);
+}
+
+/// What of the start is not as given.
+pub(super) fn start_changes(page: &mut Page, mechanism: &Mechanism) {
+    for (number, change) in mechanism.assembly.changes.iter().enumerate() {
         page.entry(if number == 0 { "start" } else { "" }, &change.to_string());
     }
 }

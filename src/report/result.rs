@@ -1,6 +1,6 @@
 //! How a run went.
 
-use super::check::describe;
+use super::check::{describe, start_changes};
 use super::page::{Page, counted, figure, magnitude};
 use crate::dynamics::Mechanism;
 #[cfg(feature = "files")]
@@ -157,6 +157,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     let Outcome { plan, statistics, drift, last, .. } = outcome;
     let mut page = Page::new(&scene.name, &scene.description);
     describe(&mut page, mechanism, plan);
+    start_changes(&mut page, mechanism);
     page.entry(
         "cost",
         &format!(

@@ -82,8 +82,8 @@ pub enum CompileError {
     SpringWithoutLength(String),
     /// A force or torque of a formula has no finite value at the start.
     #[error(
-        "`{force}` is {} at the start\nhint: its formula divides by zero there, or takes a root, logarithm or \
-            power of a number that has none; start elsewhere, or change the formula",
+        "`{force}` is {} at the start\nhint: its formula divides by zero there, or takes a root, logarithm \
+            or power of a number that has none; start elsewhere, or change the formula",
         if value.is_nan() { "not a number" } else { "infinite" }
     )]
     NotFinite {

@@ -381,12 +381,9 @@ impl Resolver<'_> {
         let value = formula.value(&values);
         if !quantity.holds(value) {
             let problem = format!("= {} comes to {}", self.source.written(node.span), about(value));
-            let hint = match (formula.names().next(), value.is_nan()) {
-                (Some(_), _) => "look at the parameters it is made of",
-                (None, true) => {
-                    "roots, logarithms and fractional powers of what is below zero, and 0/0, have no value"
-                }
-                (None, false) => "look at the numbers it is made of",
+            let hint = match formula.names().next() {
+                Some(_) => "look at the parameters it is made of",
+                None => "roots, logarithms and powers like (-1)^1.5, and 0/0, have no value",
             };
             return Err(self.source.refusal(node.span, path, &problem, &shape.allowed(), hint));
         }
