@@ -41,8 +41,8 @@ pub struct OutputsChart {
     pub over: Option<[String; 2]>,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
-    /// The time from which on the values choose the ranges of the upright axes; what leaves them before is cut
-    /// at the frame \[s\].
+    /// The time from which on the values choose the ranges of the upright axes; what leaves them before is
+    /// cut at the frame \[s\].
     pub settled_from: Option<f64>,
 }
 

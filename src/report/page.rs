@@ -138,7 +138,7 @@ pub fn magnitude(x: f64) -> String {
 /// `1.15` and `0.24`.
 pub fn with_uncertainty(x: f64, uncertainty: f64) -> [String; 2] {
     let size = uncertainty.abs();
-    if !(1e-9..1e6).contains(&size) || !(x.abs() < 1e6) {
+    if !(1e-9..1e6).contains(&size) || x.is_nan() || x.abs() >= 1e6 {
         return [figure(x), magnitude(uncertainty)];
     }
     let decimals = (1 - size.log10().floor() as i32).clamp(0, 9) as usize;

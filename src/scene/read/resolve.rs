@@ -377,20 +377,19 @@ impl Resolver<'_> {
         let (values, dimensions) = self.arguments(&formula, &[]).map_err(refused)?;
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         fits(&formula, dimension, quantity).map_err(refused)?;
-        let values: Vec<f64> = values.into_iter().flatten().collect();
-        let value = formula.value(&values);
+        let value = formula.value(&values.into_iter().flatten().collect::<Vec<f64>>());
         if !quantity.holds(value) {
             let problem = format!("= {} comes to {}", self.source.written(node.span), about(value));
-            let hint = match formula.names().next() {
-                Some(_) => "look at the parameters it is made of",
-                None => "roots, logarithms and powers like (-1)^1.5, and 0/0, have no value",
-            };
+            let hint = HINTS[usize::from(formula.names().next().is_none())];
             return Err(self.source.refusal(node.span, path, &problem, &shape.allowed(), hint));
         }
         node.value = Value::Number(value);
         Ok(())
     }
 }
+
+const HINTS: [&str; 2] =
+    ["look at the parameters it is made of", "roots, logarithms, (-1)^1.5 and 0/0 have no value"];
 
 /// True where a formula has no names but t and those of parameters.
 fn is_of_time(formula: &Formula, parameters: &[Valued]) -> bool {
