@@ -285,6 +285,7 @@ impl TrustMeasurement {
             (rate, torque) = (rate * share, torque.map(|torque| torque * share));
             trust.error_estimate = Some(printed(ahead.min(HORIZON)));
         }
+        trust.is_upper_bound &= trust.error_estimate.is_some();
         if trust.error_estimate.is_some() {
             trust.rate_error = Some((CAUTION * rate).max(LEAST * self.fastest));
             trust.torque_error = torque.map(|torque| (CAUTION * torque).max(LEAST * self.strongest));
