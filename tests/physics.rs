@@ -96,6 +96,7 @@ mod rattle_couplings;
 mod release;
 mod restart;
 mod rigid;
+mod rough_corners;
 mod scaling;
 mod scenes;
 mod sensitivity;

@@ -29,6 +29,8 @@ use crate::arithmetic::Complex;
 /// Difference of accelerations over the largest of them that the search for the moment leaves, where a wall
 /// ceases to press.
 const ALIKE: f64 = 1e-6;
+/// Accelerations over the mechanism's own that are rounding: of what rests there is nothing else.
+const NONE: f64 = 1e-9;
 /// Combinations that are looked at.
 const MOST: usize = 20_000;
 
@@ -177,7 +179,7 @@ impl Mechanism {
                 (lasting, fit) => lasting.or(fit),
             };
             found = match (fit, found) {
-                (Some(fit), Some(known)) if !are_alike(&fit.1.load, &known.1.load) => {
+                (Some(fit), Some(known)) if !self.are_alike(&fit.1.load, &known.1.load) => {
                     // What a wall holds that just ceases to press ends there.
                     match (fit.1.ceases, known.1.ceases) {
                         (false, true) => Some(fit),
@@ -297,15 +299,17 @@ impl Mechanism {
         let is_loose = told.regularity.abs() < REGULAR && !modes.iter().any(slides);
         fit.then(|| FittingMotion { ceases: told.pressures.contains(&0), is_loose, load: told.load })
     }
+
+    /// Whether two motions have the same accelerations.
+    fn are_alike(&self, one: &[f64], other: &[f64]) -> bool {
+        let size = one.iter().chain(other).fold(0.0, |size: f64, x| size.max(x.abs()));
+        let own = |k: usize| self.units.coordinate(k, self.bodies.len()) / self.units.time.powi(2);
+        let mut apart = one.iter().zip(other).map(|(a, b)| (a - b).abs()).enumerate();
+        apart.all(|(k, apart)| apart <= (ALIKE * size).max(NONE * own(k)))
+    }
 }
 
 /// Whether modes that fit still do so a moment later.
 fn lasts(evidence: &dyn Evidence, ((closed, modes), motion): &Fit, touching: &[usize]) -> bool {
     evidence.lasts(closed, modes, touching, &motion.load)
-}
-
-/// Whether two motions have the same accelerations.
-fn are_alike(one: &[f64], other: &[f64]) -> bool {
-    let size = one.iter().chain(other).fold(0.0, |size: f64, x| size.max(x.abs()));
-    one.iter().zip(other).all(|(a, b)| (a - b).abs() <= ALIKE * size)
 }

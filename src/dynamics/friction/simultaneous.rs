@@ -28,6 +28,8 @@ use nalgebra::DVector;
 const MOST: usize = 20_000;
 /// Share of the largest velocity, impulse or entry of A that rounding makes, in doubles.
 const ROUNDING: f64 = 1e-11;
+/// Share of the largest pivot from which on others count as large as it.
+const ALIKE: f64 = 0.999_999;
 
 /// What the impulses at several walls are decided by; or, of points that rest, their forces, with
 /// accelerations for velocities.
@@ -196,7 +198,10 @@ impl<T: Real> Shocks<T> {
         (0..count).all(|i| {
             let [normal, along] = [impulse[i], impulse[count + i]];
             let is_kept = normal >= least[i] - push && after[i] >= rebound[i] - speed;
-            let is_rough = if way[i].slides == 0.0 {
+            let is_rough = if !way[i].is_pressed && least[i] == T::ZERO {
+                // Without an impulse there is no friction, whichever way the point slides.
+                true
+            } else if way[i].slides == 0.0 {
                 let pressed = if normal > T::ZERO { normal } else { T::ZERO };
                 along.abs() <= self.coefficients[i][1] * pressed * (T::ONE + self.rounding) + push
             } else {
@@ -213,17 +218,20 @@ fn largest<T: Real>(numbers: &[T]) -> T {
 }
 
 /// Solves a small system that may be singular, by elimination with exchange of rows and columns; what is left
-/// open is zero, and so is what is below this share of the largest entry.  `None` where an equation cannot
-/// be, by more than `open`.
+/// open is zero, and so is what is below this share of the largest entry.  Which one is left open, of those
+/// that could be, rounding must not decide: of pivots about as large, the first.  `None` where an equation
+/// cannot be, by more than `open`.
 fn solve<T: Real>(matrix: &mut [T], x: &mut [T], rounding: T, open: T) -> Option<()> {
     let d = x.len();
     let mut order: Vec<usize> = (0..d).collect();
     let size = largest(matrix);
     let mut rank = 0;
     while rank < d {
-        let entries = (rank..d).flat_map(|i| (rank..d).map(move |j| (i, j)));
+        let entries = || (rank..d).flat_map(|i| (rank..d).map(move |j| (i, j)));
         let weight = |(i, j): (usize, usize)| matrix[i * d + j].value().abs();
-        let (i, j) = entries.max_by(|&a, &b| weight(a).total_cmp(&weight(b))).unwrap_or((rank, rank));
+        let most = entries().map(weight).fold(0.0, f64::max);
+        let large = entries().filter(|&at| weight(at) >= ALIKE * most);
+        let (i, j) = large.min_by_key(|&(i, j)| (order[j], i)).unwrap_or((rank, rank));
         if matrix[i * d + j].abs() <= rounding * size {
             break;
         }

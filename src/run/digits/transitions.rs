@@ -206,7 +206,11 @@ impl<const W: usize> DigitsMotion<W> {
                 self.hold(held, modes, &[], None)
             }
             ModeChange::Arrives(place) => {
-                self.settle_modes(Transition { arrived: Some(place), breaks: None })
+                let before = self.state().acting.sliding.clone();
+                self.settle_modes(Transition { arrived: Some(place), breaks: None })?;
+                // Friction of bounces that are left out may have carried a place beyond rest.
+                let is_changed = self.state().acting.held != held || self.state().acting.sliding != before;
+                if is_changed { Ok(()) } else { self.settle_modes(Transition::default()) }
             }
             ModeChange::Breaks(place, sign) => {
                 self.settle_modes(Transition { arrived: None, breaks: Some((place, sign)) })
