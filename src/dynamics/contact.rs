@@ -58,8 +58,14 @@ impl Mechanism {
     /// point out of its wall.
     ///
     /// Coordinates \[rad, m\] and rates \[rad/s, m/s\].  A point stays where it would rebound to less than
-    /// [`REST_HEIGHT`] and be pressed.
-    pub fn staying(&self, touching: &[usize], t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<usize>> {
+    /// this height, over the length of its contact, and be pressed.
+    pub fn staying(
+        &self,
+        touching: &[usize],
+        t: Time,
+        [phi, omega]: [&[f64]; 2],
+        height: f64,
+    ) -> Option<Vec<usize>> {
         let (metric, z) = (ContactMetric::at(self, t, phi, omega)?, self.elements(phi));
         let at = ConstraintArguments { phi, z: &z, omega };
         let acceleration = metric.acceleration();
@@ -92,7 +98,7 @@ impl Mechanism {
                 let inward = -(point.acceleration + point.free.dot(&change));
                 if point.is_dead
                     || inward <= 0.0
-                    || point.speed * point.speed > 2.0 * REST_HEIGHT * point.contact.length * inward
+                    || point.speed * point.speed > 2.0 * height * point.contact.length * inward
                 {
                     continue;
                 }

@@ -27,6 +27,7 @@ use super::plan::Plan;
 use super::running::Outcome;
 use super::sample::{Sample, Sampler};
 use crate::arithmetic::DoubleDouble;
+use crate::dynamics::contact::REST_HEIGHT;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::{Cause, Statistics, StepError};
 use std::sync::Arc;
@@ -66,6 +67,9 @@ const KEPT: usize = 1000;
 const EVENTS_MOST: usize = 10_000;
 /// Holds between two output times beyond which a point chatters.
 const HOLDS_MOST: usize = 1000;
+/// Height at which a reference solution ends bounces, over that of a run: errors of what is left out grow
+/// with the height or its square root, and differ by one to three times that of the run.
+const SOONER: f64 = 4.0;
 /// Rounds of impacts at one moment after which what is left of the approach is left to the holds.
 const ROUNDS: usize = 100;
 /// Normal velocity, over those of the point's parts or the hardest approach of the moment, that rounding
@@ -106,6 +110,8 @@ pub(super) struct ContactDriver {
     /// The motion last sampled, kept for its room.
     shown: Motion,
     held: Vec<Held>,
+    /// Height of a rebound, over the length of the contact, below which a pressed point stays.
+    rest_height: f64,
     /// Holds, and impacts and releases, since the last output time.
     holds_in_row: usize,
     events_in_row: usize,
@@ -150,6 +156,7 @@ impl ContactDriver {
             ended_by: None,
             shown: Motion::default(),
             held: Vec::new(),
+            rest_height: REST_HEIGHT,
             holds_in_row: 0,
             events_in_row: 0,
             is_between: false,
@@ -158,6 +165,11 @@ impl ContactDriver {
             jumps: None,
             horizon: None,
         }
+    }
+
+    /// The same, with bounces that end sooner: an error that leaving them out makes, another run has as well.
+    pub(super) fn ends_bounces_sooner(self) -> Self {
+        Self { rest_height: SOONER * REST_HEIGHT, ..self }
     }
 
     /// The mechanism with the contacts held at the moment.

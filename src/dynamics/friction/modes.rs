@@ -19,6 +19,7 @@
 //! Source: D. Stewart, *Rigid-body dynamics with friction and impact*, SIAM Review 42 (2000); of the paradox
 //! F. Génot, B. Brogliato, *New results on Painlevé paradoxes*, Eur. J. Mech. A 18 (1999).
 
+use super::super::contact::REST_HEIGHT;
 use super::super::{Mechanism, Motion, Time};
 use super::combinations::{combinations, subsets};
 use super::evidence::{Evidence, InDoubles, NO_SPEED};
@@ -214,7 +215,7 @@ impl Mechanism {
             contact.touches(start.time, &phi, &z) && speed.abs() <= NO_SPEED * contact.step_size(&omega)
         };
         let touching: Vec<usize> = (0..self.contacts.len()).filter(is_still).collect();
-        let staying = self.staying(&touching, start.time, &phi, &omega)?;
+        let staying = self.staying(&touching, start.time, [&phi, &omega], REST_HEIGHT)?;
         if self.frictions.is_empty() {
             return (!staying.is_empty()).then(|| self.holding(&staying));
         }

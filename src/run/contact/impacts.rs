@@ -195,7 +195,8 @@ impl ContactDriver {
         if touching.is_empty() && self.mechanism.held.is_empty() && self.free.frictions.is_empty() {
             return Ok(());
         }
-        let Some(staying) = self.free.staying(&touching, motion.time, &phi, &omega) else {
+        let staying = self.free.staying(&touching, motion.time, [&phi, &omega], self.rest_height);
+        let Some(staying) = staying else {
             let what = format!(
                 "a point rests on wall {} and the constraints leave it no freedom",
                 self.names(&touching)

@@ -70,7 +70,7 @@ fn contact_driver(
 ) -> Result<(ContactDriver, Outcome), String> {
     let driver = build(mechanism, series, start).map_err(|stop| stop.what)?;
     let mut outcome = Outcome::begun(mechanism, series.clone());
-    let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver);
+    let mut contact_driver = ContactDriver::new(Arc::clone(mechanism), driver).ends_bounces_sooner();
     contact_driver.meet(&mut outcome).map_err(|stop| stop.what)?;
     Ok((contact_driver, outcome))
 }
@@ -134,9 +134,9 @@ impl ReferenceRun {
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
         let SavedReferenceRun { contact_state, outcome, path, begun, last } = kept;
-        let Some(mut contact_driver) =
-            ContactDriver::resume(Arc::clone(mechanism), &outcome.plan, start, contact_state, horizon)?
-        else {
+        let resumed =
+            ContactDriver::resume(Arc::clone(mechanism), &outcome.plan, start, contact_state, horizon)?;
+        let Some(mut contact_driver) = resumed.map(ContactDriver::ends_bounces_sooner) else {
             return Ok(None);
         };
         let tangent = match path {
