@@ -206,7 +206,7 @@ fn what_aims_cannot_be_is_refused_with_what_to_do() {
         "{said}"
     );
     let said = refused("bar.fi");
-    assert!(said.contains("motors[0].law") && said.contains("bar.phi"), "{said}");
+    assert!(said.contains("motors[0].law") && said.contains("bar has phi, omega"), "{said}");
     let said = refused("bar.phi*1 kg");
     assert!(said.contains("motors[0].law") && said.contains("not rad"), "{said}");
     let scene = geared("2*bar.phi", r#"{"phi": 0, "omega": 1}"#, 1.0);

@@ -162,7 +162,7 @@ impl Corner {
     fn after(&self, restitution: f64) -> Option<(Vec<Vector>, [f64; 3])> {
         let all: Vec<usize> = (0..self.walls.len()).collect();
         let approaches = |&wall: &usize| self.velocity(wall, self.before)[0] < -1e-3;
-        all.iter().any(|wall| approaches(wall)).then_some(())?;
+        all.iter().any(approaches).then_some(())?;
         let [vx, vy, spin] = self.before;
         let (phi, omega) = ([self.angle, 0.0, 0.0], [spin, vx, vy]);
         let mechanism = self.mechanism(restitution);

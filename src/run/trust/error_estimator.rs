@@ -264,12 +264,12 @@ impl ErrorEstimator {
         if let Some(finer::Finer { mut plan, name }) =
             is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten()
         {
-            let from = reference_run.motion.time.hi;
+            let from = crate::scene::about(reference_run.motion.time.hi);
             (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
             reference_run.change(&self.mechanism, plan)?;
             measured.is_bound |= finer::is_bound(reference_run.plan(), &self.run);
-            measured.name = format!("{}, from {from:.3e} s on {name}", measured.name);
+            measured.name = format!("{}, from {from} s on {name}", measured.name);
             return self.accompany(time, statistics);
         }
         Err(stop.unwrap_or_else(|| match measured.level {
