@@ -5,6 +5,7 @@
 //! a factor of two or so; what the reference solution really costs beside runs of the shipped scenes is what
 //! `.ci/cost` counts.
 
+use super::finer::is_near_rounding;
 use crate::dynamics::Mechanism;
 use crate::run::build::order_in_double_double;
 use crate::run::methods::MethodId;
@@ -13,9 +14,9 @@ use crate::stepping::{Statistics, Taylor};
 
 /// Largest share of the run's work that its reference solution may take.
 pub const SHARE: f64 = 0.3;
-/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps or near rounding,
-/// whose reference solutions cost most beside them.
-pub const GRACE: [f64; 2] = [20e6, 50e6];
+/// Work that is free: what nobody notices at the end of a run, and of runs of fixed steps, near rounding or
+/// with dry friction, whose reference solutions cost most beside them.
+const GRACE: [f64; 2] = [20e6, 50e6];
 /// Share and work free of charge of a reference solution in double-double, where the run is not near
 /// rounding.
 pub const DOUBLE_DOUBLE: [f64; 2] = [0.05, 100e3];
@@ -34,6 +35,12 @@ const WIDE: f64 = 8.0;
 /// What a place with dry friction adds to an evaluation, and to a step of the series with the search for its
 /// transitions \[ns\].
 pub(super) const FRICTION: [f64; 2] = [2e3, 12e3];
+
+/// The work of a reference solution that is free beside a run.
+pub fn grace(mechanism: &Mechanism, run: &Plan) -> f64 {
+    let is_dear = run.step.is_some() || is_near_rounding(run) || !mechanism.frictions.is_empty();
+    GRACE[usize::from(is_dear)]
+}
 
 /// Prices of a mechanism's parts.
 #[derive(Clone, Copy, Debug)]

@@ -4,7 +4,7 @@
 //! neither output times nor rests have a say in when they are.  A run that is read off polynomials inside its
 //! steps, which are less accurate than their ends, is looked at there, too, as long as its steps are few.
 
-use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, GRACE, Prices, SHARE};
+use super::budget::{DOUBLE_DOUBLE, FLOW, FULL_GRACE, FULL_SHARE, Prices, SHARE, grace};
 use super::finer;
 use super::growth::Nature;
 use super::measured::{Apart, LAST_DIGIT, TrustMeasurement};
@@ -213,9 +213,8 @@ impl ErrorEstimator {
     /// What it may cost after so much work of the run.
     fn budget(&self, statistics: Statistics) -> f64 {
         let run = self.prices.run(self.run.method, statistics);
-        let is_near = finer::is_near_rounding(&self.run);
         let whole = match self.measured.level {
-            Level::Auto => GRACE[usize::from(self.run.step.is_some() || is_near)] + SHARE * run,
+            Level::Auto => grace(&self.mechanism, &self.run) + SHARE * run,
             // No more evaluations than the run is allowed itself.
             Level::Off | Level::Full => {
                 (FULL_GRACE + FULL_SHARE * run).min(self.run.max_evaluations as f64 * self.prices.series[0])
@@ -226,7 +225,7 @@ impl ErrorEstimator {
         if !is_wide || self.measured.level == Level::Full {
             return whole;
         }
-        match is_near {
+        match finer::is_near_rounding(&self.run) {
             true => NEAR_ROUNDING * whole,
             false => DOUBLE_DOUBLE[0] * run + DOUBLE_DOUBLE[1],
         }
