@@ -465,8 +465,8 @@ fn the_same_run_gives_the_same_bits() {
 fn a_run_that_begins_at_rest_on_a_wall_stays_there() {
     for method in LOCATED {
         let mechanism: Arc<Mechanism> = compile(&against(0.5, 0.5, 1.0));
-        assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[0.0]), Some(vec![0]));
-        assert_eq!(mechanism.staying(&[0], Default::default(), &[0.5], &[1e-3]), Some(vec![]));
+        assert_eq!(mechanism.staying(&[0], Default::default(), [&[0.5], &[0.0]], 1e-11), Some(vec![0]));
+        assert_eq!(mechanism.staying(&[0], Default::default(), [&[0.5], &[1e-3]], 1e-11), Some(vec![]));
         let outcome = run(&against(0.5, 0.5, 1.0), &by(method, 5.0, 0.1, 1e-10));
         assert_eq!((outcome.stop, outcome.impact_count, outcome.persistent_contact_time), (None, 0, 5.0));
         assert_eq!(outcome.last.imbalance, 0.0);

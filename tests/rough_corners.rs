@@ -113,6 +113,35 @@ fn friction_beside_bounces_that_end_takes_energy_off_only() {
     }
 }
 
+/// A box in a chute, one corner of which ends bouncing just before the other one is struck: that finds it in flight.
+#[cfg(feature = "digits")]
+#[test]
+fn an_impact_finds_a_point_whose_bounces_last_in_flight() {
+    use super::many_digits::{last, source};
+    use driftless::arithmetic::Real;
+    let (sin, cos) = 0.32_f64.sin_cos();
+    let wall = |name: &str, x: f64, through: f64, normal: [f64; 2], mu: f64| {
+        format!(
+            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": 0.8,
+            "line": {{"through": [{through}, 0], "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
+        )
+    };
+    let walls = [
+        wall("lower", -0.15, 0.0, [-sin, cos], 0.616),
+        wall("upper", 0.15, 0.0, [-sin, cos], 0.278),
+        wall("top", 0.15, 0.9, [-cos, -sin], 0.689),
+        wall("bottom", -0.15, -0.9, [cos, sin], 0.897),
+    ];
+    let start = r#""phi": 0.32, "omega": -1.02, "origin": [0, 0.29], "velocity": [-0.69, 0.33]"#;
+    let text = boxed([0.0, -9.81], &walls, start, "1.552");
+    let row = last(&source(&text, &[], "1.552", "1.552"), 22);
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        let outcome = done(&text, &adaptive(method, 1e-12)).last;
+        let off = row.bodies[0][0].value() - outcome.phi[0];
+        assert!(off.abs() < 2e-10, "{method}: {off:e}");
+    }
+}
+
 /// A world point or direction \[m\].
 type Vector = [f64; 2];
 

@@ -304,6 +304,7 @@ impl ContactDriver {
                     self.pressure_ends(contact, outcome)?
                 }
                 Ok(Halt::Contact(contact)) => {
+                    self.take_up_bounces(outcome)?;
                     let approach = self.impact_at(contact, outcome)?;
                     self.meet_after(Some(contact), approach, outcome)?;
                 }

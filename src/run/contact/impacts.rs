@@ -249,8 +249,8 @@ impl ContactDriver {
         Ok(before != (self.mechanism.held.clone(), self.mechanism.modes.clone()))
     }
 
-    /// Lets the point of a wall go that an impact would pull into it.
-    fn release(&mut self, pulled: usize, outcome: &mut Outcome) -> Result<(), StepError> {
+    /// Lets the point of a wall go.
+    pub(super) fn release(&mut self, pulled: usize, outcome: &mut Outcome) -> Result<(), StepError> {
         let rest = self.mechanism.held.iter().copied().filter(|&held| held != pulled).collect();
         let open = |(friction, &mode): (&CompiledFriction, &FrictionMode)| match friction.normal {
             Normal::Contact(contact) if contact == pulled => FrictionMode::Open,

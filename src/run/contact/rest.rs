@@ -12,6 +12,8 @@
 //! in joints does, and takes no part in impulses: until the end it is that of a flight, and what it would do
 //! beside a point held at once is taken back.
 //!
+//! An impact at another wall before that end finds the point in flight.
+//!
 //! ```text
 //! Δw = (a_flight - a_held) T, the constraints kept,   Δq = -T Δw / 2        T: how long all bounces last
 //! ```
@@ -24,6 +26,7 @@ use crate::dynamics::contact::metric::MetricRow;
 use crate::dynamics::friction::{FrictionMode, FrictionMoment, Normal};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
+use crate::stepping::StepError;
 
 /// A motion between bounces that are left out.
 pub(in crate::run) struct Flight {
@@ -129,6 +132,16 @@ pub(in crate::run) fn come_to_rest(
 }
 
 impl ContactDriver {
+    /// Lets points go whose bounces, which were left out, last at the moment: an impact at another wall finds
+    /// them in flight, and they meet their own walls after it.
+    pub(super) fn take_up_bounces(&mut self, outcome: &mut Outcome) -> Result<(), StepError> {
+        let t = self.motion().time.hi;
+        while let Some(bouncing) = self.held.iter().find(|held| held.since > t) {
+            self.release(bouncing.contact, outcome)?;
+        }
+        Ok(())
+    }
+
     /// Counts a hold from the end of the bounces before it on, so much later \[s\].
     pub(super) fn begin_later(&mut self, contact: usize, by: f64, outcome: &mut Outcome) {
         let Some(held) = self.held.iter_mut().find(|held| held.contact == contact) else { return };
