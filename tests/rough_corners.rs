@@ -6,6 +6,9 @@ use super::formulas::{adaptive, scene};
 use driftless::Mechanism;
 use driftless::run::MethodId;
 
+/// A point or direction in the plane.
+type Vector = [f64; 2];
+
 /// A box of 30 cm by 20 cm between walls.
 fn boxed(gravity: [f64; 2], walls: &[String], start: &str, until: &str) -> String {
     format!(
@@ -47,40 +50,90 @@ fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
     }
 }
 
-/// A box in the chute between a slope of 0.35 rad and its ends, all of it turned by an angle \[rad\].
-fn chute(turn: f64, until: &str) -> String {
-    let turned = |[x, y]: [f64; 2]| {
-        let (sin, cos) = turn.sin_cos();
-        [cos * x - sin * y, sin * x + cos * y]
-    };
-    let (sin, cos) = (0.35 + turn).sin_cos();
-    let wall = |name: &str, x: f64, through: f64, normal: [f64; 2], [mu, mu0]: [f64; 2]| {
-        format!(
-            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": 0.5,
-            "line": {{"through": {:?}, "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu0}}}}}"#,
-            turned([through, 0.0])
-        )
-    };
-    let walls = [
-        wall("lower", -0.15, 0.0, [-sin, cos], [0.162, 0.162]),
-        wall("upper", 0.15, 0.0, [-sin, cos], [0.348, 0.4524]),
-        wall("top", 0.15, 0.9, [-cos, -sin], [0.774, 0.774]),
-        wall("bottom", -0.15, -0.9, [cos, sin], [0.144, 0.1872]),
-    ];
-    let start = format!(
-        r#""phi": {}, "omega": -0.79, "origin": {:?}, "velocity": {:?}"#,
-        0.35 + turn,
-        turned([0.0, 0.29]),
-        turned([-0.13, -0.88])
-    );
-    boxed(turned([0.0, -9.81]), &walls, &start, until)
+/// A box in a chute: between a slope and its ends.
+struct Chute {
+    /// Angle of the slope \[rad\].
+    slope: f64,
+    restitution: f64,
+    /// Kinetic and static coefficients of the slope at the lower and the upper corner, and of the ends at the top
+    /// and at the bottom.
+    coefficients: [[f64; 2]; 4],
+    /// Angle and spin at the start \[rad, rad/s\].
+    turned: [f64; 2],
+    origin: Vector,
+    velocity: Vector,
+}
+
+/// One corner meets the slope and the lower end at once, again and again.
+const HALF: Chute = Chute {
+    slope: 0.35,
+    restitution: 0.5,
+    coefficients: [[0.162, 0.162], [0.348, 0.4524], [0.774, 0.774], [0.144, 0.1872]],
+    turned: [0.35, -0.79],
+    origin: [0.0, 0.29],
+    velocity: [-0.13, -0.88],
+};
+
+/// A corner that rests on the slope is struck by the lower end, which it cannot slide along.
+const STEEP: Chute = Chute {
+    slope: 0.53,
+    restitution: 0.5,
+    coefficients: [[0.218, 0.2834], [0.817, 1.0621], [0.142, 0.142], [0.341, 0.4433]],
+    turned: [0.53, -0.7],
+    origin: [0.0, 0.3],
+    velocity: [0.83, 0.84],
+};
+
+/// One corner ends bouncing just before the other one is struck.
+#[cfg(feature = "digits")]
+const LIVELY: Chute = Chute {
+    slope: 0.32,
+    restitution: 0.8,
+    coefficients: [[0.616, 0.616], [0.278, 0.278], [0.689, 0.689], [0.897, 0.897]],
+    turned: [0.32, -1.02],
+    origin: [0.0, 0.29],
+    velocity: [-0.69, 0.33],
+};
+
+impl Chute {
+    /// All of it, with its gravity, turned by an angle \[rad\].
+    fn text(&self, turn: f64, until: &str) -> String {
+        let turned = |[x, y]: Vector| {
+            let (sin, cos) = turn.sin_cos();
+            [cos * x - sin * y, sin * x + cos * y]
+        };
+        let (sin, cos) = (self.slope + turn).sin_cos();
+        let wall = |name: &str, x: f64, through: f64, normal: Vector, [mu, mu0]: [f64; 2]| {
+            format!(
+                r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": {},
+                "line": {{"through": {:?}, "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu0}}}}}"#,
+                self.restitution,
+                turned([through, 0.0])
+            )
+        };
+        let [lower, upper, top, bottom] = self.coefficients;
+        let walls = [
+            wall("lower", -0.15, 0.0, [-sin, cos], lower),
+            wall("upper", 0.15, 0.0, [-sin, cos], upper),
+            wall("top", 0.15, 0.9, [-cos, -sin], top),
+            wall("bottom", -0.15, -0.9, [cos, sin], bottom),
+        ];
+        let start = format!(
+            r#""phi": {}, "omega": {}, "origin": {:?}, "velocity": {:?}"#,
+            self.turned[0] + turn,
+            self.turned[1],
+            turned(self.origin),
+            turned(self.velocity)
+        );
+        boxed(turned([0.0, -9.81]), &walls, &start, until)
+    }
 }
 
 /// Where one corner meets both walls of the chute, friction at one of them acts as the push of the other: what the
 /// motion leaves open must not be left to rounding, which differs from angle to angle and from step to step.
 #[test]
 fn a_corner_between_two_rough_walls_does_the_same_however_it_is_turned() {
-    let expected = done(&chute(0.0, "0.96"), &adaptive(MethodId::Taylor, 1e-12)).last;
+    let expected = done(&HALF.text(0.0, "0.96"), &adaptive(MethodId::Taylor, 1e-12)).last;
     for turn in [0.0, 0.4, -0.35, 1.3, -2.1, 3.0] {
         for (method, tolerance) in [
             (MethodId::Taylor, 1e-9),
@@ -89,7 +142,7 @@ fn a_corner_between_two_rough_walls_does_the_same_however_it_is_turned() {
             (MethodId::Dp8, 1e-12),
             (MethodId::Radau(5), 1e-11),
         ] {
-            let last = done(&chute(turn, "0.96"), &adaptive(method, tolerance)).last;
+            let last = done(&HALF.text(turn, "0.96"), &adaptive(method, tolerance)).last;
             let off = [last.phi[0] - turn - expected.phi[0], last.omega[0] - expected.omega[0]];
             assert!(off.iter().all(|off| off.abs() < 1e-7), "{method} {tolerance:e} at {turn}: {off:?}");
         }
@@ -103,7 +156,7 @@ fn a_corner_between_two_rough_walls_does_the_same_however_it_is_turned() {
 fn friction_beside_bounces_that_end_takes_energy_off_only() {
     use super::many_digits::{last, source};
     use driftless::arithmetic::Real;
-    let text = chute(0.0, "1.3");
+    let text = HALF.text(0.0, "1.3");
     let expected = done(&text, &adaptive(MethodId::Taylor, 1e-11)).last.friction;
     for digits in [22, 30] {
         let row = last(&source(&text, &[], "1.3", "1.3"), digits);
@@ -113,27 +166,13 @@ fn friction_beside_bounces_that_end_takes_energy_off_only() {
     }
 }
 
-/// A box in a chute, one corner of which ends bouncing just before the other one is struck: that finds it in flight.
+/// A point whose bounces are left out, but still last, is found in flight by an impact at the other corner.
 #[cfg(feature = "digits")]
 #[test]
 fn an_impact_finds_a_point_whose_bounces_last_in_flight() {
     use super::many_digits::{last, source};
     use driftless::arithmetic::Real;
-    let (sin, cos) = 0.32_f64.sin_cos();
-    let wall = |name: &str, x: f64, through: f64, normal: [f64; 2], mu: f64| {
-        format!(
-            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": 0.8,
-            "line": {{"through": [{through}, 0], "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
-        )
-    };
-    let walls = [
-        wall("lower", -0.15, 0.0, [-sin, cos], 0.616),
-        wall("upper", 0.15, 0.0, [-sin, cos], 0.278),
-        wall("top", 0.15, 0.9, [-cos, -sin], 0.689),
-        wall("bottom", -0.15, -0.9, [cos, sin], 0.897),
-    ];
-    let start = r#""phi": 0.32, "omega": -1.02, "origin": [0, 0.29], "velocity": [-0.69, 0.33]"#;
-    let text = boxed([0.0, -9.81], &walls, start, "1.552");
+    let text = LIVELY.text(0.0, "1.552");
     let row = last(&source(&text, &[], "1.552", "1.552"), 22);
     for method in [MethodId::Taylor, MethodId::Dp8] {
         let outcome = done(&text, &adaptive(method, 1e-12)).last;
@@ -142,8 +181,24 @@ fn an_impact_finds_a_point_whose_bounces_last_in_flight() {
     }
 }
 
-/// A world point or direction \[m\].
-type Vector = [f64; 2];
+/// Along a wall where another one holds it no friction acts on a point: by which sign it would, were left to rounding,
+/// which let the point rest on the slope or leave it.
+#[test]
+fn a_corner_held_along_a_wall_that_strikes_it_does_the_same_however_it_is_turned() {
+    let expected = done(&STEEP.text(0.0, "1.54"), &adaptive(MethodId::Taylor, 1e-12)).last;
+    for turn in [0.0, 0.4, -0.35, 1.3, -2.1, 3.0] {
+        for (method, tolerance) in [
+            (MethodId::Taylor, 1e-10),
+            (MethodId::Taylor, 1e-12),
+            (MethodId::Dp8, 1e-11),
+            (MethodId::Radau(5), 1e-11),
+        ] {
+            let last = done(&STEEP.text(turn, "1.54"), &adaptive(method, tolerance)).last;
+            let off = last.phi[0] - turn - expected.phi[0];
+            assert!(off.abs() < 1e-7, "{method} {tolerance:e} at {turn}: {off:e}");
+        }
+    }
+}
 
 /// The box at rest as it lies at an angle, its impact in a corner, and what the impulses at its walls have to be.
 struct Corner {

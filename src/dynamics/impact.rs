@@ -204,7 +204,11 @@ impl Mechanism {
         if let Some(friction) = self.friction_at(contact) {
             let along = MetricRow::of(&friction.tangent, t, ConstraintArguments { phi, z: &z, omega }).along;
             let across = metric.column(&along);
-            let free_across = metric.free(&across);
+            let mut free_across = metric.free(&across);
+            // Where others hold it along its wall, rounding must not say which way it slides.
+            if free_across.norm() <= NO_FREEDOM * across.norm() {
+                free_across.fill(0.0);
+            }
             let share = free.dot(&free_across) / free.norm_squared();
             let apart = (&free_across - &free * share).norm();
             let shock = Shock {

@@ -72,7 +72,11 @@ fn jump<const W: usize>(
     let slides = dot(&along, &posture.omega);
     let rounding = Digits::ONE.ldexp(motion.precision.rounding(SURE) as i32);
     let still = ((*rate).abs() + slides.abs()) * rounding;
-    let [a_nn, a_nt, a_tt] = [dot(normal, &response), dot(normal, &across), dot(&along, &across)];
+    let [a_nn, mut a_nt, mut a_tt] = [dot(normal, &response), dot(normal, &across), dot(&along, &across)];
+    // Where others hold it along its wall, rounding must not say which way it slides.
+    if a_tt.abs() <= a_nn * rounding {
+        (a_nt, a_tt) = (Digits::ZERO, Digits::ZERO);
+    }
     let apart = (a_nn * a_tt - a_nt * a_nt).abs();
     let shock = Shock {
         response: [a_nn, a_nt, a_tt],
