@@ -19,6 +19,11 @@ fn runs(text: &str) -> Vec<Outcome> {
         .into()
 }
 
+/// A number from 0 to 1 for a case, another one for each salt.
+pub fn share(case: u32, salt: u32) -> f64 {
+    f64::from(case.wrapping_mul(2_654_435_761).wrapping_mul(2 * salt + 1) >> 8) / f64::from(1_u32 << 24)
+}
+
 fn near(found: f64, expected: f64, what: &str) {
     assert!((found - expected).abs() < 1e-10, "{what}: {found} and not {expected}");
 }
@@ -259,9 +264,7 @@ fn a_ball_in_a_corner_rebounds_the_way_it_came() {
 fn one_wall_alone_is_met_as_by_rouths_method() {
     let (mut slid, mut stuck) = (0, 0);
     for k in 0..240_u32 {
-        let of = |salt: u32| {
-            f64::from(k.wrapping_mul(2_654_435_761).wrapping_mul(2 * salt + 1) >> 8) / f64::from(1_u32 << 24)
-        };
+        let of = |salt: u32| share(k, salt);
         let (angle, spin, slide, mu, e) =
             (0.2 + 2.6 * of(1), 4.0 * of(2) - 2.0, 6.0 * of(3) - 3.0, 0.9 * of(4), of(5));
         let text = format!(
@@ -437,9 +440,7 @@ fn stopped_by(normal: f64, phi: f64, [inertia, omega, mu, e]: [f64; 4]) -> [f64;
 fn a_mechanism_of_one_freedom_is_stopped_by_a_rough_wall() {
     let (mut rests, mut rebounds) = (0, 0);
     for k in 0..800_u32 {
-        let of = |salt: u32| {
-            f64::from(k.wrapping_mul(2_654_435_761).wrapping_mul(2 * salt + 1) >> 8) / f64::from(1_u32 << 24)
-        };
+        let of = |salt: u32| share(k, salt);
         let (phi, normal, omega, mu) =
             (-1.5 * of(1), 4.0 * of(2) - 2.0, 6.0 * of(3) - 3.0, 0.1 + 0.8 * of(4));
         let (is_looped, e) = (k % 2 == 1, if k % 4 < 2 { 0.0 } else { 0.4 });

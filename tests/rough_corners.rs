@@ -3,17 +3,38 @@
 
 use super::breaking_away::done;
 use super::formulas::{adaptive, scene};
+use super::friction_impacts::share;
 use driftless::Mechanism;
 use driftless::run::MethodId;
 
 /// A point or direction in the plane.
 type Vector = [f64; 2];
 
+/// A point or direction turned by an angle \[rad\].
+fn turned(angle: f64, [x, y]: Vector) -> Vector {
+    let (sin, cos) = angle.sin_cos();
+    [cos * x - sin * y, sin * x + cos * y]
+}
+
+/// A wall for a point of the body: where it goes through, its normal, restitution, kinetic and static coefficient.
+fn wall(
+    name: &str,
+    point: Vector,
+    [through, normal]: [Vector; 2],
+    restitution: f64,
+    [kinetic, stiction]: [f64; 2],
+) -> String {
+    format!(
+        r#"{{"name": "{name}", "body": "body", "point": {point:?}, "restitution": {restitution},
+        "line": {{"through": {through:?}, "normal": {normal:?}}}, "friction": {{"kinetic": {kinetic}, "static": {stiction}}}}}"#
+    )
+}
+
 /// A box of 30 cm by 20 cm between walls.
 fn boxed(gravity: [f64; 2], walls: &[String], start: &str, until: &str) -> String {
     format!(
-        r#"{{"name": "box", "gravity": {gravity:?}, "bars": [{{"name": "box", "mass": 1, "centre": [0, 0],
-            "inertia": 0.01, "length": 0.3}}], "walls": [{}], "start": {{"box": {{{start}}}}},
+        r#"{{"name": "box", "gravity": {gravity:?}, "bars": [{{"name": "body", "mass": 1, "centre": [0, 0],
+            "inertia": 0.01, "length": 0.3}}], "walls": [{}], "start": {{"body": {{{start}}}}},
         "until": {until}, "every": {until}}}"#,
         walls.join(", ")
     )
@@ -28,14 +49,14 @@ fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
     use driftless::arithmetic::Real;
     let floor = |name: &str, x: f64, law: &str, mu: f64| {
         format!(
-            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "law": "{law}", "restitution": 0.8,
+            r#"{{"name": "{name}", "body": "body", "point": [{x}, -0.1], "law": "{law}", "restitution": 0.8,
             "line": {{"through": [0, 0], "normal": [0, 1]}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
         )
     };
     let walls = [
         floor("left", -0.15, "0.0172*sin(8.21*t)", 0.284),
         floor("right", 0.15, "0.0148*sin(10.83*t)", 0.536),
-        r#"{"name": "side", "body": "box", "point": [0.15, -0.1], "restitution": 0.8,
+        r#"{"name": "side", "body": "body", "point": [0.15, -0.1], "restitution": 0.8,
             "line": {"through": [0.5, 0], "normal": [-1, 0]}, "friction": {"kinetic": 0.806}}"#
             .to_owned(),
     ];
@@ -98,18 +119,10 @@ const LIVELY: Chute = Chute {
 impl Chute {
     /// All of it, with its gravity, turned by an angle \[rad\].
     fn text(&self, turn: f64, until: &str) -> String {
-        let turned = |[x, y]: Vector| {
-            let (sin, cos) = turn.sin_cos();
-            [cos * x - sin * y, sin * x + cos * y]
-        };
+        let turned = |vector: Vector| turned(turn, vector);
         let (sin, cos) = (self.slope + turn).sin_cos();
-        let wall = |name: &str, x: f64, through: f64, normal: Vector, [mu, mu0]: [f64; 2]| {
-            format!(
-                r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": {},
-                "line": {{"through": {:?}, "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu0}}}}}"#,
-                self.restitution,
-                turned([through, 0.0])
-            )
+        let wall = |name: &str, x: f64, through: f64, normal: Vector, friction: [f64; 2]| {
+            wall(name, [x, -0.1], [turned([through, 0.0]), normal], self.restitution, friction)
         };
         let [lower, upper, top, bottom] = self.coefficients;
         let walls = [
@@ -214,18 +227,13 @@ impl Corner {
     const INERTIA: f64 = 0.01;
 
     /// From the centre to a point of the box.
-    fn lever(&self, [x, y]: Vector) -> Vector {
-        let (sin, cos) = self.angle.sin_cos();
-        [cos * x - sin * y, sin * x + cos * y]
+    fn lever(&self, point: Vector) -> Vector {
+        turned(self.angle, point)
     }
 
     fn mechanism(&self, restitution: f64) -> Mechanism {
         let wall = |(k, &(point, normal, mu)): (usize, &(Vector, Vector, f64))| {
-            format!(
-                r#"{{"name": "wall{k}", "body": "box", "point": {point:?}, "restitution": {restitution},
-                "line": {{"through": {:?}, "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#,
-                self.lever(point)
-            )
+            wall(&format!("wall{k}"), point, [self.lever(point), normal], restitution, [mu, mu])
         };
         let walls: Vec<String> = self.walls.iter().enumerate().map(wall).collect();
         let [vx, vy, spin] = self.before;
@@ -286,9 +294,7 @@ fn impulses_in_corners_are_found_and_meet_the_conditions_of_contact_and_friction
     let (left, right) = ([-0.15, -0.1], [0.15, -0.1]);
     let (mut met, mut slid, mut stuck, mut free) = ([0; 5], 0, 0, 0);
     for k in 0..3000_u32 {
-        let of = |salt: u32| {
-            f64::from(k.wrapping_mul(2_654_435_761).wrapping_mul(2 * salt + 1) >> 8) / f64::from(1_u32 << 24)
-        };
+        let of = |salt: u32| share(k, salt);
         let (angle, kind) = (6.2 * of(1) - 3.1, (k % 5) as usize);
         let facing = |turn: f64| {
             let (sin, cos) = (angle + turn).sin_cos();
@@ -357,19 +363,13 @@ fn a_ball_between_two_walls_rests_while_its_load_swings() {
             "6.62*sin(6.95*t+3.39)",
         ),
     ] {
-        let wall = |name: &str, normal: Vector, mu: f64| {
-            format!(
-                r#"{{"name": "{name}", "body": "ball", "point": [0, 0], "restitution": 0.3,
-                "line": {{"through": [0, 0], "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
-            )
-        };
         let text = format!(
-            r#"{{"name": "ball", "gravity": [0, -9.81], "bars": [{{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.01}}],
-            "walls": [{}, {}], "forces": [{{"name": "push", "body": "ball", "point": [0, 0], "force": ["{push}", 0]}}],
-            "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [-0.19, 0.44], "velocity": [0.03, -0.39]}}}},
+            r#"{{"name": "ball", "gravity": [0, -9.81], "bars": [{{"name": "body", "mass": 1, "centre": [0, 0], "inertia": 0.01}}],
+            "walls": [{}, {}], "forces": [{{"name": "push", "body": "body", "point": [0, 0], "force": ["{push}", 0]}}],
+            "start": {{"body": {{"phi": 0, "omega": 0, "origin": [-0.19, 0.44], "velocity": [0.03, -0.39]}}}},
             "until": 4, "every": 4}}"#,
-            wall("left", left, mu),
-            wall("right", right, other)
+            wall("left", [0.0; 2], [[0.0; 2], left], 0.3, [mu, mu]),
+            wall("right", [0.0; 2], [[0.0; 2], right], 0.3, [other, other])
         );
         for (method, tolerance) in
             [(MethodId::Taylor, 1e-10), (MethodId::Dp8, 1e-10), (MethodId::Radau(5), 1e-10)]
@@ -392,10 +392,7 @@ fn bounces_that_end_may_turn_the_sliding_in_many_digits() {
     use super::many_digits::{last, source};
     use driftless::arithmetic::Real;
     let wall = |name: &str, x: f64, through: f64, normal: Vector, mu: f64| {
-        format!(
-            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": 0.8,
-            "line": {{"through": [{through}, 0], "normal": {normal:?}}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
-        )
+        wall(name, [x, -0.1], [[through, 0.0], normal], 0.8, [mu, mu])
     };
     let walls = [
         wall("left", -0.15, 0.0, [0.0, 1.0], 0.417),

@@ -199,7 +199,7 @@ mod tests {
         );
         body_angles.phi[2] = -1e-6;
         let stop = guard.look(&mechanism, 0.5, &body_angles).expect_err("it is below").stop("dp8");
-        assert!(stop.what.contains(" m behind wall floor"), "{stop}");
+        assert!(stop.what.contains("is 1e-6 m behind wall floor"), "{stop}");
     }
 
     #[test]

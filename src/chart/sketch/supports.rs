@@ -61,13 +61,17 @@ fn direction_of_attached(hinge: [f64; 2], [from, to]: &[[f64; 2]; 2]) -> Option<
 }
 
 /// The place so far along the base of a support, and so far from its hinge.
-fn beside(foot: Point, side: Point, along: f64, away: f64) -> Point {
-    [foot[0] - along * side[1] + away * side[0], foot[1] + along * side[0] + away * side[1]]
+fn beside(hinge: Point, side: Point, along: f64, away: f64) -> Point {
+    [hinge[0] - along * side[1] + away * side[0], hinge[1] + along * side[0] + away * side[1]]
 }
 
 impl Pencil<'_> {
     /// Hinges on the ground on the page, with the sides of their supports.
-    fn feet<'a>(&'a self, sketch: &'a Sketch, pose: &'a Pose) -> impl Iterator<Item = (Point, Point)> + 'a {
+    fn supported<'a>(
+        &'a self,
+        sketch: &'a Sketch,
+        pose: &'a Pose,
+    ) -> impl Iterator<Item = (Point, Point)> + 'a {
         let hinges = sketch.hinges.iter().zip(&pose.hinges).zip(&self.sides);
         hinges
             .filter(|((hinge, at), _)| hinge.ground && finite(&[**at]))
@@ -77,10 +81,10 @@ impl Pencil<'_> {
     /// Keeps the places of the supports free of names.
     pub(crate) fn block_supports(&self, sketch: &Sketch, pose: &Pose, occupied: &mut Occupied) {
         let (half, height) = (HALF * self.size, HEIGHT * self.size);
-        for (foot, side) in self.feet(sketch, pose) {
+        for (hinge, side) in self.supported(sketch, pose) {
             // The strokes lean beyond one end of the base.
-            let one = beside(foot, side, -1.8 * half, 2.0);
-            let other = beside(foot, side, 1.8 * half + 3.0, height + 5.0 * self.size);
+            let one = beside(hinge, side, -1.8 * half, 2.0);
+            let other = beside(hinge, side, 1.8 * half + 3.0, height + 5.0 * self.size);
             let [[left, right], [top, bottom]] = [0, 1].map(|c| [one[c].min(other[c]), one[c].max(other[c])]);
             occupied.block([left, top, right, bottom]);
         }
@@ -96,9 +100,9 @@ impl Pencil<'_> {
         self.block_supports(sketch, pose, occupied);
         let size = self.size;
         let (half, height) = (HALF * size, HEIGHT * size);
-        for (foot, side) in self.feet(sketch, pose) {
-            let on = |along: f64, away: f64| beside(foot, side, along, away);
-            let corners = [on(-half, height), foot, on(half, height)];
+        for (hinge, side) in self.supported(sketch, pose) {
+            let on = |along: f64, away: f64| beside(hinge, side, along, away);
+            let corners = [on(-half, height), hinge, on(half, height)];
             self.sheet.polygon(&corners, mix(SPINE, WHITE, 0.7))?;
             self.sheet.line(&corners, &Pen::new(INK, 0.9 * size))?;
             let base = [on(-1.8 * half, height), on(1.8 * half, height)];

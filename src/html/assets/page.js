@@ -449,10 +449,10 @@ class Stage {
     }
   }
 
-  support(foot, side) {
+  support(hinge, side) {
     const half = 8 * this.size, height = 12 * this.size;
-    const on = (along, away) => [foot[0] - along * side[1] + away * side[0], foot[1] + along * side[0] + away * side[1]];
-    this.line([foot, on(-half, height), on(half, height), foot], this.colours.ink, 1.2);
+    const on = (along, away) => [hinge[0] - along * side[1] + away * side[0], hinge[1] + along * side[0] + away * side[1]];
+    this.line([hinge, on(-half, height), on(half, height), hinge], this.colours.ink, 1.2);
     this.hatched(on(-1.7 * half, height), on(1.7 * half, height), side, 5 * this.size, 6 * this.size);
   }
 
