@@ -97,6 +97,7 @@ mod release;
 mod restart;
 mod rigid;
 mod rough_corners;
+mod rough_supports;
 mod scaling;
 mod scenes;
 mod sensitivity;

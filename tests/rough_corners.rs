@@ -40,6 +40,15 @@ fn boxed(gravity: [f64; 2], walls: &[String], start: &str, until: &str) -> Strin
     )
 }
 
+/// A floor that shakes, for a lower corner of the box.
+#[cfg(feature = "digits")]
+fn shaking(name: &str, x: f64, law: &str, [restitution, mu]: [f64; 2]) -> String {
+    format!(
+        r#"{{"name": "{name}", "body": "body", "point": [{x}, -0.1], "law": "{law}", "restitution": {restitution},
+        "line": {{"through": [0, 0], "normal": [0, 1]}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
+    )
+}
+
 /// A box on two floors that shake apart: the friction of the bounces that end at one corner carries its sliding
 /// beyond rest, and the other one still bounces.
 #[cfg(feature = "digits")]
@@ -47,15 +56,9 @@ fn boxed(gravity: [f64; 2], walls: &[String], start: &str, until: &str) -> Strin
 fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
     use super::many_digits::{last, source};
     use driftless::arithmetic::Real;
-    let floor = |name: &str, x: f64, law: &str, mu: f64| {
-        format!(
-            r#"{{"name": "{name}", "body": "body", "point": [{x}, -0.1], "law": "{law}", "restitution": 0.8,
-            "line": {{"through": [0, 0], "normal": [0, 1]}}, "friction": {{"kinetic": {mu}, "static": {mu}}}}}"#
-        )
-    };
     let walls = [
-        floor("left", -0.15, "0.0172*sin(8.21*t)", 0.284),
-        floor("right", 0.15, "0.0148*sin(10.83*t)", 0.536),
+        shaking("left", -0.15, "0.0172*sin(8.21*t)", [0.8, 0.284]),
+        shaking("right", 0.15, "0.0148*sin(10.83*t)", [0.8, 0.536]),
         r#"{"name": "side", "body": "body", "point": [0.15, -0.1], "restitution": 0.8,
             "line": {"through": [0.5, 0], "normal": [-1, 0]}, "friction": {"kinetic": 0.806}}"#
             .to_owned(),
@@ -68,6 +71,33 @@ fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
         let outcome = done(&text, &adaptive(method, 1e-9));
         let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
         assert!(off.iter().all(|off| off.abs() < 1e-12), "{method}: {off:?}");
+    }
+}
+
+/// An upper corner that bounces against a side wall is pressed to it by the friction of the lower ones alone, and
+/// comes to rest there.
+#[cfg(feature = "digits")]
+#[test]
+fn a_corner_pressed_by_the_friction_of_others_comes_to_rest() {
+    use super::many_digits::{last, source};
+    use driftless::arithmetic::Real;
+    let walls = [
+        shaking("left", -0.15, "0.0199*sin(10.04*t)", [0.3, 0.556]),
+        shaking("right", 0.15, "0.0139*sin(6.31*t)", [0.3, 0.372]),
+        r#"{"name": "side", "body": "body", "point": [0.15, 0.1], "restitution": 0.3,
+            "line": {"through": [0.5, 0], "normal": [-1, 0]}}"#
+            .to_owned(),
+    ];
+    let start = r#""phi": 0.06, "omega": -1.48, "origin": [0.16, 0.26], "velocity": [0.35, -0.09]"#;
+    let push = r#""forces": [{"name": "push", "body": "body", "point": [-0.08, -0.01],
+        "force": ["4.99*sin(5.53*t+0.96)", 0]}], "start""#;
+    let text = boxed([0.0, -9.81], &walls, start, "0.7").replace(r#""start""#, push);
+    let row = last(&source(&text, &[], "0.7", "0.7"), 22);
+    let [phi, omega] = [0, 1].map(|what| row.bodies[0][what].value());
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = done(&text, &adaptive(method, 1e-11));
+        let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
+        assert!(off.iter().all(|off| off.abs() < 1e-9), "{method}: {off:?}");
     }
 }
 
@@ -114,6 +144,16 @@ const LIVELY: Chute = Chute {
     turned: [0.32, -1.02],
     origin: [0.0, 0.29],
     velocity: [-0.69, 0.33],
+};
+
+/// The lower corner sticks to the bottom, and touches the slope without a force, when the upper one lands.
+const PINNED: Chute = Chute {
+    slope: 0.56,
+    restitution: 0.3,
+    coefficients: [[0.607, 0.607], [0.821, 0.821], [0.3181, 0.4134], [0.849, 0.849]],
+    turned: [-0.19, 1.9],
+    origin: [0.0, 0.37],
+    velocity: [-0.37, -0.95],
 };
 
 impl Chute {
@@ -209,6 +249,34 @@ fn a_corner_held_along_a_wall_that_strikes_it_does_the_same_however_it_is_turned
             let last = done(&STEEP.text(turn, "1.54"), &adaptive(method, tolerance)).last;
             let off = last.phi[0] - turn - expected.phi[0];
             assert!(off.abs() < 1e-7, "{method} {tolerance:e} at {turn}: {off:e}");
+        }
+    }
+}
+
+/// An impact presses a point that touches a wall without a force as it does one that is held: which of them it is
+/// must not be left to rounding.
+#[test]
+fn a_corner_that_touches_without_a_force_takes_part_in_the_impact_of_another() {
+    let expected = done(&PINNED.text(0.0, "2"), &adaptive(MethodId::Taylor, 1e-12)).last;
+    #[cfg(feature = "digits")]
+    {
+        use super::many_digits::{last, source};
+        use driftless::arithmetic::Real;
+        let off =
+            last(&source(&PINNED.text(0.0, "2"), &[], "2", "2"), 22).bodies[0][0].value() - expected.phi[0];
+        assert!(off.abs() < 1e-9, "many digits: {off:e}");
+    }
+    for turn in [0.0, 0.4, -2.1] {
+        for (method, tolerance) in [
+            (MethodId::Taylor, 1e-9),
+            (MethodId::Taylor, 1e-12),
+            (MethodId::Dp8, 1e-10),
+            (MethodId::Dp8, 1e-11),
+            (MethodId::Radau(5), 1e-11),
+        ] {
+            let last = done(&PINNED.text(turn, "2"), &adaptive(method, tolerance)).last;
+            let off = last.phi[0] - turn - expected.phi[0];
+            assert!(off.abs() < 1e-8, "{method} {tolerance:e} at {turn}: {off:e}");
         }
     }
 }

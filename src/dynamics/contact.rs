@@ -130,8 +130,13 @@ impl Contact {
     /// True where its wall has no hold on the point, as the gradient of the gap by all coordinates has this
     /// square \[m²\].
     pub(crate) fn is_dead(&self, gradient_squared: f64) -> bool {
+        self.tilt(gradient_squared) < DEAD_CENTRE
+    }
+
+    /// |G| over the levers of a point that turns.
+    pub(super) fn tilt(&self, gradient_squared: f64) -> f64 {
         let levers: f64 = self.point.terms.iter().map(|term| term.1.norm_squared()).sum();
-        self.point.shifts.is_empty() && gradient_squared < DEAD_CENTRE * DEAD_CENTRE * levers
+        if self.point.shifts.is_empty() { (gradient_squared / levers).sqrt() } else { f64::INFINITY }
     }
 }
 

@@ -163,6 +163,20 @@ impl Mechanism {
         self.pulled(&metric.multipliers(&metric.column(&along)), NO_FREEDOM)
     }
 
+    /// What constraints, holds and places that stick leave of a point's freedom along the normal of its wall,
+    /// over what it has without them; or, where that is less, its Jacobian over its levers, zero at the dead
+    /// centre of a point that turns.
+    pub fn freedom(&self, contact: usize, t: Time, phi: &[f64], omega: &[f64]) -> f64 {
+        let Some(metric) = ContactMetric::at(self, t, phi, omega) else { return 1.0 };
+        let (contact, at) =
+            (&self.contacts[contact], ConstraintArguments { phi, z: &self.elements(phi), omega });
+        let along = MetricRow::of(&contact.row, t, at).along;
+        let column = metric.column(&along);
+        let whole = column.norm();
+        let left = if whole > 0.0 { metric.free(&column).norm() / whole } else { 0.0 };
+        left.min(contact.tilt(dot(&along, &along)))
+    }
+
     /// The held contact that would have to pull the hardest, by more than `least`, of these impulses of the
     /// rows.
     pub fn pulled(&self, row_impulses: &[f64], least: f64) -> Option<usize> {

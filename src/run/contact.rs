@@ -303,9 +303,10 @@ impl ContactDriver {
                 Ok(Halt::Contact(contact)) if self.mechanism.held.contains(&contact) => {
                     self.pressure_ends(contact, outcome)?
                 }
+                Ok(Halt::Contact(contact)) if self.is_passed_by(contact) => {}
                 Ok(Halt::Contact(contact)) => {
-                    self.take_up_bounces(outcome)?;
-                    let approach = self.impact_at(contact, outcome)?;
+                    let flying = self.take_up_bounces(outcome)?;
+                    let approach = self.impact_at(contact, &flying, outcome)?;
                     self.meet_after(Some(contact), approach, outcome)?;
                 }
                 Err(stop) if stop.cause == Cause::RestingContact => {

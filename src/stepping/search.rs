@@ -22,6 +22,8 @@ pub use chebyshev::{Chebyshev, Interpolants, Nodes, interpolated};
 
 /// A value that counts as zero at the step's start: it must open before it can close.
 pub const TOUCH: f64 = 1e-12;
+/// Depth of a minimum below zero, over what rounding may do there, up to which it touches zero.
+const GRAZE: f64 = 0.5;
 /// Share of the step below which two zeros are one.
 const CLOSE: f64 = 1e-9;
 /// Dips into the zone of doubt that are looked at in a step.
@@ -100,7 +102,7 @@ pub enum Crossing {
 pub fn crossing(curve: &impl Curve, end: f64) -> Crossing {
     let [first, _] = curve.at(0.0);
     if first > TOUCH {
-        return root(curve, 0.0, 0.0, end).map_or(Crossing::Nothing, Crossing::At);
+        return passage(curve, 0.0, end);
     }
     let opens = root(curve, TOUCH, 0.0, end);
     let is_below = first <= -TOUCH;
@@ -109,9 +111,27 @@ pub fn crossing(curve: &impl Curve, end: f64) -> Crossing {
         (open, Some(sink)) if open.is_none_or(|open| sink < open) => {
             Crossing::Inside(if is_below { 0.0 } else { sink })
         }
-        (Some(open), _) => root(curve, 0.0, open, end).map_or(Crossing::Nothing, Crossing::At),
+        (Some(open), _) => passage(curve, open, end),
         (None, _) => Crossing::Nothing,
     }
+}
+
+/// The first passage of a positive function to negative values that are no rounding: what touches zero with
+/// its minimum stays on its side, and what has hardly passed at the end of a step is found in the next one.
+fn passage(curve: &impl Curve, mut from: f64, end: f64) -> Crossing {
+    for _ in 0..DIPS {
+        let Some(at) = root(curve, 0.0, from, end) else { break };
+        let rounding = curve.about(at, 0.0).rounding;
+        let depth = GRAZE * rounding;
+        let is_low = curve.at(at)[0] <= -depth;
+        let low = if is_low { Some(at) } else { root(curve, -depth, at, end) };
+        match (low, root(curve, TOUCH.max(2.0 * rounding), at, end)) {
+            (Some(low), high) if high.is_none_or(|high| low < high) => return Crossing::At(at),
+            (_, Some(high)) => from = high,
+            _ => break,
+        }
+    }
+    Crossing::Nothing
 }
 
 /// The first minimum in (begin, end], and before a passage at `passes` that does not lead to it, whose value

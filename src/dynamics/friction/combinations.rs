@@ -17,21 +17,24 @@ pub(super) fn subsets(staying: &[usize], touching: &[usize]) -> Vec<Vec<usize>> 
     all
 }
 
-/// Every combination of one mode a place, by the number of places that do not take their first one.
-pub(super) fn combinations(options: &[Vec<FrictionMode>]) -> Vec<Vec<FrictionMode>> {
-    let mut all: Vec<(usize, Vec<FrictionMode>)> = vec![(0, Vec::new())];
-    for of in options {
+/// Every combination of one mode a place: by the number of places that stuck `before` and slide, then by that
+/// of places that do not take their first mode.
+pub(super) fn combinations(options: &[Vec<FrictionMode>], before: &[FrictionMode]) -> Vec<Vec<FrictionMode>> {
+    let mut all = vec![([0_usize; 2], Vec::new())];
+    for (number, of) in options.iter().enumerate() {
+        let stuck = matches!(before.get(number), Some(FrictionMode::Stick(_)));
         all = all
             .iter()
-            .flat_map(|(later, modes)| {
+            .flat_map(|([moved, later], modes)| {
                 of.iter().enumerate().map(move |(i, &mode)| {
+                    let moves = stuck && matches!(mode, FrictionMode::Slip(_));
                     let mut modes = modes.clone();
                     modes.push(mode);
-                    (later + usize::from(i > 0), modes)
+                    ([moved + usize::from(moves), later + usize::from(i > 0)], modes)
                 })
             })
             .collect();
     }
-    all.sort_by_key(|(later, _)| *later);
+    all.sort_by_key(|(order, _)| *order);
     all.into_iter().map(|(_, modes)| modes).collect()
 }

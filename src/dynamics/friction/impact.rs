@@ -46,12 +46,15 @@ pub struct Shock<T = f64> {
 
 /// Share of a velocity that rounding leaves of one that ended.
 const NO_SPEED: f64 = 1e-14;
+/// The same along a wall that others hold the point along: as much as the place of the impact is off.
+const HELD_SPEED: f64 = 1e-9;
 
 impl Shock {
     /// Normal and tangential impulse \[N·s\]; `None` where nothing ends it.
     pub fn impulses(&self) -> Option<[f64; 2]> {
-        let [v_n, v_t] = self.velocity;
-        self.impulses_beyond(NO_SPEED * (v_n.abs() + v_t.abs()))
+        let ([v_n, v_t], [_, _, a_tt]) = (self.velocity, self.response);
+        let rounding = if a_tt == 0.0 { HELD_SPEED } else { NO_SPEED };
+        self.impulses_beyond(rounding * (v_n.abs() + v_t.abs()))
     }
 }
 
@@ -123,10 +126,16 @@ impl<T: Real> Shock<T> {
 
 impl Mechanism {
     /// Rates \[rad/s, m/s\] without those along the normals of the contacts that are held, which impulses of
-    /// their walls take off with the friction of those that slide; `None` where there are no such impulses.
+    /// their walls take off with the friction of those that slide, and the work of motors and of walls that
+    /// move \[J\]; `None` where there are no such impulses.
     ///
     /// They may pull: see `run/contact/rest.rs`.
-    pub(crate) fn without_normal_rates(&self, t: Time, phi: &[f64], omega: &[f64]) -> Option<Vec<f64>> {
+    pub(crate) fn without_normal_rates(
+        &self,
+        t: Time,
+        phi: &[f64],
+        omega: &[f64],
+    ) -> Option<(Vec<f64>, f64)> {
         let metric = ContactMetric::at(self, t, phi, omega)?;
         let (before, z) = (metric.velocity(omega), self.elements(phi));
         let columns: Vec<DVector<f64>> = metric.rows.iter().map(|row| metric.column(&row.along)).collect();
@@ -144,13 +153,15 @@ impl Mechanism {
             .flat_map(|&r| counting.iter().map(|&s| columns[r].dot(&pushes[s])).collect::<Vec<_>>())
             .collect();
         solve(&mut matrix, &mut impulses);
-        let mut change = DVector::zeros(omega.len());
+        let (mut change, mut work) = (DVector::zeros(omega.len()), 0.0);
         for (&s, impulse) in counting.iter().zip(impulses) {
             change.axpy(impulse, &pushes[s], 1.0);
+            work -= impulse * metric.rows[s].row.drive;
         }
         let change = metric.rates(&change);
         let is_finite = change.iter().all(|x| x.is_finite());
-        is_finite.then(|| change.iter().zip(omega).map(|(change, omega)| omega + change).collect())
+        let rates = change.iter().zip(omega).map(|(change, omega)| omega + change);
+        is_finite.then(|| (rates.collect(), work))
     }
 }
 

@@ -9,8 +9,9 @@
 //!
 //! The complementarity problem of all places at once, solved by looking at every combination: their number is
 //! that of the places that touch and do not slide, which is small, and nothing else tells a problem without a
-//! solution, or with several, from one whose solution was not found.  Among combinations that fit, those that
-//! stick most come first: with a static coefficient above the kinetic one a place at rest stays so.
+//! solution, or with several, from one whose solution was not found.  Among combinations that fit, those come
+//! first in which most places that stuck before do so still, and then those that stick most: with a static
+//! coefficient above the kinetic one a place at rest stays so, and does not slide with less than its limit.
 //! Places that share a degree of freedom may also be at their limits, see `friction/shared.rs`.
 //!
 //! The combinations are the same for all numbers; what is told of one by its equations, and what counts as
@@ -154,15 +155,16 @@ impl Mechanism {
                 return Err(Paradox::TooMany(resting));
             }
             let known = PlaceRates { rates: &rates, pushed: &pushed, arrived: transition.arrived };
-            let mut fits = combinations(&options).into_iter().filter_map(|modes| {
+            let mut fits = combinations(&options, before).into_iter().filter_map(|modes| {
                 let motion = self.fits(evidence, at, &closed, &modes, touching, known)?;
                 Some(((closed.clone(), modes), motion))
             });
             let fit = fits.next();
-            // Where one gives way, others at their limits leave more than one way to share the load, with
-            // walls or without: one that still does so a moment later is taken.
+            // Where one gives way, or has given way to no motion, others at their limits leave more than one
+            // way to share the load, with walls or without: one that still does so a moment later is taken.
             let lasts = |fit: &Fit| lasts(evidence, fit, touching);
-            let is_at_limits = |fit: &Fit| transition.breaks.is_some() || fit.1.ceases;
+            let Transition { arrived, breaks } = transition;
+            let is_at_limits = |fit: &Fit| arrived.is_some() || breaks.is_some() || fit.1.ceases;
             let doubts = |fit: &Fit| fit.1.is_loose || is_at_limits(fit) && !lasts(fit);
             let is_in_doubt = fit.as_ref().is_some_and(doubts);
             let word = |modes: (&FrictionMode, &FrictionMode)| modes.0.word() == modes.1.word();

@@ -2,7 +2,8 @@
 //! doubles (`dynamics::friction::impact`), in all digits.
 //!
 //! Friction in hinges and sliders takes no part in impacts: what sticks there may slide after one.  An impact
-//! that presses a point which rests on another wall with friction is one at both (module `several`).
+//! that presses a point which touches another wall at rest, held or not, is one at both where one of them has
+//! friction (module `several`).
 
 use super::evidence::gradient;
 use super::friction::SURE;
@@ -19,6 +20,10 @@ use crate::dynamics::friction::{CompiledFriction, FrictionMode, Normal};
 use crate::dynamics::kernel::dot;
 use crate::stepping::{Cause, StepError};
 
+/// Part of the digits that a velocity has to be zero in along a wall that others hold the point along: the
+/// place of the impact is as much off.
+const HELD_SURE: f64 = 0.5;
+
 /// What the impulses at one wall do.
 pub(super) fn alone<const W: usize>(
     motion: &mut DigitsMotion<W>,
@@ -32,6 +37,11 @@ pub(super) fn alone<const W: usize>(
             motion.release(&[held])?;
             continue;
         }
+        let Some(jump) = jump else {
+            let name = &motion.mechanism.walls[wall].0.name;
+            let what = format!("no impulses fit the law of impact and friction at wall {name}");
+            return Err(motion.stop(Cause::Unsuited, 0.0, &what, "lower the coefficient of friction"));
+        };
         let (held, standing) = (&motion.state().acting.held, motion.mechanism.structure.standing_rows());
         let rounding = motion.precision.rounding(SURE);
         let is_pressed = |(other, pull): (&usize, &Digits<W>)| {
@@ -39,19 +49,23 @@ pub(super) fn alone<const W: usize>(
                 && pull.log2() > rounding
                 && motion.mechanism.structure.friction_at(*other).is_some()
         };
-        if held.iter().zip(&pulls[standing..]).any(is_pressed) {
-            return Meeting::touching(motion, wall).jump(motion);
-        }
-        return Ok(jump);
+        let is_pressed = held.iter().zip(&pulls[standing..]).any(is_pressed);
+        let touching = Meeting::touching(motion, wall);
+        return if is_pressed || touching.is_pressed_by(motion, wall, &jump) {
+            touching.jump(motion)
+        } else {
+            Ok(jump)
+        };
     }
 }
 
-/// The jump, and the impulses of the constraints over that of the wall.
+/// The jump, and the impulses of the constraints over that of the wall; where no impulses fit, those for a
+/// normal impulse alone.
 fn jump<const W: usize>(
     motion: &DigitsMotion<W>,
     wall: usize,
     GapRate { gradient: normal, travel, rate }: &GapRate<W>,
-) -> Result<(ImpulseJump<W>, Vec<Digits<W>>), StepError> {
+) -> Result<(Option<ImpulseJump<W>>, Vec<Digits<W>>), StepError> {
     let (t, posture) = (motion.state().t, motion.state_posture());
     let sliding = vec![FrictionMode::Open; motion.mechanism.frictions.len()];
     let striking = motion.mechanism.with(Acting { sliding, ..motion.state().acting.clone() });
@@ -65,17 +79,19 @@ fn jump<const W: usize>(
         let impulse = -(Digits::ONE + restitution) * *rate / dot(normal, &response);
         let change = response.iter().map(|&a| a * impulse).collect();
         let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
-        return Ok((ImpulseJump { change, work, walls: 1 }, pulls));
+        return Ok((Some(ImpulseJump { change, work, walls: 1 }), pulls));
     };
     let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
     let (across, pulls_across) = keeper.response(&striking, t, at, &along);
     let slides = dot(&along, &posture.omega);
     let rounding = Digits::ONE.ldexp(motion.precision.rounding(SURE) as i32);
-    let still = ((*rate).abs() + slides.abs()) * rounding;
+    let mut still = ((*rate).abs() + slides.abs()) * rounding;
     let [a_nn, mut a_nt, mut a_tt] = [dot(normal, &response), dot(normal, &across), dot(&along, &across)];
     // Where others hold it along its wall, rounding must not say which way it slides.
     if a_tt.abs() <= a_nn * rounding {
         (a_nt, a_tt) = (Digits::ZERO, Digits::ZERO);
+        let least = motion.precision.rounding(HELD_SURE) as i32;
+        still = ((*rate).abs() + slides.abs()) * Digits::ONE.ldexp(least);
     }
     let apart = (a_nn * a_tt - a_nt * a_nt).abs();
     let shock = Shock {
@@ -86,14 +102,11 @@ fn jump<const W: usize>(
         is_newton: friction.is_newton,
         one_way: (apart <= a_nn * a_tt * rounding).then_some(rounding),
     };
-    let Some([impulse, tangential]) = shock.impulses_beyond(still) else {
-        let what = format!("no impulses fit the law of impact and friction at wall {}", friction.name);
-        return Err(motion.stop(Cause::Unsuited, 0.0, &what, "lower the coefficient of friction"));
-    };
+    let Some([impulse, tangential]) = shock.impulses_beyond(still) else { return Ok((None, pulls)) };
     let change = response.iter().zip(&across).map(|(&a, &b)| a * impulse + b * tangential).collect();
     let ratio = tangential / impulse;
     let pulls: Vec<_> =
         pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
     let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
-    Ok((ImpulseJump { change, work, walls: 1 }, pulls))
+    Ok((Some(ImpulseJump { change, work, walls: 1 }), pulls))
 }

@@ -71,6 +71,24 @@ impl<const W: usize> Meeting<W> {
         rates[i] < Digits::ZERO && rates[i].log2() > largest(&rates) + self.rounding
     }
 
+    /// True where the impulse at one wall presses a point that touches another one at rest and is not held,
+    /// and there is dry friction at one of them.
+    pub fn is_pressed_by(&self, motion: &DigitsMotion<W>, wall: usize, alone: &ImpulseJump<W>) -> bool {
+        let rubs = |wall| motion.mechanism.structure.friction_at(wall).is_some();
+        let before: Vec<_> = self.gaps.iter().map(|gap| gap.rate).collect();
+        let after: Vec<_> =
+            self.gaps.iter().map(|gap| gap.rate + dot(&gap.gradient, &alone.change)).collect();
+        let least = largest(&before) + self.rounding;
+        self.walls.iter().enumerate().any(|(i, &other)| {
+            other != wall
+                && (rubs(wall) || rubs(other))
+                && !motion.state().acting.held.contains(&other)
+                && (before[i] <= Digits::ZERO || before[i].log2() <= least)
+                && after[i] < Digits::ZERO
+                && after[i].log2() > least
+        })
+    }
+
     /// What the impulses do.
     ///
     /// # Errors

@@ -155,6 +155,25 @@ proptest! {
     }
 }
 
+/// (t - 0.3)² (1.5 - t) touches zero, and passes it later; a steep passage of large values rounds to either
+/// side.
+#[test]
+fn what_touches_zero_stays_on_its_side_and_what_passes_does_not() {
+    let touching = through(&[0.3, 0.3, 1.5], -1.0);
+    assert_eq!(crossing(&touching, 1.0), Crossing::Nothing);
+    let Crossing::At(t) = crossing(&touching, 2.0) else { panic!("no zero") };
+    assert!((t - 1.5).abs() < 1e-12, "{t}");
+    for size in [1.0, 1e6, 1e12] {
+        for k in 1..50 {
+            let zero = 0.019 * f64::from(k);
+            let Crossing::At(t) = crossing(&[size * zero, -size, -1e-3], 1.0) else {
+                panic!("{size} {zero}")
+            };
+            assert!((t - zero).abs() < 2e-3, "{size}: {t} for {zero}");
+        }
+    }
+}
+
 #[test]
 fn a_minimum_whose_side_is_unknown_is_told() {
     // (t - 0.6)² + height, off by 1e-6.

@@ -1,0 +1,226 @@
+//! Supports with dry friction of more than one part: what sticks, what rests at its limit, what grazes its wall, and
+//! the work of walls that move, against closed forms, the same scene stated otherwise, and many digits.
+
+use super::breaking_away::done;
+use super::formulas::adaptive;
+use driftless::run::{MethodId, Request};
+
+/// Methods at tight tolerances.
+fn requests() -> [Request; 3] {
+    [(MethodId::Taylor, 1e-12), (MethodId::Dp8, 1e-11), (MethodId::Radau(5), 1e-11)]
+        .map(|(method, tolerance)| adaptive(method, tolerance))
+}
+
+/// What a mechanism of one body moves by up to its end in 22 digits: angle, place.
+#[cfg(feature = "digits")]
+fn in_digits(text: &str, until: &str, body: usize) -> [f64; 3] {
+    use super::many_digits::{last, source};
+    use driftless::arithmetic::Real;
+    let row = last(&source(text, &[], until, until), 22);
+    [0, 2, 3].map(|what| row.bodies[body][what].value())
+}
+
+/// A block that slides on a carriage, which sticks to the ground and is pulled back: where the block comes to rest on
+/// it, the carriage stays, since it is not loaded to its static limit, and the block slides back:
+/// x = v²/2a - a'(T - v/a)²/2,  a = F + mu g,  a' = F - mu g.
+#[test]
+fn what_sticks_stays_where_another_place_comes_to_rest_on_it() {
+    let slider = |name: &str, body: &str, rail: &str, friction: &str| {
+        format!(
+            r#"{{"name": "{name}", "point": {{"body": "{body}", "point": [0, 0]}}, "angle": "locked",
+            "rail": {{"body": {rail}, "direction": [1, 0]}}, "friction": {{{friction}}}}}"#
+        )
+    };
+    let on_carriage = slider("upper", "block", r#""carriage", "point": [0, 0.1]"#, r#""kinetic": 0.55"#);
+    let on_ground =
+        slider("lower", "carriage", r#""ground", "point": [0, 0]"#, r#""kinetic": 0.2, "static": 0.35"#);
+    let (back, forth) = (6.0 + 0.55 * 9.81, 6.0 - 0.55 * 9.81);
+    let expected = 0.125 / back - 0.5 * forth * (0.5 - 0.5_f64 / back).powi(2);
+    for sliders in [[&on_carriage, &on_ground], [&on_ground, &on_carriage]] {
+        let body = |name: &str| {
+            format!(r#"{{"name": "{name}", "mass": 1, "centre": [0, 0], "inertia": 0.01, "length": 0.3}}"#)
+        };
+        let text = format!(
+            r#"{{"name": "blocks", "gravity": [0, -9.81], "bars": [{}, {}], "sliders": [{}, {}],
+            "forces": [{{"name": "pull", "body": "block", "point": [0, 0], "force": [-6, 0]}}],
+            "start": {{"carriage": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}},
+                "block": {{"phi": 0, "omega": 0, "origin": [0, 0.1], "velocity": [0.5, 0]}}}},
+            "until": 0.5, "every": 0.5}}"#,
+            body("carriage"),
+            body("block"),
+            sliders[0],
+            sliders[1]
+        );
+        for request in requests() {
+            let last = done(&text, &request).last;
+            let [carriage, block] = [last.phi[2], last.phi[4]];
+            assert!(carriage.abs() < 1e-12, "{request:?}: {carriage:e}");
+            assert!((block - expected).abs() < 1e-11, "{request:?}: {block} for {expected}");
+        }
+        #[cfg(feature = "digits")]
+        assert!((in_digits(&text, "0.5", 1)[1] - expected).abs() < 1e-12);
+    }
+}
+
+/// A rod on the floor is pushed against a rough wall; its load falls and pulls it off once it passes the friction of
+/// the one rough end.  Until then its supports share the load in more ways than one, and in each of them one or the
+/// other comes to its limit.
+#[test]
+fn a_rod_between_floor_and_wall_rests_until_its_load_pulls_it_off() {
+    let wall = |name: &str, x: f64, line: &str, friction: &str| {
+        format!(
+            r#"{{"name": "{name}", "body": "rod", "point": [{x}, 0], "line": {{{line}}}, "restitution": 0{friction}}}"#
+        )
+    };
+    let (floor, rough) = (r#""through": [0, 0], "normal": [0, 1]"#, r#", "friction": {"kinetic": 0.4}"#);
+    let text = format!(
+        r#"{{"name": "rod", "gravity": [0, -9.81], "bars": [{{"name": "rod", "mass": 1, "centre": [0.2, 0], "inertia": 0.0133, "length": 0.4}}],
+        "walls": [{}, {}, {}], "forces": [{{"name": "push", "body": "rod", "point": [0.2, 0], "force": ["20-40*t", 0]}}],
+        "start": {{"rod": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}}}, "until": 1, "every": 1}}"#,
+        wall("left", 0.0, floor, rough),
+        wall("right", 0.4, floor, ""),
+        wall("side", 0.4, r#""through": [0.4, 0], "normal": [-1, 0]"#, rough)
+    );
+    // Half of the weight is on the rough end.
+    let breaks = (20.0 + 0.4 * 0.5 * 9.81) / 40.0;
+    let expected = -40.0 * (1.0_f64 - breaks).powi(3) / 6.0;
+    for request in requests() {
+        let x = done(&text, &request).last.phi[1];
+        assert!((x - expected).abs() < 1e-11, "{request:?}: {x} for {expected}");
+    }
+    #[cfg(feature = "digits")]
+    assert!((in_digits(&text, "1", 0)[1] - 0.2 - expected).abs() < 1e-12);
+}
+
+/// The end of a pendulum that just touches the floor with its lowest point passes it: what rounding and the error of
+/// a step make of its gap is no impact, which would stop it there.
+#[test]
+fn what_touches_a_wall_at_its_dead_centre_passes() {
+    let text = |walls: &str| {
+        format!(
+            r#"{{"name": "graze", "gravity": [0, -9.81], "bars": [{{"name": "bar", "mass": 1, "centre": [0.15, 0], "inertia": 0.0075, "length": 0.3}}],
+            "hinges": [{{"name": "pivot", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+            "walls": [{walls}], "start": {{"bar": {{"phi": -1, "omega": -1}}}}, "until": 0.5, "every": 0.5}}"#
+        )
+    };
+    let free = text("");
+    for (restitution, friction) in [(0.0, ""), (0.5, ""), (0.5, r#", "friction": {"kinetic": 0.3}"#)] {
+        let grazing = text(&format!(
+            r#"{{"name": "floor", "body": "bar", "point": [0.3, 0], "restitution": {restitution},
+            "line": {{"through": [0, -0.3], "normal": [0, 1]}}{friction}}}"#
+        ));
+        for (method, tolerance) in [
+            (MethodId::Taylor, 1e-9),
+            (MethodId::Taylor, 1e-12),
+            (MethodId::Dp5, 1e-9),
+            (MethodId::Dp8, 1e-9),
+            (MethodId::Dp8, 1e-11),
+            (MethodId::Radau(5), 1e-11),
+        ] {
+            let request = adaptive(method, tolerance);
+            let [here, there] = [&grazing, &free].map(|text| done(text, &request).last.phi[0]);
+            assert!((here - there).abs() < 1e-8, "{method} {tolerance:e}: {here} for {there}");
+        }
+        #[cfg(feature = "digits")]
+        {
+            let [here, there] = [&grazing, &free].map(|text| in_digits(text, "0.5", 0)[0]);
+            assert!((here - there).abs() < 1e-15, "{here} for {there}");
+        }
+    }
+}
+
+/// An impact by Newton's law that pulls a point off the wall it rests on has no impulses with that point held; in many
+/// digits it is let go as in doubles.
+#[cfg(feature = "digits")]
+#[test]
+fn an_impact_by_newtons_law_lets_a_resting_point_go_in_many_digits() {
+    let bar = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.15, 0], "inertia": 0.0075, "length": 0.3}}"#)
+    };
+    let text = format!(
+        r#"{{"name": "elbow", "gravity": [0, -9.81], "bars": [{}, {}],
+        "hinges": [{{"name": "shoulder", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "upper", "point": [0, 0]}}]}},
+            {{"name": "elbow", "between": [{{"body": "upper", "point": [0.3, 0]}}, {{"body": "lower", "point": [0, 0]}}]}}],
+        "walls": [{{"name": "slope", "body": "lower", "point": [0.3, 0], "restitution": 0.8,
+                "line": {{"through": [0.201221, -0.539248], "normal": [-0.06994284733753277, 0.9975510002532796]}},
+                "friction": {{"kinetic": 0.64, "impact": "newton"}}}},
+            {{"name": "floor", "body": "upper", "point": [0.3, 0], "restitution": 0.8,
+                "line": {{"through": [0, -0.24], "normal": [0, 1]}}, "friction": {{"kinetic": 0.569}}}}],
+        "start": {{"upper": {{"phi": "-atan2(4,3)", "omega": 0}}, "lower": {{"phi": -1.9, "omega": 3}}}},
+        "until": 0.5, "every": 0.5}}"#,
+        bar("upper"),
+        bar("lower")
+    );
+    for request in requests() {
+        let last = done(&text, &request).last;
+        for body in 0..2 {
+            let [phi, ..] = in_digits(&text, "0.5", body);
+            assert!((last.phi[body] - phi).abs() < 1e-9, "{request:?}: {} for {phi}", last.phi[body]);
+        }
+    }
+}
+
+/// A box that ends bouncing on a floor that moves: the impulses of the bounces that are left out do work with it, as
+/// in many digits, which leave none out.  Energy less work changes by impacts alone, with friction as well, where an
+/// impact at one corner makes the other one rebound that rests.
+#[test]
+fn bounces_that_end_on_a_floor_that_moves_take_its_work() {
+    let floor = |name: &str, x: f64, friction: &str| {
+        format!(
+            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.1], "restitution": 0.3, "law": "0.0116*sin(7.4*t)",
+            "line": {{"through": [0, 0], "normal": [0, 1]}}{friction}}}"#
+        )
+    };
+    let text = |frictions: [&str; 2]| {
+        format!(
+            r#"{{"name": "box", "gravity": [0, -9.81], "bars": [{{"name": "box", "mass": 0.81, "centre": [0, 0], "inertia": 0.0126, "length": 0.3}}],
+            "walls": [{}, {}], "start": {{"box": {{"phi": 0.1, "omega": 0, "origin": [0, 0.3], "velocity": [-0.3, 0]}}}},
+            "until": 0.34, "every": 0.34}}"#,
+            floor("left", -0.15, frictions[0]),
+            floor("right", 0.15, frictions[1])
+        )
+    };
+    let rough = [
+        r#", "friction": {"kinetic": 0.22, "static": 0.22}"#,
+        r#", "friction": {"kinetic": 0.668, "static": 0.8684}"#,
+    ];
+    for request in requests() {
+        let last = done(&text(rough), &request).last;
+        assert!(last.imbalance.abs() < 1e-11, "{request:?}: {:e}", last.imbalance);
+        #[cfg(feature = "digits")]
+        {
+            use super::many_digits::{last, source};
+            use driftless::arithmetic::Real;
+            let smooth = text(["", ""]);
+            let row = last(&source(&smooth, &[], "0.34", "0.34"), 22);
+            let (work, expected) = (done(&smooth, &request).last.work, row.energy[2].value());
+            assert!((work - expected).abs() < 1e-11, "{request:?}: {work} J for {expected} J");
+        }
+    }
+}
+
+/// Two links below a carriage hit the ground in turn, ever more slowly: what rounding leaves of an approach is no
+/// impact, which would have to balance and have a way back.
+#[test]
+fn impacts_that_die_away_at_two_points_end_in_rest() {
+    let text = r#"{"name": "links", "gravity": [0, -9.81], "bars": [
+            {"name": "carriage", "mass": 1.51, "centre": [0, 0], "inertia": 0.01, "length": 0.2},
+            {"name": "upper", "mass": 1.29, "centre": [0.2, 0], "inertia": 0.0172, "length": 0.4},
+            {"name": "lower", "mass": 0.97, "centre": [0.15, 0], "inertia": 0.007275, "length": 0.3}],
+        "hinges": [{"name": "hip", "between": [{"body": "carriage", "point": [0, 0]}, {"body": "upper", "point": [0, 0]}]},
+            {"name": "knee", "between": [{"body": "upper", "point": [0.4, 0]}, {"body": "lower", "point": [0, 0]}]}],
+        "sliders": [{"name": "rail", "point": {"body": "carriage", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "friction": {"kinetic": 0.1, "static": 0.35}}],
+        "walls": [{"name": "step", "body": "upper", "point": [0.4, 0], "restitution": 0,
+                "line": {"through": [0, -0.3187], "normal": [0, 1]}, "friction": {"kinetic": 0.561}},
+            {"name": "floor", "body": "lower", "point": [0.3, 0], "restitution": 0,
+                "line": {"through": [0, -0.605], "normal": [0, 1]}, "friction": {"kinetic": 0.087}}],
+        "forces": [{"name": "push", "body": "upper", "point": [0.4, 0], "force": ["6.01*sin(2.04*t+3.37)", 0]}],
+        "start": {"carriage": {"phi": 0, "origin": [0, 0], "velocity": [-0.12, 0]}, "upper": {"phi": -0.74, "omega": -0.58},
+            "lower": {"phi": -1.05, "omega": 0.73}},
+        "until": 0.6, "every": 0.6}"#;
+    let ends = requests().map(|request| done(text, &request).last.phi);
+    for (one, other) in ends[0].iter().zip(&ends[1]).chain(ends[0].iter().zip(&ends[2])) {
+        assert!((one - other).abs() < 1e-7, "{ends:?}");
+    }
+}
