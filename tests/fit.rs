@@ -2,6 +2,7 @@
 //! often as these say; a chaotic motion by multiple shooting.
 
 use driftless::run::fit::{Data, Fit, FitError, FitRequest, fit};
+use driftless::scene::Output;
 use driftless::{MethodId, Simulation, Template};
 use nalgebra::{Matrix3, Vector3};
 use std::fmt::Write;
@@ -443,6 +444,38 @@ fn pieces_of_a_motion_on_constraints_give_the_fit_of_the_whole() {
                 assert!((one.value - whole.value).abs() < 1e-3 * whole.error, "{segments} {one:?} {whole:?}");
                 assert!((one.error / whole.error - 1.0).abs() < 1e-3, "{segments} {one:?} {whole:?}");
             }
+        }
+    }
+}
+
+/// The oscillator with an output of its own, and one of the same name of `--output` in its place.
+#[test]
+fn columns_are_fitted_to_outputs_that_are_added() {
+    let own = OSCILLATOR.replacen('{', r#"{"outputs": {"q": "b.phi"},"#, 1);
+    let truth = [2.1, 0.12, 0.5, 0.3];
+    let mut text = String::from("t [s],q,b.phi [rad]\n");
+    for row in 1..=40 {
+        let t = f64::from(row) / 20.0;
+        let phi = oscillation(truth, t)[0];
+        writeln!(text, "{t},{},{phi}", 1.5 * phi).expect("a string");
+    }
+    let data = Data::parse(&text, "data.csv").expect("a table");
+    for scene in [&own, OSCILLATOR] {
+        let template = Template::new(scene.to_owned(), "oscillator.json".into(), &[]);
+        let template = template.with_outputs(vec![Output::parse("q=1.5*b.phi")]);
+        for columns in [&["q"][..], &["q", "b.phi"]] {
+            let request = FitRequest {
+                vary: ["k", "c"].map(str::to_owned).to_vec(),
+                columns: columns.iter().map(|name| (*name).to_owned()).collect(),
+                sigmas: columns.iter().map(|name| ((*name).to_owned(), 0.01)).collect(),
+                ..FitRequest::default()
+            };
+            let found =
+                fit(&template, &data, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"));
+            for (number, truth) in found.numbers.iter().zip(truth) {
+                assert!((number.value - truth).abs() < 1e-7, "{columns:?} {number:?}");
+            }
+            assert!(found.chi_square < 1e-10, "{columns:?} {}", found.chi_square);
         }
     }
 }

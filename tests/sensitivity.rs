@@ -4,6 +4,7 @@
 use crate::mechanisms::{Dice, scene as random_scene};
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::reference;
+use driftless::scene::Output;
 use driftless::{Measure, Regime, Sensitivity, SensitivityRequest, Template, lyapunov, sensitivity};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -762,5 +763,25 @@ fn extremes_at_an_event_move_with_it() {
         assert_near(measure.value, value, 1e-9, &measure.name);
         let slopes = measure.slopes.iter().zip(slopes);
         slopes.for_each(|(found, expected)| assert_near(*found, expected, 1e-9, &measure.name));
+    }
+}
+
+/// A flight at (2, 3) m/s: what `--output` adds is derived beside formulas that are asked for, and in place of an
+/// output of the scene of the same name.
+#[test]
+fn outputs_that_are_added_are_derived() {
+    let text = r#"{"name": "flight", "gravity": [0, 0],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "points": [{"name": "p", "body": "b", "point": [0, 0]}], "outputs": {"q": "p.x"},
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [2, 3]}}, "until": 5, "every": 5}"#;
+    let without = text.replace(r#""outputs": {"q": "p.x"},"#, "");
+    for text in [text, &without] {
+        let template = template(text).with_outputs(vec![Output::parse("q=p.x^2")]);
+        let found = derived(&template, &["q", "p.x*p.y", "max:q"], &["b.velocity[0]"], 3.0);
+        for (measure, (value, slope)) in found.measures.iter().zip([(36.0, 36.0), (54.0, 27.0), (36.0, 36.0)])
+        {
+            assert_near(measure.value, value, 1e-9, &measure.name);
+            assert_near(measure.slopes[0], slope, 1e-9, &measure.name);
+        }
     }
 }

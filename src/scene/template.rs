@@ -80,10 +80,12 @@ impl Template {
         Self { text, source, overrides: overrides.to_vec(), outputs: Vec::new() }
     }
 
-    /// The same with outputs beside those of the scene, or in place of those of the same names.
+    /// The same with outputs beside those there are, of the scene or from a call before, or in place of those
+    /// of the same names.
     #[must_use]
-    pub fn with_outputs(self, outputs: Vec<Output>) -> Self {
-        Self { outputs, ..self }
+    pub fn with_outputs(mut self, outputs: Vec<Output>) -> Self {
+        outputs.into_iter().for_each(|output| output.put(&mut self.outputs));
+        self
     }
 
     /// The scene as it stands.

@@ -236,7 +236,7 @@ pub fn fit(
         let text = format!("{measurements} cannot determine {numbers}");
         return Err(FitError::Data(format!("{}: {text}\nhint: more rows or columns", data.source)));
     }
-    let indices = indices(&first, &columns);
+    let indices = indices(&first, data, &columns)?;
     let sizes = sizes(&first, &indices, &columns);
     for (column, size) in columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given) {
         column.sigma = SPREAD[0] * size;
@@ -295,10 +295,16 @@ pub fn fit(
 }
 
 /// Numbers of the outputs of the columns.
-fn indices(study: &Study, columns: &[FittedColumn]) -> Vec<usize> {
+fn indices(study: &Study, data: &Data, columns: &[FittedColumn]) -> Result<Vec<usize>, FitError> {
     let heads: Vec<&str> =
         study.mechanism.outputs.iter().flat_map(|outputs| outputs.heads()).map(|(name, _)| name).collect();
-    columns.iter().filter_map(|column| heads.iter().position(|head| *head == column.name)).collect()
+    let index = |column: &FittedColumn| {
+        heads.iter().position(|head| *head == column.name).ok_or_else(|| {
+            let text = format!("{}: column {} is no output of the motion", data.source, column.name);
+            FitError::Data(format!("{text}\nhint: the motion has: {}", heads.join(", ")))
+        })
+    };
+    columns.iter().map(index).collect()
 }
 
 /// What the noise of columns is measured by: their spread, or where constraints keep them in one place, for
