@@ -479,3 +479,70 @@ fn columns_are_fitted_to_outputs_that_are_added() {
         }
     }
 }
+
+/// One row of angle and rate for one number: a single residual, which any ratio of their noises explains.  Two rows
+/// of one column tell its noise, and so do a few rows of both; not what a column has of its own number alone.
+#[test]
+fn noise_that_the_data_do_not_tell_is_named() {
+    let ended = |text: &str, vary: &[&str], sigmas: &[(&str, f64)]| {
+        let template = Template::new(OSCILLATOR.into(), "oscillator.json".into(), &[]);
+        let request = FitRequest {
+            vary: vary.iter().map(|name| (*name).to_owned()).collect(),
+            sigmas: sigmas.iter().map(|(name, sigma)| ((*name).to_owned(), *sigma)).collect(),
+            ..FitRequest::default()
+        };
+        let data = Data::parse(text, "data.csv").expect("a table");
+        let found = fit(&template, &data, &request, &mut || false).unwrap_or_else(|error| panic!("{error}"));
+        (found.ended, found.columns)
+    };
+    let one = "t [s],b.phi [rad],b.omega [rad/s]\n1,-0.13,-1.0\n";
+    let told = ended(one, &["a"], &[]).0;
+    assert!(told.contains("the noise of b.phi, b.omega is not told: --sigma b.phi="), "{told}");
+    assert!(!ended(one, &["a"], &[("b.phi", 0.1), ("b.omega", 0.1)]).0.contains("not told"));
+    let two = "t [s],b.phi [rad]\n0.5,0.31\n1,-0.13\n";
+    assert!(!ended(two, &["a"], &[]).0.contains("not told"));
+    let three = "t [s],b.phi [rad],b.omega [rad/s]\n0.5,0.31,\n1,-0.13,-1.0\n";
+    assert!(ended(three, &["a"], &[]).0.contains("not told"));
+    let few = "t [s],b.phi [rad],b.omega [rad/s]\n0.3,0.5,-0.3\n0.5,0.31,-0.8\n1,-0.13,-1.0\n1.5,-0.4,-0.2\n";
+    let (told, _) = ended(few, &["a"], &[]);
+    assert!(!told.contains("not told"), "{told}");
+    // A column without values has no noise, found or not.
+    let (_, columns) = ended("t [s],b.phi [rad],b.omega [rad/s]\n0.5,0.31,\n1,-0.13,\n", &["a"], &[]);
+    assert!(columns[1].sigma.is_nan() && columns[0].sigma > 0.0, "{columns:?}");
+}
+
+/// An angle that stays where no motion from the start is: ever stiffer springs and dampers fit it better.
+#[test]
+fn a_search_that_runs_away_says_where_to() {
+    let text = r#"{"name": "pendulum", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 0.7, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "s", "body": "a", "stiffness": 2, "free_angle": 0, "damping": 0.05}],
+        "start": {"a": {"phi": -0.7, "omega": 1.2}}, "until": 6, "every": 0.05}"#;
+    let data = Data::parse("t [s],a.phi [rad]\n1,1\n2,1\n3,1\n", "data.csv").expect("a table");
+    let template = Template::new(text.into(), "pendulum.json".into(), &[]);
+    let vary = ["s.stiffness", "s.damping"].map(str::to_owned).to_vec();
+    let request = FitRequest { vary, ..FitRequest::default() };
+    let error = fit(&template, &data, &request, &mut || false).map(|_| ()).expect_err("no fit").to_string();
+    println!("{error}");
+    assert!(error.contains("the search ran from ") && error.contains("hint: "), "{error}");
+}
+
+/// What is no number to be found is refused like a name that is none.
+#[test]
+fn numbers_are_named_once_and_are_such_that_the_motion_depends_on() {
+    let data = data(&template("free", &[]), 1.0, 0.1, 1e-3, 3);
+    for (vary, told) in [
+        (&["gravity[0]", "gravity[0]"][..], "--vary names gravity[0] twice"),
+        (&["bars.bar1.length", "bar1.length"], "--vary names bars.bar1.length twice"),
+        (&["gravity[0]", "until"], "--vary until: no motion depends on it"),
+    ] {
+        let request = FitRequest {
+            vary: vary.iter().map(|name| (*name).to_owned()).collect(),
+            ..FitRequest::default()
+        };
+        let error = fit(&template("free", &[]), &data, &request, &mut || false).map(|_| ()).expect_err(told);
+        assert!(error.to_string().contains(told), "{error}");
+        assert!(matches!(error, FitError::Sensitivity(_)), "{error:?}");
+    }
+}

@@ -46,9 +46,10 @@ fn residuals(column: &FittedColumn) -> impl Iterator<Item = Option<f64>> {
         .map(|(measured, model)| measured.map(|measured| measured - model))
 }
 
+/// NaN of a column without values.
 fn rms(column: &FittedColumn) -> f64 {
     let squares: Vec<f64> = residuals(column).flatten().map(|residual| residual * residual).collect();
-    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
 /// The page.
@@ -69,8 +70,12 @@ pub fn text(found: &Fit) -> String {
     page.table(&["number", "guess", "value", "std. error"], &rows);
     let rows: Vec<Vec<String>> = (found.columns.iter())
         .map(|column| {
+            let name = format!("{} [{}]", column.name, column.unit);
+            if column.measured.iter().all(Option::is_none) {
+                return vec![name, "no values".into(), String::new()];
+            }
             let sigma = format!("{}{}", rough(column.sigma), if column.is_given { "" } else { " (found)" });
-            vec![format!("{} [{}]", column.name, column.unit), magnitude(rms(column)), sigma]
+            vec![name, magnitude(rms(column)), sigma]
         })
         .collect();
     page.entry("columns", "residuals and the noise they were weighted with");

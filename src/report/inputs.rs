@@ -9,12 +9,12 @@ use std::f64::consts::TAU;
 /// Numbers shown on a page; the rest is summed up.
 const SHOWN: usize = 16;
 
-/// The entry `inputs` of `trust`: effects in rad, or as shares of the longest bar, at most a turn; `null`
-/// where they were not asked for.
+/// The entry `inputs` of `trust`: effects in rad, or as shares of the longest bar, at most a turn, with
+/// `is_capped` where they are larger; `null` where they were not asked for.
 pub fn object(inputs: Option<&Inputs>) -> Value {
     let Some(inputs) = inputs else { return Value::Null };
     let number = |input: &Input| {
-        json!({
+        let mut number = json!({
             "path": input.path,
             "unit": input.unit,
             "value": input.value,
@@ -23,9 +23,14 @@ pub fn object(inputs: Option<&Inputs>) -> Value {
             "is_upper_bound": input.is_upper_bound,
             "at": inputs.at,
             "why": input.why,
-        })
+        });
+        if input.effect.is_some_and(|effect| effect > TAU) {
+            number["is_capped"] = Value::Bool(true);
+        }
+        number
     };
-    json!({
+    let is_capped = inputs.total.is_some_and(|total| total > TAU);
+    let mut object = json!({
         "at_s": inputs.at,
         "total_rad": inputs.total.map(bounded),
         "numbers": inputs.numbers.iter().map(number).collect::<Vec<_>>(),
@@ -33,7 +38,11 @@ pub fn object(inputs: Option<&Inputs>) -> Value {
         "runs": inputs.runs,
         "evaluations": inputs.evaluations,
         "why": inputs.why,
-    })
+    });
+    if is_capped {
+        object["is_capped"] = Value::Bool(true);
+    }
+    object
 }
 
 /// An angle cannot be more uncertain than by a turn.

@@ -32,7 +32,19 @@ impl FitProblem<'_> {
             (problem, ended) = problem.minimize_free(columns, weight)?;
             turns -= 1;
         }
+        if problem.was_too_long && !problem.is_settled()? {
+            return Err(problem.too_long().into());
+        }
         Ok((problem, ended))
+    }
+
+    /// True where a step of Gauss and Newton takes next to nothing off the sum of squares.
+    fn is_settled(&self) -> Result<bool, Lost> {
+        let svd = self.decomposed()?;
+        let residuals = &self.found.as_ref().map_err(Clone::clone)?.residuals;
+        let u = svd.u.as_ref().ok_or("the Jacobian has no singular values")?;
+        let settled = SETTLED[0].max(SETTLED[1] * residuals.norm_squared());
+        Ok(u.tr_mul(residuals).norm_squared() <= settled)
     }
 
     /// True of a number the scene takes in place of that of an unknown.
@@ -45,16 +57,11 @@ impl FitProblem<'_> {
 
     /// Holds the number that ended the search at its bound; false where there is none.
     fn hold(&mut self) -> Result<bool, Lost> {
-        if !self.was_refused {
+        if !self.was_refused || self.is_settled()? {
             return Ok(false);
         }
         let svd = self.decomposed()?;
         let residuals = &self.found.as_ref().map_err(Clone::clone)?.residuals;
-        let u = svd.u.as_ref().ok_or("the Jacobian has no singular values")?;
-        let settled = SETTLED[0].max(SETTLED[1] * residuals.norm_squared());
-        if u.tr_mul(residuals).norm_squared() <= settled {
-            return Ok(false);
-        }
         let Ok(step) = svd.solve(residuals, rounding(&svd.singular_values)) else { return Ok(false) };
         let count = self.held.len();
         for (place, k) in self.free().into_iter().enumerate().filter(|(_, k)| *k < count) {

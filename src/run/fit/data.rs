@@ -4,6 +4,9 @@ use super::FitError;
 use crate::scene::formula::unit::{Dimension, UnitScale};
 use std::path::Path;
 
+/// What separates columns elsewhere.
+const SEPARATORS: [(char, &str); 2] = [(';', "semicolons"), ('\t', "tabs")];
+
 /// A table of measurements.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Data {
@@ -40,6 +43,12 @@ impl Data {
             csv::ReaderBuilder::new().comment(Some(b'#')).trim(csv::Trim::All).from_reader(text.as_bytes());
         let fail = |what: String, hint: &str| FitError::Data(format!("{source}: {what}\nhint: {hint}"));
         let header = reader.headers().map_err(|error| fail(error.to_string(), "a table of numbers"))?.clone();
+        let is_one = |mark: char| header.len() == 1 && header[0].contains(mark);
+        if let Some((_, what)) = SEPARATORS.iter().find(|(mark, _)| is_one(*mark)) {
+            let hint =
+                format!("columns are separated by commas, not by {what}, as in `t [s],bar1.phi [rad]`");
+            return Err(fail("line 1 is a single column".into(), &hint));
+        }
         let heads: Vec<(&str, Option<&str>)> = header.iter().map(head).collect();
         let names: Vec<&str> = heads.iter().map(|(name, _)| *name).collect();
         let time = names.iter().position(|name| *name == "t").ok_or_else(|| {
@@ -91,9 +100,16 @@ impl Data {
     }
 }
 
-/// Name and unit of a column: `bar1.phi [rad]`; a unit `?` is none.
+/// Name and unit of a column: `bar1.phi [rad]`, with or without the blank; a unit `?` is none.  Without it
+/// brackets with a number in them are a part of the name, and so are those that do not end it.
 fn head(head: &str) -> (&str, Option<&str>) {
-    let (name, unit) = head.split_once(" [").map_or((head, None), |(name, unit)| (name, Some(unit)));
+    let has_unit = |(_, unit): &(&str, &str)| {
+        unit.ends_with(']') && !unit.starts_with(|first: char| first.is_ascii_digit())
+    };
+    let (name, unit) = head
+        .split_once(" [")
+        .or_else(|| head.rsplit_once('[').filter(has_unit))
+        .map_or((head, None), |(name, unit)| (name, Some(unit)));
     let unit = unit.map(|unit| unit.trim().trim_end_matches(']').trim());
     (name.trim(), unit.filter(|unit| *unit != "?"))
 }
@@ -110,6 +126,9 @@ mod tests {
         assert_eq!(data.columns[1], ("x".into(), vec![None, Some(2.0)]));
         for (text, told) in [
             ("bar1.phi\n1\n", "no column of times"),
+            ("bar1.phi\n1\n", "name one `t [s]`"),
+            ("t [s];bar1.phi [rad]\n0;1\n", "separated by commas, not by semicolons"),
+            ("t [s]\tbar1.phi [rad]\n0\t1\n", "separated by commas, not by tabs"),
             ("t,a\n0,1\n0,2\n", "line 3, column t: 0"),
             ("t,a\n0,one\n", "line 2, column a: `one`"),
             ("t,a\n", "no rows"),
@@ -131,5 +150,9 @@ mod tests {
         assert_eq!(values, [std::f64::consts::PI, 0.002, 7.0, 8.0].map(Some));
         let units: Vec<_> = data.units.iter().map(Option::as_deref).collect();
         assert_eq!(units, [Some("deg"), Some("mm"), Some("counts"), None]);
+        let data = Data::parse("t[ms],bar1.phi[deg],P.x[2],[m]\n500,180,2,1\n", "data.csv").expect("a table");
+        assert_eq!((&data.times[..], data.columns[0].1[0]), (&[0.5][..], Some(std::f64::consts::PI)));
+        let names: Vec<_> = data.columns.iter().map(|(name, _)| name.as_str()).collect();
+        assert_eq!(names, ["bar1.phi", "P.x[2]", ""]);
     }
 }

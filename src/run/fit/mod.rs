@@ -18,6 +18,7 @@
 
 mod bounds;
 mod data;
+mod noise;
 mod problem;
 mod search;
 mod segment;
@@ -25,7 +26,6 @@ mod segment;
 pub use data::Data;
 
 use super::driver::Pause;
-use super::extremes::ExtremesDetector;
 use super::sensitivity::{Measure, SensitivityError, SensitivityRequest, Study};
 use crate::scene::formula::unit::UnitScale;
 use crate::scene::{Output, OutputNames, Scene, SceneError, Template, Variable};
@@ -33,15 +33,8 @@ use nalgebra::DMatrix;
 use problem::FitProblem;
 use segment::Lost;
 
-/// Share of a column's spread taken for its noise where nobody says, to begin with and at least.
-const SPREAD: [f64; 2] = [1e-2, 1e-10];
-/// Least spread a column counts with, over what it changes by in one unit of a coordinate or rate.
-const KEPT: f64 = 1e-3;
-/// How often noise is estimated anew at most, and what it changes by in the last of them.
+/// How often noise is estimated anew at most.
 const ROUNDS: usize = 40;
-const STEADY: f64 = 1e-3;
-/// Rows of a column that are left beside the numbers it tells, at least.
-const LEFT: f64 = 1e-3;
 /// Weights of continuity, over the least noise, one after the other.
 const CONTINUITY: [f64; 3] = [0.1, 10.0, 1e3];
 
@@ -99,7 +92,7 @@ impl From<Lost> for FitError {
     fn from(lost: Lost) -> Self {
         match lost {
             Lost::Interrupted => Self::Interrupted,
-            Lost::Why(why) => Self::Failed(why),
+            Lost::TooLong(_) | Lost::Why(_) => Self::Failed(lost.to_string()),
         }
     }
 }
@@ -134,7 +127,7 @@ pub struct FittedColumn {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Standard deviation of its noise.
+    /// Standard deviation of its noise; NaN of a column without values.
     pub sigma: f64,
     /// Whether that was given.
     pub is_given: bool,
@@ -142,6 +135,18 @@ pub struct FittedColumn {
     pub model: Vec<f64>,
     /// What was measured.
     pub measured: Vec<Option<f64>>,
+}
+
+impl FittedColumn {
+    /// Measured less fitted.
+    fn residuals(&self) -> impl Iterator<Item = f64> {
+        self.measured.iter().zip(&self.model).filter_map(|(measured, model)| Some((*measured)? - model))
+    }
+
+    /// How many values there are.
+    fn count(&self) -> usize {
+        self.measured.iter().flatten().count()
+    }
 }
 
 /// Numbers of a scene fitted to data.
@@ -205,13 +210,7 @@ pub fn fit(
 ) -> Result<Fit, FitError> {
     let scene = template.scene()?;
     let (outputs, ignored) = chosen(&scene, data, request)?;
-    let variables: Vec<Variable> =
-        request.vary.iter().map(|name| template.variable(name)).collect::<Result<_, _>>()?;
-    if variables.is_empty() {
-        return Err(FitError::Asked(
-            "nothing to fit\nhint: name numbers of the scene, as --vary spring.stiffness".into(),
-        ));
-    }
+    let variables = varied(template, request)?;
     let mut columns = columns(data, &outputs, request)?;
     let rows = data.times.len();
     if request.segments == 0 || request.segments > rows.max(2) / 2 {
@@ -226,6 +225,10 @@ pub fn fit(
         tolerance: request.tolerance,
     };
     let first = Study::new(template, &study_request)?;
+    if let Some(number) = first.idle().next() {
+        let text = format!("--vary {}: no motion depends on it", number.path);
+        return Err(SensitivityError::Unsuited(format!("{text}\nhint: leave it out")).into());
+    }
     let guess: Vec<f64> = first.inputs.iter().map(|input| input.value).collect();
     let count = columns.iter().flat_map(|column| &column.measured).flatten().count();
     if count <= guess.len() {
@@ -237,10 +240,8 @@ pub fn fit(
         return Err(FitError::Data(format!("{}: {text}\nhint: more rows or columns", data.source)));
     }
     let indices = indices(&first, data, &columns)?;
-    let sizes = sizes(&first, &indices, &columns);
-    for (column, size) in columns.iter_mut().zip(&sizes).filter(|(column, _)| !column.is_given) {
-        column.sigma = SPREAD[0] * size;
-    }
+    let sizes = noise::sizes(&first, &indices, &columns);
+    noise::guess(&mut columns, &sizes);
     let mut problem = FitProblem::new(
         template,
         (variables, guess.clone()),
@@ -249,23 +250,7 @@ pub fn fit(
         pause,
     );
     problem.guess_states(&columns)?;
-    let mut ended = String::new();
-    for round in 1..=ROUNDS {
-        let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
-        let weights = if request.segments > 1 { &CONTINUITY[..] } else { &CONTINUITY[..1] };
-        for weight in weights {
-            (problem, ended) = problem.minimize(&columns, weight / least)?;
-        }
-        problem.take_model(&mut columns)?;
-        let told = problem.told(columns.len())?;
-        match estimate_noise(&mut columns, &sizes, &told) {
-            None => break,
-            Some(name) if round == ROUNDS => {
-                ended += &format!("; the noise of {name} is not told: --sigma {name}=… gives it");
-            }
-            Some(_) => (),
-        }
-    }
+    let (mut problem, ended) = weighted(problem, &mut columns, &sizes)?;
     let covariance = problem.covariance(&columns)?;
     let (values, held) = (problem.values(), problem.held());
     let scene = template.filled(problem.variables(), &values)?;
@@ -277,7 +262,8 @@ pub fn fit(
         error: if held[k] { f64::NAN } else { covariance[(k, k)].sqrt() },
         is_at_bound: held[k],
     });
-    let square = |column: &FittedColumn| (residuals(column).map(|r| (r / column.sigma).powi(2))).sum::<f64>();
+    let square =
+        |column: &FittedColumn| (column.residuals().map(|r| (r / column.sigma).powi(2))).sum::<f64>();
     Ok(Fit {
         numbers: numbers.collect(),
         chi_square: columns.iter().map(square).sum(),
@@ -294,6 +280,53 @@ pub fn fit(
     })
 }
 
+/// The numbers to be found, each once.
+fn varied(template: &Template, request: &FitRequest) -> Result<Vec<Variable>, FitError> {
+    let mut variables: Vec<Variable> = Vec::new();
+    for name in &request.vary {
+        let variable = template.variable(name)?;
+        if variables.iter().any(|known| known.path == variable.path) {
+            let text = format!("--vary names {} twice\nhint: name each number once", variable.path);
+            return Err(SensitivityError::Unsuited(text).into());
+        }
+        variables.push(variable);
+    }
+    match variables.is_empty() {
+        true => Err(FitError::Asked(
+            "nothing to fit\nhint: name numbers of the scene, as --vary spring.stiffness".into(),
+        )),
+        false => Ok(variables),
+    }
+}
+
+/// The minimum with the noise of the columns that is found there, and how the search for it ended.
+fn weighted<'a>(
+    mut problem: FitProblem<'a>,
+    columns: &mut [FittedColumn],
+    sizes: &[f64],
+) -> Result<(FitProblem<'a>, String), Lost> {
+    let (mut ended, mut untold) = (String::new(), Vec::new());
+    for _ in 0..ROUNDS {
+        let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
+        let weights = if problem.has_segments() { &CONTINUITY[..] } else { &CONTINUITY[..1] };
+        for weight in weights {
+            (problem, ended) = problem.minimize(columns, weight / least)?;
+        }
+        problem.take_model(columns)?;
+        let told = problem.told(columns.len())?;
+        let moving = noise::estimate(columns, sizes, &told);
+        untold = noise::untold(columns, &told);
+        if moving.is_empty() {
+            break;
+        }
+        untold.extend(moving.into_iter().filter(|name| !untold.contains(name)).collect::<Vec<_>>());
+    }
+    if let Some(first) = untold.first() {
+        ended += &format!("; the noise of {} is not told: --sigma {first}=… gives it", untold.join(", "));
+    }
+    Ok((problem, ended))
+}
+
 /// Numbers of the outputs of the columns.
 fn indices(study: &Study, data: &Data, columns: &[FittedColumn]) -> Result<Vec<usize>, FitError> {
     let heads: Vec<&str> =
@@ -305,19 +338,6 @@ fn indices(study: &Study, data: &Data, columns: &[FittedColumn]) -> Result<Vec<u
         })
     };
     columns.iter().map(index).collect()
-}
-
-/// What the noise of columns is measured by: their spread, or where constraints keep them in one place, for
-/// the rounding of values there not to outweigh all others, a part of what a unit of a coordinate changes.
-fn sizes(study: &Study, indices: &[usize], columns: &[FittedColumn]) -> Vec<f64> {
-    let detector = ExtremesDetector::new(&study.mechanism);
-    let changes = detector.map(|mut detector| detector.changes(&study.start)).unwrap_or_default();
-    let change = |index: &usize| changes.get(*index).copied().filter(|change| change.is_finite());
-    let size = |(index, column): (&usize, &FittedColumn)| {
-        let size = spread(&column.measured).max(KEPT * change(index).unwrap_or_default());
-        if size > 0.0 { size } else { 1.0 }
-    };
-    indices.iter().zip(columns).map(size).collect()
 }
 
 /// Outputs of the columns that count, and the names of those that mean nothing.
@@ -396,32 +416,4 @@ fn columns(data: &Data, outputs: &[Output], request: &FitRequest) -> Result<Vec<
         FittedColumn { name, unit, sigma, is_given: given.is_some(), model, measured }
     };
     Ok(outputs.iter().map(column).collect())
-}
-
-/// Measured less fitted.
-fn residuals(column: &FittedColumn) -> impl Iterator<Item = f64> {
-    column.measured.iter().zip(&column.model).filter_map(|(measured, model)| Some((*measured)? - model))
-}
-
-/// Finds the noise of columns for which nobody says, from what the residuals leave beside so many numbers;
-/// returns one whose noise is not yet what the fit was weighted with.
-fn estimate_noise(columns: &mut [FittedColumn], sizes: &[f64], told: &[f64]) -> Option<String> {
-    let mut moving = None;
-    for ((column, size), told) in columns.iter_mut().zip(sizes).zip(told).filter(|((c, _), _)| !c.is_given) {
-        let count = residuals(column).count() as f64;
-        let squares = residuals(column).map(|residual| residual * residual).sum::<f64>();
-        let sigma = (squares / (count - told).max(LEFT)).sqrt().max(SPREAD[1] * size);
-        if (sigma / column.sigma - 1.0).abs() > STEADY {
-            moving.get_or_insert_with(|| column.name.clone());
-        }
-        column.sigma = sigma;
-    }
-    moving
-}
-
-/// Root mean square about the mean.
-fn spread(values: &[Option<f64>]) -> f64 {
-    let count = values.iter().flatten().count().max(1) as f64;
-    let mean = values.iter().flatten().sum::<f64>() / count;
-    (values.iter().flatten().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
 }

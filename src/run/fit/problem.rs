@@ -12,7 +12,7 @@ use super::data::Data;
 use super::segment::{Frame, Lost, Place, SegmentOutcome, pass};
 use crate::dynamics::Time;
 use crate::run::driver::Pause;
-use crate::scene::{Template, Variable};
+use crate::scene::{Template, Variable, about};
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::ops::Range;
@@ -21,6 +21,15 @@ use std::ops::Range;
 const TURNS: usize = 40;
 /// Weight of a state as guessed, where a part does not tell it.
 const GUESSED: f64 = 1e-3;
+
+/// Steps that a run of the search may take, over those of the guess, and at least: where it takes more, the
+/// search is on its way to where nothing is told, as to a stiffness of 1e12 N/m.
+const MANY: u64 = 50;
+const FEW: u64 = 2_000;
+
+/// What to do where the search runs away.
+pub(super) const HINT: &str =
+    "hint: begin nearer to the data by --set, vary fewer numbers, or take data that tell more";
 
 /// A part of the data: its rows, when it begins and ends, and the state it begins with (none for the first,
 /// which begins as the scene does).
@@ -55,12 +64,23 @@ pub(super) struct FitProblem<'a> {
     unit: Vec<f64>,
     pause: RefCell<&'a mut dyn FnMut() -> bool>,
     runs: u64,
+    /// Steps that a run may take; no bound before the first, whose steps tell it.
+    most: u64,
+    /// True where one since the last trial took more than four fifths of them.
+    pub(super) is_long: bool,
+    /// The numbers as guessed, over their scale.
+    guess: Vec<f64>,
     measured: Vec<Vec<Option<f64>>>,
     sigma: Vec<f64>,
     pub(super) weight: f64,
     pub(super) x: DVector<f64>,
-    /// True where the search was refused a step.
+    /// True where the search was refused a step, and where a run at it would take too many steps.
     pub(super) was_refused: bool,
+    pub(super) was_too_long: bool,
+    /// Trials that took nearly as many, or too many.
+    pub(super) long_trials: usize,
+    /// Residual in place of one that cannot be computed.
+    pub(super) far: f64,
     /// Numbers that are held at a bound, with the sign of the direction beyond it.
     pub(super) held: Vec<Option<f64>>,
     pub(super) found: Result<Evaluated, Lost>,
@@ -85,10 +105,16 @@ impl<'a> FitProblem<'a> {
             state: None,
             tangent: DMatrix::zeros(0, 0),
         });
-        let x = guess.iter().zip(&scale).map(|(value, scale)| value / scale);
+        let x: Vec<f64> = guess.iter().zip(&scale).map(|(value, scale)| value / scale).collect();
         Self {
-            x: DVector::from_iterator(guess.len(), x),
+            x: DVector::from_column_slice(&x),
+            guess: x,
+            most: u64::MAX,
+            is_long: false,
             was_refused: false,
+            was_too_long: false,
+            long_trials: 0,
+            far: f64::INFINITY,
             held: vec![None; guess.len()],
             parts: parts.collect(),
             measured: Vec::new(),
@@ -119,6 +145,10 @@ impl<'a> FitProblem<'a> {
     /// Which of them are at a bound.
     pub fn held(&self) -> Vec<bool> {
         self.held.iter().map(Option::is_some).collect()
+    }
+
+    pub fn has_segments(&self) -> bool {
+        self.parts.len() > 1
     }
 
     pub fn runs(&self) -> u64 {
@@ -222,7 +252,39 @@ impl<'a> FitProblem<'a> {
         let times = &self.times[part.rows.clone()];
         let mut pause = self.pause.borrow_mut();
         let is_one_of_several = self.parts.len() > 1;
-        pass(study, from, (times, part.span[1]), is_one_of_several, &mut **pause)
+        let passed = pass(study, from, (times, part.span[1]), (is_one_of_several, self.most), &mut **pause);
+        self.is_long |= match &passed {
+            Ok(passed) => passed.effort > self.most / 5 * 4,
+            Err(why) => matches!(why, Lost::TooLong(_)),
+        };
+        let passed = passed?;
+        if self.most == u64::MAX {
+            self.most = passed.effort.saturating_mul(MANY).max(FEW);
+        }
+        Ok(passed)
+    }
+
+    /// Where the search is with a number, and where it began, once it is elsewhere.
+    pub(super) fn ran_to(&self, k: usize) -> Option<String> {
+        let (path, scale) = (&self.variables[k].path, self.scale[k]);
+        let [at, from] = [self.x[k], self.guess[k]].map(|x| about(scale * x));
+        (self.x[k] != self.guess[k]).then(|| format!("the search ran from {path} = {from} to {at}"))
+    }
+
+    /// Why the search cannot go on to runs that take too many steps, with the number that is farthest from
+    /// its guess.
+    pub(super) fn too_long(&self) -> String {
+        let away = |k: &usize| (self.x[*k] - self.guess[*k]).abs();
+        let farthest = (0..self.guess.len()).max_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or_default();
+        let beyond = format!("a run takes more than {} steps", self.most);
+        match self.ran_to(farthest) {
+            Some(ran) => format!("{ran}, beyond which {beyond}\n{HINT}"),
+            None => format!(
+                "beside the guess, {} = {}, {beyond}",
+                self.variables[farthest].path,
+                about(self.scale[farthest] * self.x[farthest])
+            ),
+        }
     }
 
     /// Residuals of the rows of a part, with their slopes by the numbers and by its state.

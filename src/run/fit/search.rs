@@ -1,7 +1,7 @@
 //! The search for the minimum, and what it says of the numbers.
 
 use super::FittedColumn;
-use super::problem::{Evaluated, FitProblem};
+use super::problem::{Evaluated, FitProblem, HINT};
 use super::segment::Lost;
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
@@ -10,8 +10,12 @@ use nalgebra::{DMatrix, DVector, Dyn, SVD};
 /// Relative tolerance of the search, and evaluations for each unknown.
 const TOLERANCE: f64 = 1e-11;
 const PATIENCE: usize = 40;
-/// Residual in place of one that cannot be computed: the step is taken back.
+/// Residual in place of one that cannot be computed, at least, and over all at the beginning: the step is
+/// taken back.
 const FAR: f64 = 1e9;
+const FARTHER: f64 = 10.0;
+/// Trials in all that may take nearly as many steps as one is allowed, or too many.
+const LONG: usize = 8;
 /// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
 const NOTHING: f64 = 1e-11;
 
@@ -39,12 +43,15 @@ impl FitProblem<'_> {
         weight: f64,
     ) -> Result<(Self, String), Lost> {
         self.take(columns);
-        (self.weight, self.was_refused) = (weight, false);
+        (self.weight, self.was_refused, self.was_too_long) = (weight, false, false);
         self.found = self.evaluate();
         match &self.found {
             Err(Lost::Interrupted) => return Err(Lost::Interrupted),
             Err(why) => return Err(format!("the motion from the guess has no derivatives: {why}").into()),
-            Ok(found) => self.acting(columns, &found.jacobian)?,
+            Ok(found) => {
+                self.far = FAR.max(FARTHER * found.residuals.norm());
+                self.acting(columns, &found.jacobian)?;
+            }
         }
         let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
         let (mut problem, report) = search.minimize(self);
@@ -67,19 +74,27 @@ impl FitProblem<'_> {
         let is_free = |k: &usize| self.held[*k].is_none();
         let mut idle =
             (0..self.variables.len()).filter(is_free).filter(|&k| jacobian.column(k).amax() < NOTHING * size);
-        let error = |k: usize| Err(format!("the data do not depend on {}", self.variables[k].path).into());
+        let error = |k: usize| {
+            let path = &self.variables[k].path;
+            Err(Lost::from(match self.ran_to(k) {
+                Some(ran) => format!("{ran}, where the data do not depend on it\n{HINT}"),
+                None => format!("the data do not depend on {path}"),
+            }))
+        };
         idle.next().map_or(Ok(()), error)
     }
 
-    /// How many of the unknowns each column tells: the sum of the leverages of its rows.
-    pub fn told(&self, columns: usize) -> Result<Vec<f64>, Lost> {
+    /// What each column tells of the unknowns: UᵀU of its rows, J = U S Vᵀ, whose trace is the sum of their
+    /// leverages.
+    pub fn told(&self, columns: usize) -> Result<Vec<DMatrix<f64>>, Lost> {
         let (svd, found) = (self.decomposed()?, self.found.as_ref().map_err(Clone::clone)?);
         let (values, least) = (&svd.singular_values, rounding(&svd.singular_values));
-        let mut told = vec![0.0; columns];
+        let known: Vec<usize> = (0..values.len()).filter(|&k| values[k] > least).collect();
+        let mut told = vec![DMatrix::zeros(known.len(), known.len()); columns];
         for (row, owner) in svd.u.iter().flat_map(|u| u.row_iter()).zip(&found.owners) {
             let Some(column) = *owner else { continue };
-            let known = row.iter().zip(values).filter(|(_, value)| **value > least);
-            told[column] += known.map(|(u, _)| u * u).sum::<f64>();
+            let row = DVector::from_iterator(known.len(), known.iter().map(|&k| row[k]));
+            told[column].ger(1.0, &row, &row, 1.0);
         }
         Ok(told)
     }
@@ -124,13 +139,20 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for FitProblem<'_> {
             self.x[k] = x[k];
         }
         let size = self.found.as_ref().map_or(0, |found| found.residuals.len());
+        self.is_long = false;
         let found = self.evaluate();
+        self.long_trials += usize::from(self.is_long);
+        if self.is_long && self.long_trials >= LONG && !matches!(found, Err(Lost::Interrupted)) {
+            self.found = Err(self.too_long().into());
+            return;
+        }
         // What cannot be computed is far away: the step is taken back.
         self.found = match found {
             Ok(_) | Err(Lost::Interrupted) => found,
-            Err(_) => {
+            Err(why) => {
                 self.was_refused = true;
-                let (residuals, gap) = (DVector::from_element(size, FAR), f64::NAN);
+                self.was_too_long |= matches!(why, Lost::TooLong(_));
+                let (residuals, gap) = (DVector::from_element(size, self.far), f64::NAN);
                 let jacobian = DMatrix::zeros(size, x.len());
                 Ok(Evaluated { residuals, jacobian, owners: Vec::new(), model: Vec::new(), gap })
             }

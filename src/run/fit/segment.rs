@@ -8,6 +8,7 @@ use super::super::sensitivity::{Derived, Look, Study, Variation, outputs};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::{Motion, Time};
 use crate::run::driver::Pause;
+use crate::stepping::{Cause, StepError};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
@@ -20,6 +21,9 @@ pub(super) enum Lost {
     /// It was paused.
     #[error("interrupted")]
     Interrupted,
+    /// It takes more than so many steps.
+    #[error("a run takes more than {0} steps")]
+    TooLong(u64),
     /// It cannot be computed.
     #[error("{0}")]
     Why(String),
@@ -39,6 +43,8 @@ pub(super) struct SegmentOutcome {
     pub end: Place,
     /// The columns there.
     pub columns: Vec<Vec<f64>>,
+    /// Expansions of the motion, or steps of the columns, whichever are more.
+    pub effort: u64,
 }
 
 /// The local coordinates of a start: directions that the constraints leave at the base of these, orthonormal
@@ -83,7 +89,8 @@ impl Frame<'_> {
 
 /// Integrates from `from` (time, state and its local coordinates; from the scene's start where there is none)
 /// to `until` \[s\], looking at `times`, with columns for the numbers of a study and then for the local
-/// coordinates; one of several parts is to leave nothing but a state.
+/// coordinates; one of several parts is to leave nothing but a state.  More than `most` expansions of the
+/// motion, or steps of the columns, are refused.
 ///
 /// # Errors
 /// Why there is no such motion, or no derivatives.
@@ -91,9 +98,13 @@ pub(super) fn pass(
     study: &Study,
     from: Option<(f64, &Place, Frame)>,
     (times, until): (&[f64], f64),
-    is_one_of_several: bool,
+    (is_one_of_several, most): (bool, u64),
     pause: &mut Pause,
 ) -> Result<SegmentOutcome, Lost> {
+    let stopped = |stop: StepError| match stop.cause {
+        Cause::EffortExhausted => Lost::TooLong(most),
+        _ => stop.what.into(),
+    };
     let mut plan = study.plan.clone();
     (plan.until, plan.every) = (until, until);
     let start = match from {
@@ -111,12 +122,14 @@ pub(super) fn pass(
         return Err(what.into());
     }
     let mut outcome = Outcome::begun(&study.mechanism, plan.clone());
-    let driver = build(&study.mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
+    let mut driver = build(&study.mechanism, &mut plan, &start).map_err(stopped)?;
+    driver.allow(most);
     let mut driver = ContactDriver::new(Arc::clone(&study.mechanism), driver);
     let directions = from.map_or_else(Vec::new, |(_, _, frame)| frame.directions());
     let mut variation = study.variation(directions.len()).map_err(|error| error.to_string())?;
+    variation.most = most;
     driver.jumps = Some(variation.jumps.clone());
-    driver.meet(&mut outcome).map_err(|stop| stop.what)?;
+    driver.meet(&mut outcome).map_err(stopped)?;
     if from.is_some() {
         variation.columns.iter_mut().for_each(|column| column.fill(0.0));
     }
@@ -134,12 +147,12 @@ pub(super) fn pass(
         sampler.at(&mut variation, &begin, begin.time.hi);
     }
     if begin.time.hi < until
-        && !variation.go(&mut driver, until, &mut outcome, &mut sampler, pause).map_err(|stop| stop.what)?
+        && !variation.go(&mut driver, until, &mut outcome, &mut sampler, pause).map_err(stopped)?
     {
         return Err(Lost::Interrupted);
     }
     if let Some(lost) = variation.lost {
-        return Err(lost.into());
+        return Err(if variation.tried >= most { Lost::TooLong(most) } else { lost.into() });
     }
     let events = study.mechanism.laws.iter().flat_map(|laws| &laws.formulas.events);
     let mut changes = events.filter(|event| event.changes_what_acts());
@@ -156,7 +169,8 @@ pub(super) fn pass(
         (0..end.phi.len()).map(|k| end.unwrapped(k)).collect(),
         end.omega.iter().map(|omega| omega.hi).collect(),
     ];
-    Ok(SegmentOutcome { rows: sampler.rows, end: place, columns: variation.columns })
+    let effort = driver.statistics().evaluations.max(variation.tried);
+    Ok(SegmentOutcome { rows: sampler.rows, end: place, columns: variation.columns, effort })
 }
 
 struct SegmentSampler<'a> {

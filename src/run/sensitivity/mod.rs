@@ -53,8 +53,6 @@ use std::sync::Arc;
 pub const TOLERANCE: f64 = 1e-14;
 /// Slope of an output over its size and the time at an extreme that is none of a smooth curve.
 const CORNER: f64 = 1e-4;
-/// Most rows over time.
-const MOST_ROWS: f64 = 1e6;
 
 /// A measure on its way.
 struct Query {
@@ -149,7 +147,7 @@ impl Study {
         }
         let tolerance = request.tolerance.unwrap_or(TOLERANCE);
         let plan = Plan::of_series(&mechanism, Tolerance { relative: tolerance, absolute: tolerance }, until);
-        let times = times(until, request.every)?;
+        let times = recorder::times(until, request.every)?;
         let start = mechanism.start(&scene);
         let mut study = Self {
             template: template.clone(),
@@ -171,7 +169,8 @@ impl Study {
         let variable = template.variable(name)?;
         let value = template.value(&variable)?.ok_or_else(|| {
             let what = format!("{} is not a number written in the scene", variable.path);
-            refused(what, "add it to the scene or by --set, or name the parameter in its formula")
+            let hint = "add it to the scene or by --set, or name the parameter in its formula";
+            SensitivityError::Unsuited(format!("{what}\nhint: {hint}"))
         })?;
         let base = (&self.mechanism, &self.start);
         let neighbours =
@@ -182,6 +181,16 @@ impl Study {
         self.inputs.push(InputNumber { path: variable.path, unit: variable.unit.into(), value, error });
         self.neighbours.push(neighbours);
         Ok(())
+    }
+
+    /// Numbers that neither the equations nor the start depend on.
+    #[cfg(feature = "fit")]
+    pub fn idle(&self) -> impl Iterator<Item = &InputNumber> {
+        let does_nothing = |neighbours: &Neighbours| {
+            neighbours.levels.is_empty() && neighbours.start.iter().all(|slope| *slope == 0.0)
+        };
+        let each = self.inputs.iter().zip(&self.neighbours);
+        each.filter(move |(_, neighbours)| does_nothing(neighbours)).map(|(input, _)| input)
     }
 
     /// The measures, with the outputs they are of.
@@ -427,17 +436,6 @@ fn position(known: &[&str], name: &str, what: &str) -> Result<usize, Sensitivity
         };
         refused(format!("no {what} is called `{name}`"), &hint)
     })
-}
-
-/// Times of rows from 0 on.
-fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, SensitivityError> {
-    let Some(every) = every else { return Ok(Vec::new()) };
-    let rows = (until / every).ceil();
-    if !(every > 0.0 && rows <= MOST_ROWS) {
-        let hint = format!("an interval above zero that makes at most {MOST_ROWS:e} rows");
-        return Err(refused(format!("the interval {every:e} s makes {rows:e} rows"), &hint));
-    }
-    Ok((0..=rows as u64).map(|k| (k as f64 * every).min(until)).collect())
 }
 
 fn refused(what: String, hint: &str) -> SensitivityError {

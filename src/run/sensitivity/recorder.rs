@@ -1,8 +1,22 @@
 //! Values and derivatives of outputs, and derivatives of times, at the times that are asked for.
 
 use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
-use super::{Look, Query, Variation};
+use super::{Look, Query, SensitivityError, Variation, refused};
 use crate::dynamics::Motion;
+
+/// Most rows over time.
+const MOST_ROWS: f64 = 1e6;
+
+/// Times of rows from 0 on.
+pub(super) fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, SensitivityError> {
+    let Some(every) = every else { return Ok(Vec::new()) };
+    let rows = (until / every).ceil();
+    if !(every > 0.0 && rows <= MOST_ROWS) {
+        let hint = format!("an interval above zero that makes at most {MOST_ROWS:e} rows");
+        return Err(refused(format!("the interval {every:e} s makes {rows:e} rows"), &hint));
+    }
+    Ok((0..=rows as u64).map(|k| (k as f64 * every).min(until)).collect())
+}
 
 /// What was seen at one time.
 pub(super) struct RecordedTime {

@@ -76,8 +76,10 @@ pub(in crate::run) struct Variation {
     reach: f64,
     /// Parts that do not act at the moment.
     pub off: Vec<String>,
-    /// Steps of the columns.
+    /// Steps of the columns, steps tried, and how many may be.
     pub steps: u64,
+    pub tried: u64,
+    pub most: u64,
     /// Why they go no further.
     pub lost: Option<String>,
     /// What forces that depend on rates, and impacts, take off volumes, where somebody asks.
@@ -153,6 +155,8 @@ impl Variation {
             reach: f64::INFINITY,
             off,
             steps: 0,
+            tried: 0,
+            most: u64::MAX,
             lost: None,
             dissipation: None,
         };
@@ -240,6 +244,11 @@ impl Variation {
     /// To a time inside a step; false where that is not possible.
     fn advance(&mut self, step: &mut Step, to: f64) -> bool {
         while self.now < to {
+            if self.tried >= self.most {
+                self.lose("small differences take too many steps");
+                return false;
+            }
+            self.tried += 1;
             let left = to - self.now;
             let pieces = (left / self.reach).ceil().max(1.0);
             let h = left / pieces;
