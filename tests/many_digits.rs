@@ -1,7 +1,7 @@
 //! Runs in many digits against published digits, closed forms in integer arithmetic, and runs in doubles.
 
 use crate::common;
-use driftless::arithmetic::Scalar;
+use driftless::arithmetic::{Real, Scalar};
 use driftless::dynamics::Mechanism;
 use driftless::run::Request;
 use driftless::run::digits::{
@@ -83,6 +83,12 @@ pub fn proved(source: &DigitsSource) -> DigitsPair {
 
 pub fn last(source: &DigitsSource, digits: usize) -> ShownRow {
     rows(source, digits).pop().expect("a row")
+}
+
+/// Of every body at the end of a run: angle and rate, place and velocity, as doubles.
+pub fn bodies_at_end(text: &str, until: &str, digits: usize) -> Vec<[f64; 6]> {
+    let row = last(&source(text, &[], until, until), digits);
+    row.bodies.iter().map(|body| body.map(|value| value.value())).collect()
 }
 
 pub fn one() -> BigInt {

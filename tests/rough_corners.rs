@@ -54,8 +54,7 @@ fn shaking(name: &str, x: f64, law: &str, [restitution, mu]: [f64; 2]) -> String
 #[cfg(feature = "digits")]
 #[test]
 fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
-    use super::many_digits::{last, source};
-    use driftless::arithmetic::Real;
+    use super::many_digits::bodies_at_end;
     let walls = [
         shaking("left", -0.15, "0.0172*sin(8.21*t)", [0.8, 0.284]),
         shaking("right", 0.15, "0.0148*sin(10.83*t)", [0.8, 0.536]),
@@ -65,8 +64,7 @@ fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
     ];
     let start = r#""phi": 0.02, "omega": 1.57, "origin": [0.19, 0.43], "velocity": [-0.17, 0.07]"#;
     let text = boxed([0.0, -9.81], &walls, start, "2");
-    let row = last(&source(&text, &[], "2", "2"), 22);
-    let [phi, omega] = [0, 1].map(|what| row.bodies[0][what].value());
+    let [phi, omega, ..] = bodies_at_end(&text, "2", 22)[0];
     for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
         let outcome = done(&text, &adaptive(method, 1e-9));
         let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
@@ -79,8 +77,7 @@ fn bounces_that_end_may_turn_the_sliding_of_a_corner() {
 #[cfg(feature = "digits")]
 #[test]
 fn a_corner_pressed_by_the_friction_of_others_comes_to_rest() {
-    use super::many_digits::{last, source};
-    use driftless::arithmetic::Real;
+    use super::many_digits::bodies_at_end;
     let walls = [
         shaking("left", -0.15, "0.0199*sin(10.04*t)", [0.3, 0.556]),
         shaking("right", 0.15, "0.0139*sin(6.31*t)", [0.3, 0.372]),
@@ -92,8 +89,7 @@ fn a_corner_pressed_by_the_friction_of_others_comes_to_rest() {
     let push = r#""forces": [{"name": "push", "body": "body", "point": [-0.08, -0.01],
         "force": ["4.99*sin(5.53*t+0.96)", 0]}], "start""#;
     let text = boxed([0.0, -9.81], &walls, start, "0.7").replace(r#""start""#, push);
-    let row = last(&source(&text, &[], "0.7", "0.7"), 22);
-    let [phi, omega] = [0, 1].map(|what| row.bodies[0][what].value());
+    let [phi, omega, ..] = bodies_at_end(&text, "0.7", 22)[0];
     for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
         let outcome = done(&text, &adaptive(method, 1e-11));
         let off = [outcome.last.phi[0] - phi, outcome.last.omega[0] - omega];
@@ -223,13 +219,12 @@ fn friction_beside_bounces_that_end_takes_energy_off_only() {
 #[cfg(feature = "digits")]
 #[test]
 fn an_impact_finds_a_point_whose_bounces_last_in_flight() {
-    use super::many_digits::{last, source};
-    use driftless::arithmetic::Real;
+    use super::many_digits::bodies_at_end;
     let text = LIVELY.text(0.0, "1.552");
-    let row = last(&source(&text, &[], "1.552", "1.552"), 22);
+    let [phi, ..] = bodies_at_end(&text, "1.552", 22)[0];
     for method in [MethodId::Taylor, MethodId::Dp8] {
         let outcome = done(&text, &adaptive(method, 1e-12)).last;
-        let off = row.bodies[0][0].value() - outcome.phi[0];
+        let off = phi - outcome.phi[0];
         assert!(off.abs() < 2e-10, "{method}: {off:e}");
     }
 }
@@ -260,10 +255,8 @@ fn a_corner_that_touches_without_a_force_takes_part_in_the_impact_of_another() {
     let expected = done(&PINNED.text(0.0, "2"), &adaptive(MethodId::Taylor, 1e-12)).last;
     #[cfg(feature = "digits")]
     {
-        use super::many_digits::{last, source};
-        use driftless::arithmetic::Real;
-        let off =
-            last(&source(&PINNED.text(0.0, "2"), &[], "2", "2"), 22).bodies[0][0].value() - expected.phi[0];
+        use super::many_digits::bodies_at_end;
+        let off = bodies_at_end(&PINNED.text(0.0, "2"), "2", 22)[0][0] - expected.phi[0];
         assert!(off.abs() < 1e-9, "many digits: {off:e}");
     }
     for turn in [0.0, 0.4, -2.1] {
@@ -457,8 +450,7 @@ fn a_ball_between_two_walls_rests_while_its_load_swings() {
 #[cfg(feature = "digits")]
 #[test]
 fn bounces_that_end_may_turn_the_sliding_in_many_digits() {
-    use super::many_digits::{last, source};
-    use driftless::arithmetic::Real;
+    use super::many_digits::bodies_at_end;
     let wall = |name: &str, x: f64, through: f64, normal: Vector, mu: f64| {
         wall(name, [x, -0.1], [[through, 0.0], normal], 0.8, [mu, mu])
     };
@@ -471,8 +463,7 @@ fn bounces_that_end_may_turn_the_sliding_in_many_digits() {
     let text = boxed([0.0, -9.81], &walls, start, "2");
     let expected = done(&text, &adaptive(MethodId::Taylor, 1e-12)).last;
     for digits in [22, 30] {
-        let row = last(&source(&text, &[], "2", "2"), digits);
-        let off = row.bodies[0][0].value() - expected.phi[0];
+        let off = bodies_at_end(&text, "2", digits)[0][0] - expected.phi[0];
         assert!(off.abs() < 1e-9, "{digits}: {off:e}");
     }
 }

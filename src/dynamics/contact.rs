@@ -96,10 +96,7 @@ impl Mechanism {
             let mut hardest: Option<(usize, f64)> = None;
             for (c, point) in points.iter().enumerate().filter(|(c, _)| !set.contains(c)) {
                 let inward = -(point.acceleration + point.free.dot(&change));
-                if point.is_dead
-                    || inward <= 0.0
-                    || point.speed * point.speed > 2.0 * height * point.contact.length * inward
-                {
+                if point.is_dead || !point.contact.rebounds_low([point.speed, inward], height) {
                     continue;
                 }
                 // What the rows in force leave of the point's freedom to give way.
@@ -131,6 +128,12 @@ impl Contact {
     /// square \[m²\].
     pub(crate) fn is_dead(&self, gradient_squared: f64) -> bool {
         self.tilt(gradient_squared) < DEAD_CENTRE
+    }
+
+    /// True where a point that leaves its wall at this speed \[m/s\], with this acceleration towards it
+    /// \[m/s²\], comes back from less than a height, over the length of the contact.
+    pub(crate) fn rebounds_low(&self, [speed, inward]: [f64; 2], height: f64) -> bool {
+        inward > 0.0 && speed * speed <= 2.0 * height * self.length * inward
     }
 
     /// |G| over the levers of a point that turns.

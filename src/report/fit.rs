@@ -48,8 +48,8 @@ fn residuals(column: &FittedColumn) -> impl Iterator<Item = Option<f64>> {
 
 /// NaN of a column without values.
 fn rms(column: &FittedColumn) -> f64 {
-    let squares: Vec<f64> = residuals(column).flatten().map(|residual| residual * residual).collect();
-    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+    let squares: f64 = column.residuals().map(|residual| residual * residual).sum();
+    (squares / column.count() as f64).sqrt()
 }
 
 /// The page.
@@ -71,7 +71,7 @@ pub fn text(found: &Fit) -> String {
     let rows: Vec<Vec<String>> = (found.columns.iter())
         .map(|column| {
             let name = format!("{} [{}]", column.name, column.unit);
-            if column.measured.iter().all(Option::is_none) {
+            if column.count() == 0 {
                 return vec![name, "no values".into(), String::new()];
             }
             let sigma = format!("{}{}", rough(column.sigma), if column.is_given { "" } else { " (found)" });

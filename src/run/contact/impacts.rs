@@ -112,8 +112,7 @@ impl ContactDriver {
         if impact.approach >= 0.0 {
             return Ok(0.0);
         }
-        if self.presses_friction(contact, flying, &impact, &striking) {
-            let touching = self.touching_with(contact);
+        if let Some(touching) = self.pressed_together(contact, flying, &impact, &striking) {
             return self.impact_at_several(&touching, outcome);
         }
         // Letting others go may have moved it by rounding.
@@ -122,9 +121,8 @@ impl ContactDriver {
         let claim = Claim { contact, impulse, tangential, energy_lost };
         let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
         let is_slow = -impact.approach <= slow;
-        if let (false, Err(what)) =
-            (is_slow, impact_monitor::check(&striking, tolerance, &last, &after, &claim))
-        {
+        let check = || impact_monitor::check(&striking, tolerance, &last, &after, &claim);
+        if let Err(what) = if is_slow { Ok(()) } else { check() } {
             let (cause, what) =
                 (Cause::ImpactCheckFailed, format!("impact at wall {}: {what}", self.name(contact)));
             return Err(StepError {

@@ -31,7 +31,7 @@ use crate::dynamics::{Mechanism, Motion, Time};
 use crate::stepping::StepError;
 
 /// Speed of a rebound from a wall that holds its point, over what counts as none: drift makes less.
-const LEAST_REBOUND: f64 = 1e3;
+const LEAVING: f64 = 1e3;
 
 /// What is left of the freedom of a point along the normal of its wall, and its normal speed over the speeds
 /// it is made of, up to which its path touches the wall: it goes behind it by half the square of that.
@@ -176,7 +176,7 @@ impl ContactDriver {
     pub(super) fn rebounds(&self, contact: usize, motion: &Motion) -> bool {
         let [phi, omega] = motion.rounded();
         let rate = self.free.contacts[contact].gap_rate(motion.time, &phi, &self.free.elements(&phi), &omega);
-        rate > LEAST_REBOUND * self.no_speed(contact, &omega)
+        rate > LEAVING * self.no_speed(contact, &omega)
     }
 
     /// A touching contact, not among those whose points are still, that rebounds less high than points do
@@ -197,8 +197,7 @@ impl ContactDriver {
             let wall = &self.free.contacts[*contact];
             let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
             let (speed, inward) = (wall.gap_rate(t, &phi, &z, &omega), course.inward(wall, t, at));
-            let is_low = speed * speed <= 2.0 * self.rest_height * wall.length * inward;
-            !still.contains(contact) && inward > 0.0 && is_low
+            !still.contains(contact) && wall.rebounds_low([speed, inward], self.rest_height)
         })
     }
 

@@ -41,28 +41,28 @@ impl ContactDriver {
         (touching.iter().filter(is_met).count() > 1).then_some(touching)
     }
 
-    /// True where an impact at one wall presses a point that rests on another one, and there is dry friction
-    /// at one of them: a point that touches without a force is pressed as one that is held, and one that is
-    /// `flying` is not.
-    pub(super) fn presses_friction(
+    /// The walls that touch, where an impact at one of them presses a point that rests on another one, and
+    /// there is dry friction at one of both: a point that touches without a force is pressed as one that is
+    /// held, and one that is `flying` is not.
+    pub(super) fn pressed_together(
         &mut self,
         contact: usize,
         flying: &[usize],
         impact: &Impact,
         striking: &Mechanism,
-    ) -> bool {
+    ) -> Option<Vec<usize>> {
+        if self.free.frictions.is_empty() || self.free.contacts.len() < 2 {
+            return None;
+        }
+        let touching = self.touching_with(contact);
         let pressed = striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]);
         let mut pressed = pressed.filter(|(_, impulse)| -**impulse > LEAST_PRESS * impact.impulse);
         if pressed.any(|(&held, _)| striking.friction_at(held).is_some()) {
-            return true;
+            return Some(touching);
         }
-        if self.free.frictions.is_empty() || self.free.contacts.len() < 2 {
-            return false;
-        }
-        let touching = self.touching_with(contact);
         let PresentState { t, z, phi, omega } = self.present_state();
         let rubs = |other: usize| [contact, other].iter().any(|&at| striking.friction_at(at).is_some());
-        touching.into_iter().any(|other| {
+        let is_pressed = |&other: &usize| {
             let wall = &self.free.contacts[other];
             let rate = |omega: &[f64]| wall.gap_rate(t, &phi, &z, omega);
             other != contact
@@ -71,7 +71,8 @@ impl ContactDriver {
                 && !striking.held.contains(&other)
                 && rate(&omega) <= self.no_speed(other, &omega)
                 && rate(&impact.omega) < LEAST_PRESS * impact.approach
-        })
+        };
+        touching.iter().any(is_pressed).then_some(touching)
     }
 
     /// Lets the impact at these walls take effect at once, and returns the hardest approach \[m/s\].
@@ -90,11 +91,13 @@ impl ContactDriver {
         };
         let (last, after, energy_lost) = self.jump_to(&impacts.omega, impacts.motor_work);
         let tolerance = outcome.plan.tolerance.unwrap_or_default().relative;
-        let checked =
-            impact_monitor::check_several(&striking, tolerance, [&last, &after], &impacts.blows, energy_lost);
         let is_slow =
             impacts.blows.iter().all(|blow| -blow.normal_rates[0] <= self.no_speed(blow.contact, &omega));
-        if let (false, Err(what)) = (is_slow, checked) {
+        let check = || {
+            let both = [&last, &after];
+            impact_monitor::check_several(&striking, tolerance, both, &impacts.blows, energy_lost)
+        };
+        if let Err(what) = if is_slow { Ok(()) } else { check() } {
             let what = format!("impact at walls {}: {what}", self.names(contacts));
             let stop = self.stopped(&outcome.plan, what, "tighten the tolerance, or use --method dp8");
             return Err(StepError { cause: Cause::ImpactCheckFailed, ..stop });

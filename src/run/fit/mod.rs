@@ -139,12 +139,12 @@ pub struct FittedColumn {
 
 impl FittedColumn {
     /// Measured less fitted.
-    fn residuals(&self) -> impl Iterator<Item = f64> {
+    pub(crate) fn residuals(&self) -> impl Iterator<Item = f64> {
         self.measured.iter().zip(&self.model).filter_map(|(measured, model)| Some((*measured)? - model))
     }
 
     /// How many values there are.
-    fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.measured.iter().flatten().count()
     }
 }
@@ -291,12 +291,12 @@ fn varied(template: &Template, request: &FitRequest) -> Result<Vec<Variable>, Fi
         }
         variables.push(variable);
     }
-    match variables.is_empty() {
-        true => Err(FitError::Asked(
+    if variables.is_empty() {
+        return Err(FitError::Asked(
             "nothing to fit\nhint: name numbers of the scene, as --vary spring.stiffness".into(),
-        )),
-        false => Ok(variables),
+        ));
     }
+    Ok(variables)
 }
 
 /// The minimum with the noise of the columns that is found there, and how the search for it ended.

@@ -87,7 +87,7 @@ pub(super) fn untold(columns: &[FittedColumn], told: &[DMatrix<f64>]) -> Vec<Str
     });
     let SymmetricEigen { eigenvalues, eigenvectors } = information.symmetric_eigen();
     let least = ROUNDING * eigenvalues.amax().max(1.0);
-    let spread = |i: usize| {
+    let variance = |i: usize| {
         let shares = (0..open.len()).map(|k| eigenvectors[(i, k)].powi(2) / eigenvalues[k].max(least));
         shares.sum::<f64>()
     };
@@ -97,7 +97,7 @@ pub(super) fn untold(columns: &[FittedColumn], told: &[DMatrix<f64>]) -> Vec<Str
     let freedom = rows - told.iter().map(DMatrix::trace).sum::<f64>();
     let needed = open.len() + usize::from(open.len() > 1);
     let is_short = freedom < needed as f64 - TELLING;
-    let is_untold = |i: &usize| is_short || spread(*i) * TELLING > 1.0;
+    let is_untold = |i: &usize| is_short || variance(*i) * TELLING > 1.0;
     (0..open.len()).filter(is_untold).map(|i| columns[open[i]].name.clone()).collect()
 }
 
