@@ -12,7 +12,8 @@ use pyo3::types::PyDict;
 use std::io;
 
 /// What a sweep of a scene came to: names of the columns, the numbers, of each point the bar that turned over
-/// first (-1: none) and its status (0 done, 1 stopped, 2 refused, 3 skipped), causes by point, and the report.
+/// first (-1: none) and its status (0 done, 1 stopped, 2 refused, 3 skipped), causes by point, the report,
+/// the names of the bars, and the number of the first point.
 type Swept<'py> = (
     Vec<String>,
     Bound<'py, PyArray2<f64>>,
@@ -20,11 +21,14 @@ type Swept<'py> = (
     Bound<'py, PyArray1<u8>>,
     Vec<(u64, String)>,
     String,
+    Vec<String>,
+    u64,
 );
 
 /// Gathers points, tells how far it is, and looks for Ctrl-C.
 struct Gather {
     layout: SweepLayout,
+    first: Option<u64>,
     numbers: Vec<f64>,
     flips: Vec<i32>,
     status: Vec<u8>,
@@ -35,6 +39,7 @@ struct Gather {
 
 impl PointObserver for Gather {
     fn see(&mut self, point: &SweepPoint) -> io::Result<()> {
+        self.first.get_or_insert(point.index);
         self.numbers.extend(numbers(point, self.layout));
         self.flips.push(point.flip.map_or(-1, |flip| flip.bar as i32));
         let (status, cause) = match &point.status {
@@ -103,6 +108,7 @@ pub fn sweep<'py>(
     let plan = if to_flip { plan.ending_at_flips() } else { plan };
     let mut gather = Gather {
         layout: SweepLayout::of(&plan),
+        first: None,
         numbers: Vec::new(),
         flips: Vec::new(),
         status: Vec::new(),
@@ -120,6 +126,7 @@ pub fn sweep<'py>(
     // The bar that turned over, status and cause are words.
     columns.truncate(columns.len() - 3);
     let count = gather.status.len();
+    let bars = plan.mechanism().own_bodies().iter().map(|body| body.name.clone()).collect();
     Ok((
         columns.clone(),
         PyArray1::from_vec(py, gather.numbers).reshape([count, columns.len()])?,
@@ -127,5 +134,7 @@ pub fn sweep<'py>(
         PyArray1::from_vec(py, gather.status),
         gather.causes,
         report,
+        bars,
+        gather.first.unwrap_or(0),
     ))
 }

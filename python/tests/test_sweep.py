@@ -75,14 +75,38 @@ def test_rows_go_to_files_in_chunks(free, tmp_path):
     kept = free.sweep(GRID, until=3, to=path, chunk=10)
     assert len(kept) == 0 and kept.success
     header, rows = table(path)
-    numbers = np.array([[float(word) if word else np.nan for word in row[:-1]] for row in rows])
-    assert header[:-1] == whole.heads and np.array_equal(numbers, whole.rows, equal_nan=True)
+    numbers = np.array([[float(word) if word else np.nan for word in row[:-3]] for row in rows])
+    assert header[:-3] == whole.heads and np.array_equal(numbers, whole.rows, equal_nan=True)
     with pytest.raises(ValueError, match="csv or .parquet"):
         free.sweep(GRID, until=3, to=tmp_path / "points.txt")
     parquet = pytest.importorskip("pyarrow.parquet")
     free.sweep(GRID, until=3, to=tmp_path / "points.parquet", chunk=10)
     read = parquet.read_table(tmp_path / "points.parquet")
     assert np.array_equal(read["bar2.phi [rad]"].to_numpy(), whole["bar2.phi"])
+
+
+WORDS = [["", "refused"], ["", "refused"], ["bar2", "done"], ["bar2", "done"]]
+
+
+def test_files_and_frames_tell_bars_and_causes_in_words(free, tmp_path):
+    points = {"bar1.length": (-0.5, 1, 4), "bar2.omega": (20, 20, 1)}
+    whole = free.sweep(points, until=2, to_flip=True)
+    assert whole.bars == ["bar1", "bar2"] and list(whole.flip_bar) == [-1, -1, 1, 1]
+    free.sweep(points, until=2, to_flip=True, to=tmp_path / "points.csv", chunk=1)
+    header, rows = table(tmp_path / "points.csv")
+    assert header[-3:] == ["flip_bar", "status", "cause"] and [row[-3:-1] for row in rows] == WORDS
+    causes = [whole.causes.get(point, "") for point in range(4)]
+    assert [row[-1] for row in rows] == causes and causes[0] != causes[1]
+    late = free.sweep(points, until=2, to_flip=True, shard=(2, 4))
+    assert late.first == 1 and late.causes == {1: causes[1]}
+    parquet = pytest.importorskip("pyarrow.parquet")
+    free.sweep(points, until=2, to_flip=True, to=tmp_path / "points.parquet", chunk=1)
+    read = parquet.read_table(tmp_path / "points.parquet").to_pydict()
+    assert read["flip_bar"] == [None, None, 1, 1] and read["cause"] == [cause or None for cause in causes]
+    assert read["t [s]"][:2] == [None, None] and read["bar2.phi [rad]"][3] == whole["bar2.phi"][3]
+    pytest.importorskip("pandas")
+    assert list(whole.to_pandas()["flip_bar"]) == [None, None, "bar2", "bar2"]
+    assert list(late.to_pandas()["cause"]) == [causes[1]]
 
 
 def test_frames_and_datasets(free):
@@ -255,6 +279,7 @@ def test_files_tell_of_refused_points(free, tmp_path):
         (SMALL, {"parts": 0}, "parts"),
         (SMALL, {"threads": -1}, "from 0 to 1024"),
         (SMALL, {"threads": 1025}, "from 0 to 1024"),
+        (SMALL, {"resume": True}, "name it by to="),
     ],
 )
 def test_what_is_no_sweep_is_refused(free, vary, options, said):
@@ -268,5 +293,5 @@ def test_a_share_of_nothing_has_columns_alone(free, tmp_path):
     header, rows = table(path)
     assert header[0] == "start.bar1.phi [rad]" and rows == []
     empty = free.sweep({"bar1.phi": [0.1, 0.2]}, until=0.1, shard=(1, 9))
-    assert empty.rows.shape == (0, len(header) - 1) and empty.success
+    assert empty.rows.shape == (0, len(header) - 3) and empty.success
     assert len(free.sweep({"bar1.phi": [0.1, 0.2]}, until=0.1, threads=1024)) == 2

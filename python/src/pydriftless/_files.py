@@ -13,14 +13,17 @@ import json
 import math
 import os
 import shutil
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from ._sweep import Part, Sweep
 
-def written(found: Callable[[Sequence[int]], Iterable[Any]], count: int, to: Any, mark: str | None) -> Any:
+
+def written(found: Callable[[Sequence[int]], Iterable[Part]], count: int, to: Any, mark: str | None) -> Sweep:
     """The parts as a file, one after the other; the numbers are not kept.
 
     Parameters
@@ -34,7 +37,7 @@ def written(found: Callable[[Sequence[int]], Iterable[Any]], count: int, to: Any
     mark : str, optional
         What tells the sweep from others; with it a file that was begun is gone on with.
     """
-    from ._sweep import Sweep
+    from ._sweep import Part, Sweep
 
     path = os.fspath(to)
     if not path.endswith((".csv", ".parquet")):
@@ -48,11 +51,10 @@ def written(found: Callable[[Sequence[int]], Iterable[Any]], count: int, to: Any
             progress.add(number, part, write.part(number, part))
     progress.remove()
     parts = [progress.parts[number] for number in sorted(progress.parts)]
-    heads = parts[0]["heads"]
-    sweep = Sweep(heads, np.empty((0, len(heads))), np.empty(0, np.int32), np.empty(0, np.uint8))
-    sweep.causes = {index: cause for part in parts for index, cause in part["causes"]}
+    first, causes = parts[0], [cause for part in parts for cause in part["causes"]]
+    rows, flip_bar, status = np.empty((0, len(first["heads"]))), np.empty(0, np.int32), np.empty(0, np.uint8)
+    sweep = Sweep(Part(first["heads"], rows, flip_bar, status, causes, first["report"], first["bars"], 0))
     sweep.counts = np.sum([part["counts"] for part in parts], axis=0)
-    sweep.report = json.loads(parts[0]["report"])
     return sweep
 
 
@@ -72,7 +74,7 @@ class _Progress:
         if begun["mark"] != mark:
             raise ValueError(f"{path} was begun by another sweep: remove {self._path.name} to begin anew")
         for part in map(_read, lines[1:]):
-            if part.keys() >= {"number", "heads", "counts", "causes", "report", "size", "sha256"}:
+            if part.keys() >= {"number", "heads", "bars", "counts", "causes", "report", "size", "sha256"}:
                 self.parts[int(part["number"])] = part
 
     @property
@@ -89,12 +91,11 @@ class _Progress:
         beside.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
         os.replace(beside, self._path)
 
-    def add(self, number: int, part: Any, proof: dict[str, Any]) -> None:
+    def add(self, number: int, part: Part, proof: dict[str, Any]) -> None:
         """Takes a part that is in its file."""
-        heads, _, _, status, causes, report = part
-        counts = np.bincount(status, minlength=4).tolist()
-        told = {"number": number, "heads": heads, "counts": counts, "causes": causes, **proof}
-        told["report"] = report if number == 1 else "{}"
+        counts = np.bincount(part.status, minlength=4).tolist()
+        told = {"number": number, "heads": part.heads, "bars": part.bars, "counts": counts, "causes": part.causes}
+        told |= {"report": part.report if number == 1 else "{}", **proof}
         self.parts[number] = told
         if self._mark is not None:
             with open(self._path, "a", encoding="utf-8") as file:
@@ -146,14 +147,11 @@ class _Csv:
         self._file = open(self._path, "ab" if self._size else "wb")
         return self
 
-    def part(self, number: int, part: Any) -> dict[str, Any]:
-        from ._sweep import STATUS
-
-        heads, rows, _, status, _, _ = part
+    def part(self, number: int, part: Part) -> dict[str, Any]:
         if number == 1:
-            self._write([[*heads, "status"]])
-        words = (["" if math.isnan(number) else repr(number) for number in row] for row in rows.tolist())
-        self._write([*row, STATUS[state]] for row, state in zip(words, status))
+            self._write([[*part.heads, "flip_bar", "status", "cause"]])
+        numbers = (["" if math.isnan(number) else repr(number) for number in row] for row in part.rows.tolist())
+        self._write([*row, *words] for row, words in zip(numbers, _words(part)))
         if self._progress.is_kept:
             self._file.flush()
             os.fsync(self._file.fileno())
@@ -194,15 +192,16 @@ class _Parquet:
             self._parts.mkdir(exist_ok=True)
         return self
 
-    def part(self, number: int, part: Any) -> dict[str, Any]:
+    def part(self, number: int, part: Part) -> dict[str, Any]:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        heads, rows, flips, status, _, _ = part
-        columns = {head: pa.array(np.ascontiguousarray(rows[:, k])) for k, head in enumerate(heads)}
-        columns["flip_bar"] = pa.array(flips)
-        columns["status"] = pa.array(status)
-        table = pa.table(columns)
+        columns = [np.ascontiguousarray(column) for column in part.rows.T]
+        table = {head: pa.array(column, mask=np.isnan(column)) for head, column in zip(part.heads, columns)}
+        table["flip_bar"] = pa.array(part.flip_bar, mask=part.flip_bar < 0)
+        table["status"] = pa.array(part.status)
+        table["cause"] = pa.array([cause or None for _, _, cause in _words(part)], pa.string())
+        table = pa.table(table)
         if not self._progress.is_kept:
             self._append(table)
             return {}
@@ -242,3 +241,12 @@ def _proof(path: Path) -> dict[str, Any]:
     """What a file of a part is verified by."""
     content = path.read_bytes()
     return {"size": len(content), "sha256": hashlib.sha256(content).hexdigest()}
+
+
+def _words(part: Part) -> Iterator[tuple[str, str, str]]:
+    """Of every point the bar that turned over first, its status, and why it has no end; empty where there is none."""
+    from ._sweep import STATUS
+
+    causes = dict(part.causes)
+    for point, (bar, status) in enumerate(zip(part.flip_bar, part.status)):
+        yield part.bars[bar] if bar >= 0 else "", STATUS[status], causes.get(part.first + point, "")

@@ -7,7 +7,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,19 @@ if TYPE_CHECKING:
     from ._scene import Scene
 
 STATUS = ("done", "stopped", "refused", "skipped")
+
+
+class Part(NamedTuple):
+    """Points of a sweep that were computed together, as :class:`Sweep` tells them, with their causes in a list."""
+
+    heads: list[str]
+    rows: np.ndarray
+    flip_bar: np.ndarray
+    status: np.ndarray
+    causes: list[tuple[int, str]]
+    report: str
+    bars: list[str]
+    first: int
 
 
 class Sweep:
@@ -33,11 +46,15 @@ class Sweep:
     units : dict
         Units by the names of the columns.
     flip_bar : numpy.ndarray
-        Number of the bar that turned over first, -1 for none.
+        Number of the bar that turned over first, from 0, -1 for none.
+    bars : list of str
+        Names of the bars by that number.
     status : numpy.ndarray
         0 done, 1 stopped, 2 refused, 3 skipped.
     causes : dict
-        Why points stopped or were refused, by their number.
+        Why points stopped or were refused, by their number in the whole sweep.
+    first : int
+        Number of the first point in the whole sweep: not 0 for a later shard.
     counts : numpy.ndarray
         How many points are done, stopped, refused and skipped, also of those that went to a file.
     grid : tuple of int or None
@@ -46,18 +63,20 @@ class Sweep:
         What the program reports; of a sweep in parts that of the first.
     """
 
-    def __init__(self, heads: list[str], rows: np.ndarray, flip_bar: np.ndarray, status: np.ndarray) -> None:
-        split = [head.partition(" [") for head in heads]
+    def __init__(self, points: Part) -> None:
+        split = [head.partition(" [") for head in points.heads]
         self.columns = [name for name, _, _ in split]
         self.units = {name: unit.rstrip("]") for name, _, unit in split}
-        self.heads = heads
-        self.rows = rows
-        self.flip_bar = flip_bar
-        self.status = status
-        self.causes: dict[int, str] = {}
-        self.counts: np.ndarray = np.bincount(status, minlength=len(STATUS))
+        self.heads = points.heads
+        self.rows = points.rows
+        self.flip_bar = points.flip_bar
+        self.bars = points.bars
+        self.status = points.status
+        self.causes = dict(points.causes)
+        self.first = points.first
+        self.counts: np.ndarray = np.bincount(points.status, minlength=len(STATUS))
         self.grid: tuple[int, ...] | None = None
-        self.report: dict[str, Any] = {}
+        self.report: dict[str, Any] = json.loads(points.report)
 
     @property
     def success(self) -> bool:
@@ -79,11 +98,16 @@ class Sweep:
         return self[name].reshape(self.grid)
 
     def to_pandas(self) -> Any:
-        """The points as a ``pandas.DataFrame``, with their status in words."""
+        """The points as a ``pandas.DataFrame``, with bars, status and causes in words."""
         import pandas as pd
 
         frame = pd.DataFrame(self.rows, columns=self.columns, copy=False)
+        bars = [self.bars[bar] if bar >= 0 else None for bar in self.flip_bar]
+        causes = [self.causes.get(self.first + point) for point in range(len(self))]
+        # None stays None.
+        frame["flip_bar"] = pd.Series(bars, dtype=object)
         frame["status"] = [STATUS[status] for status in self.status]
+        frame["cause"] = pd.Series(causes, dtype=object)
         frame.attrs["units"] = self.units
         return frame
 
@@ -144,7 +168,7 @@ def swept(
     elif shard is None and to is not None:
         count = max(1, -(-total // chunk))
 
-    def found(numbers: Sequence[int]) -> Iterable[Any]:
+    def found(numbers: Sequence[int]) -> Iterable[Part]:
         """The parts of these numbers, from 1 to `count`."""
         if shard is not None:
             return (_part(scene, *_share(plan, shard)) for _ in numbers)
@@ -154,6 +178,8 @@ def swept(
             return (_part(scene, *_share(plan, (number, count))) for number in numbers)
         return [_part(scene, plan, None, 0, progress_bar(progress, total, unit=" points"))]
 
+    if resume and to is None:
+        raise ValueError("resume goes on with a file: name it by to=")
     if to is not None:
         mark = _fingerprint(scene, plan, count, shard) if resume else None
         sweep: Sweep = written(found, count, to, mark)
@@ -219,27 +245,31 @@ def _share(plan: dict[str, Any], shard: tuple[int, int] | None) -> tuple[dict[st
     return {**plan, "listed": (names, values[begin:end])}, None, begin
 
 
-def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, first: int, bar: Any = None) -> Any:
+def _part(scene: Scene, plan: dict[str, Any], shard: tuple[int, int] | None, first: int, bar: Any = None) -> Part:
     """What :func:`_share` gave, wherever it runs."""
     listed = plan["listed"]
     if listed is not None and len(listed[1]) == 0:
         return _empty(scene, plan)
     update = (lambda points: bar.update(points - bar.n)) if bar is not None else None
-    heads, rows, flips, status, causes, report = _core.sweep(
-        scene._core, plan["axes"], listed, plan["to_flip"], plan["threads"], shard, update, **plan["options"]
+    part = Part(
+        *_core.sweep(
+            scene._core, plan["axes"], listed, plan["to_flip"], plan["threads"], shard, update, **plan["options"]
+        )
     )
     if bar is not None:
         bar.close()
-    return heads, rows, flips, status, [(first + index, cause) for index, cause in causes], report
+    causes = [(first + index, cause) for index, cause in part.causes]
+    return part._replace(causes=causes, first=first + part.first)
 
 
-def _empty(scene: Scene, plan: dict[str, Any]) -> Any:
+def _empty(scene: Scene, plan: dict[str, Any]) -> Part:
     """A part without points: its columns are those of any point."""
     names, options = plan["listed"][0], {**plan["options"], "max_evaluations": 1}
-    heads, rows, flips, status, _, _ = _core.sweep(
-        scene._core, [], (names, np.ones((1, len(names)))), plan["to_flip"], 1, None, None, **options
+    part = Part(
+        *_core.sweep(scene._core, [], (names, np.ones((1, len(names)))), plan["to_flip"], 1, None, None, **options)
     )
-    return heads, rows[:0], flips[:0], status[:0], [], "{}"
+    none = slice(0)
+    return Part(part.heads, part.rows[none], part.flip_bar[none], part.status[none], [], "{}", part.bars, 0)
 
 
 def _submitted(
@@ -250,7 +280,7 @@ def _submitted(
     count: int,
     total: int,
     progress: bool,
-) -> Iterator[Any]:
+) -> Iterator[Part]:
     """Parts by a client, in the order of the points."""
     plan = {**plan, "threads": plan["threads"] or 1}
     futures = [client.submit(_part, scene, *_share(plan, (number, count))) for number in numbers]
@@ -269,7 +299,7 @@ def _fingerprint(scene: Scene, plan: dict[str, Any], count: int, shard: Any) -> 
     points = None if listed is None else (listed[0], hashlib.sha256(listed[1].tobytes()).hexdigest())
     settings = {name: _plain(value) for name, value in plan["options"].items() if value is not None}
     text, _, *changed = scene._core.parts()
-    version = (_core.__version__, "progress by parts")
+    version = (_core.__version__, "progress with bars")
     text = repr((text, changed, plan["axes"], points, bool(plan["to_flip"]), settings, count, shard, version))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -288,11 +318,10 @@ def _workers(client: Any) -> int:
     return getattr(client, "_max_workers", None) or os.cpu_count() or 1
 
 
-def _joined(found: list[Any]) -> Sweep:
-    heads = found[0][0]
-    columns = zip(*(part[1:4] for part in found))
-    rows, flips, status = (parts[0] if len(parts) == 1 else np.concatenate(parts) for parts in columns)
-    sweep = Sweep(heads, rows, flips, status)
-    sweep.causes = {index: cause for part in found for index, cause in part[4]}
-    sweep.report = json.loads(found[0][5])
-    return sweep
+def _joined(parts: list[Part]) -> Sweep:
+    """The points of all parts, in their order, and the report of the first."""
+    if len(parts) == 1:
+        return Sweep(parts[0])
+    rows, flip_bar, status = (np.concatenate(column) for column in list(zip(*parts))[1:4])
+    causes = [cause for part in parts for cause in part.causes]
+    return Sweep(parts[0]._replace(rows=rows, flip_bar=flip_bar, status=status, causes=causes))
