@@ -389,3 +389,27 @@ fn all_events_at_the_end_of_a_run_happen() {
         }
     }
 }
+
+/// Constraints of a method without projection have drifted before an event that changes no rates, and are no
+/// reason to stop there.
+#[test]
+fn an_event_is_not_blamed_for_the_drift_before_it() {
+    let text = r#"{"name": "press", "gravity": [0, -9.81],
+        "bars": [{"name": "crank", "length": 0.2, "width": 0.02, "thickness": 0.01, "density": 2700},
+            {"name": "rod", "length": 0.5, "width": 0.02, "thickness": 0.01, "density": 2700}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "crank", "point": [0.2, 0]}, {"body": "rod", "point": [0, 0]}]}],
+        "sliders": [{"name": "piston", "point": {"body": "rod", "point": [0.5, 0]},
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+        "torques": [{"name": "T", "body": "crank", "torque": 0.05}],
+        "events": [{"name": "cut", "when": "t-1.3", "off": ["T"]}],
+        "start": {"crank": {"phi": 1, "omega": 10}, "rod": {"phi": -0.3434}}, "until": 2, "every": 0.1}"#;
+    let expected = run(&scene(text), &adaptive(MethodId::Dp8, 1e-12));
+    for (method, rtol) in [(MethodId::Dopri5, 1e-6), (MethodId::Dop853, 1e-6)] {
+        let outcome = run(&scene(text), &adaptive(method, rtol));
+        assert!(outcome.stop.is_none() && times(&outcome, "cut").len() == 1, "{method}: {:?}", outcome.stop);
+        assert!(outcome.drift.constraints.iter().any(|(_, [position, _])| position.max > 1e-8), "{method}");
+        let off = outcome.last.phi[0] - expected.last.phi[0];
+        assert!(off.abs() < 1e-2, "{method}: {off:e}");
+    }
+}

@@ -395,3 +395,22 @@ fn linkages_of_any_size_are_put_together() {
         }
     }
 }
+
+/// A block whose place and velocity as given are off its rail starts where assembly puts it, as in doubles and
+/// as the notes say.
+#[test]
+fn a_block_starts_where_its_rail_puts_it() {
+    let text = r#"{"name": "block", "gravity": [0, -10],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 0.2}],
+        "sliders": [{"name": "s", "point": {"body": "b", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [3, 4]}}],
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 0.3], "velocity": [1, 0]}}, "until": 0.5, "every": 0.5}"#;
+    let begun = rows(&source(text, &[], "0.5", "0.5"), 22)[0].bodies[0].map(|value| value.value());
+    for (value, expected) in begun[2..].iter().zip([0.144, 0.192, 0.36, 0.48]) {
+        assert!((value - expected).abs() < 1e-14, "{begun:?}");
+    }
+    // Down the rail at 8 m/s^2.
+    let [.., x, y, _, _] = bodies_at_end(text, "0.5", 22)[0];
+    let travel = 0.24 + 0.6 * 0.5 - 4.0 * 0.25;
+    assert!((x - 0.6 * travel).abs() < 1e-14 && (y - 0.8 * travel).abs() < 1e-14, "{x} {y}");
+}

@@ -53,3 +53,27 @@ fn the_same_scene_run_all_four_ways_agrees() {
         }
     }
 }
+
+/// What is left of rates by factors of a place 1e-8 rad behind is taken off as well: coarse steps of linkages
+/// stopped at 1e-12 of a constraint.
+#[test]
+fn coarse_steps_of_linkages_are_put_back_to_rounding() {
+    for (scene, method, rtol, end) in [
+        ("crank_rocker", MethodId::Dp5, 1e-4, None),
+        ("crank_rocker", MethodId::Dp8, 1e-3, None),
+        ("quick_return", MethodId::Radau(5), 1e-3, Some(0.5)),
+    ] {
+        let request = Request {
+            method: Some(method),
+            rtol: Some(rtol),
+            stabilize: Some(Stabilization::Projection),
+            until: end,
+            ..Request::default()
+        };
+        let outcome = run(scene, &request);
+        assert!(outcome.stop.is_none(), "{scene} by {method}: {:?}", outcome.stop);
+        for (name, [position, rate]) in &outcome.drift.constraints {
+            assert!(position.max < 1e-12 && rate.max < 1e-11, "{scene} by {method}: {name}");
+        }
+    }
+}

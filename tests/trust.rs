@@ -745,3 +745,30 @@ fn companions_take_little_more_work_than_their_runs() {
         );
     }
 }
+
+/// Bounces that die out are of another number in the run and in its reference: their rates are compared after
+/// them all the same.  A ball with a pendulum on it, whose reference is the series in double-double.
+#[test]
+fn rates_are_judged_after_bounces_of_another_number() {
+    let text = r#"{"name": "ball", "gravity": [0, -9.81],
+        "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1},
+            {"name": "c", "mass": 1, "centre": [0.3, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "B", "between": [{"body": "ball", "point": [0, 0]}, {"body": "c", "point": [0, 0]}]}],
+        "walls": [{"name": "floor", "body": "ball", "point": [0, 0], "restitution": 0.3,
+            "line": {"through": [0, 0], "normal": [0, 1]}}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 0.05], "velocity": [0, 0]}, "c": {"phi": 0.3, "omega": 0}},
+        "until": 1.5, "every": 0.05}"#;
+    let scene = driftless::scene::parse_scene(text, "ball.json", &[]).expect("a scene");
+    let truth = run(&scene, &asked("taylor", 1e-13, 1.5, 0.05)).last;
+    for (method, rtol) in [("radau9", 1e-3), ("radau9", 1e-4), ("taylor", 1e-5), ("dp8", 1e-6)] {
+        let outcome = trusted(&scene, &asked(method, rtol, 1.5, 0.05), Level::Auto);
+        let off =
+            (outcome.last.omega.iter().zip(&truth.omega)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let told = outcome.trust.expect("asked for").rate_error.expect("a figure");
+        println!("{method} {rtol:e}: {told:e} for {off:e}");
+        assert!(
+            told > off / 3.0 && told < 1000.0 * off.max(1e-10),
+            "{method} {rtol:e}: {told:e} for {off:e}"
+        );
+    }
+}

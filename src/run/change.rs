@@ -8,6 +8,7 @@ use super::latch;
 use super::monitor::Monitor;
 use super::running::Outcome;
 use crate::dynamics::compile::Laws;
+use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Mechanism, Motion};
 use crate::stepping::{Cause, StepError};
@@ -16,6 +17,9 @@ use std::sync::Arc;
 /// Violation of a constraint, angles in rad and lengths in sizes of the mechanism, and its rate in units of
 /// the mechanism, up to which a changed motion satisfies it.
 const SATISFIED: f64 = 1e-8;
+/// Violation after a change over the one before it that counts as the same: of a method without projection
+/// constraints have drifted.
+const DRIFTED: f64 = 2.0;
 
 impl ContactDriver {
     /// Takes the events found in the last steps into the outcome.
@@ -153,7 +157,7 @@ impl ContactDriver {
         if let Err((what, hint)) = latch::close([&self.free, &free], &mut held, &mut after) {
             return Err(refused(self, what, hint));
         }
-        if let Some(what) = broken(&free, &after) {
+        if let Some(what) = broken([(&*self.free, &before), (&*free, &after)]) {
             let hint = match self.free.laws.as_ref().is_some_and(|laws| laws.formulas.drives()) {
                 true => "the law of a motor must keep its value and its rate through its corners",
                 false => "change rates along what the constraints allow",
@@ -215,21 +219,32 @@ fn stays(free: &Mechanism, contact: usize, motion: &Motion) -> bool {
         && contact.gap_rate(motion.time, &phi, &z, &omega).abs() <= SATISFIED * speed
 }
 
-/// The constraint that a motion does not satisfy.
-fn broken(mechanism: &Mechanism, motion: &Motion) -> Option<String> {
+/// Violations of every constraint at both levels, over its unit and over the speeds of the motion.
+fn violations(mechanism: &Mechanism, motion: &Motion) -> Vec<[f64; 2]> {
     let [phi, omega] = motion.rounded();
-    if phi.iter().chain(&omega).any(|x| !x.is_finite()) {
-        return Some("gives numbers that are not finite".into());
-    }
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.linearise_at::<0>(mechanism, motion.time, &phi, &omega);
     let (size, time) = (mechanism.size_of_parts(), mechanism.units.time);
-    mechanism.constraints.iter().enumerate().find_map(|(r, row)| {
+    let step_size = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
+    let of = |(r, row): (usize, &ConstraintEquation)| {
         let unit = if row.is_in_radians() { 1.0 } else { size };
-        let (position, rate) =
-            (kernel.rows[r].position.abs() / unit, kernel.row_rate(r, &omega).abs() / unit * time);
-        let step_size = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
-        (position > SATISFIED || rate > SATISFIED * step_size).then(|| {
+        let rate = kernel.row_rate(r, &omega).abs() / unit * time;
+        [kernel.rows[r].position.abs() / unit, rate / step_size]
+    };
+    mechanism.constraints.iter().enumerate().map(of).collect()
+}
+
+/// The constraint that a motion does not satisfy, by more than the one before did, where it was there.
+fn broken([(earlier, before), (mechanism, after)]: [(&Mechanism, &Motion); 2]) -> Option<String> {
+    if after.phi.iter().chain(&after.omega).any(|x| !x.hi.is_finite()) {
+        return Some("gives numbers that are not finite".into());
+    }
+    let drifted = violations(earlier, before);
+    let before = |name: &str| earlier.constraints.iter().position(|row| row.name == name);
+    mechanism.constraints.iter().zip(violations(mechanism, after)).find_map(|(row, [position, rate])| {
+        let known = before(&row.name).map_or([0.0; 2], |r| drifted[r]);
+        let [most, fastest] = known.map(|known| (DRIFTED * known).max(SATISFIED));
+        (position > most || rate > fastest).then(|| {
             format!(
                 "leaves constraint {} by {position:.1e} at position and {rate:.1e} at velocity level",
                 row.name

@@ -11,8 +11,10 @@
 //! II*, 2nd ed. (1996), section VII.2 (algorithm 2.1); E. Eich, SIAM J. Numer. Anal. 30 (1993).
 
 mod natural;
+mod rates;
 
 use self::natural::NaturalProjection;
+use self::rates::project_rates;
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::{larger, two_sum};
 use crate::dynamics::kernel::Kernel;
@@ -335,26 +337,8 @@ fn project_sized<const N: usize>(
         }
     }
     check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
-    let mut fast = 0.0;
-    for r in 0..rows {
-        let omega = &state.y[n..2 * n];
-        kernel.multiplier[r] = kernel.row_rate(r, omega);
-        if !kernel.is_left_out(r) {
-            fast = larger(fast, kernel.multiplier[r].abs() / step_size(mechanism, kernel, omega, r));
-        }
-    }
-    if fast > 2.0 * f64::EPSILON || fast.is_nan() {
-        kernel.solve_rows();
-        let change = shift(mechanism, kernel, state, n, -1.0);
-        let rates = state.y[n..2 * n].iter().enumerate();
-        let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| {
-            most.max(omega.abs() / size(mechanism, k))
-        });
-        (moved, far) = (true, larger(far, change / most));
-        let omega = &state.y[n..2 * n];
-        check(mechanism, kernel, tolerance, |r| {
-            (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r))
-        })?;
+    if let Some(change) = project_rates::<N>(mechanism, kernel, state, tolerance)? {
+        (moved, far) = (true, larger(far, change));
     }
     let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
     let mut energy_change = 0.0;

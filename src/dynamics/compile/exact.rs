@@ -366,6 +366,7 @@ impl<C: Decimal> ExactMechanism<C> {
         C: crate::arithmetic::Over<C>,
     {
         let (n, bars) = (start.phi.len(), self.bodies.len());
+        let (length, time) = (self.structure.units.length, self.structure.units.time);
         for x in (bars..n).step_by(2) {
             let end = |k: usize| self.forest.walk(k, self.bodies[k].ends[0]);
             let group: Vec<usize> =
@@ -374,16 +375,33 @@ impl<C: Decimal> ExactMechanism<C> {
                 let mut z = self.elements(&start.phi);
                 z[x] = Complex::ZERO;
                 let reach = end(k).position(&z);
-                (start.phi[x], start.phi[x + 1]) = (at[0] - reach.re, at[1] - reach.im);
-                start.given[0][x..x + 2].fill(true);
+                put(&mut start.phi, &mut start.given[0], x, [at[0] - reach.re, at[1] - reach.im], length);
             }
             if let Some((k, rate)) = group.iter().find_map(|&k| Some((k, scene.given[k].velocity?))) {
                 let z = self.elements(&start.phi);
-                start.omega[x..x + 2].fill(C::ZERO);
-                let turning = end(k).velocity(&z, &start.omega);
-                (start.omega[x], start.omega[x + 1]) = (rate[0] - turning.re, rate[1] - turning.im);
-                start.given[1][x..x + 2].fill(true);
+                let mut omega = start.omega.clone();
+                omega[x..x + 2].fill(C::ZERO);
+                let turning = end(k).velocity(&z, &omega);
+                let rates = [rate[0] - turning.re, rate[1] - turning.im];
+                put(&mut start.omega, &mut start.given[1], x, rates, length / time);
             }
+        }
+    }
+}
+
+/// Puts in what is given of a pair of coordinates where assembly in doubles has left it, in this unit; what
+/// it has changed stays as it found it.
+fn put<C: crate::arithmetic::Real>(
+    found: &mut [C],
+    is_given: &mut [bool],
+    x: usize,
+    given: [C; 2],
+    unit: f64,
+) {
+    for (k, given) in (x..).zip(given) {
+        let double = found[k].value();
+        if (given.value() - double).abs() <= 1e-12 * double.abs().max(unit) {
+            (found[k], is_given[k]) = (given, true);
         }
     }
 }

@@ -327,7 +327,8 @@ impl ErrorEstimator {
 
     /// Measures how far the run and its reference solution are apart.
     fn measure(&mut self, motion: &Motion) {
-        let Self { mechanism, metric, measured, reference_run: Some(reference_run), torques, .. } = self
+        let Self { mechanism, metric, measured, events, reference_run: Some(reference_run), torques, .. } =
+            self
         else {
             return;
         };
@@ -340,8 +341,7 @@ impl ErrorEstimator {
         let own = rounding.hypot(reference_run.own_error(motion.time.hi));
         // It is there for differences that are small by chance.
         let angle = apart.hypot(own.min(MOST_OWN_ERROR * apart.max(measured.error)));
-        // Between an impact of the one and that of the other rates differ by all of it.
-        let rate = (self.events == reference_run.events())
+        let rate = (measured.tells_rates([*events, reference_run.events()]))
             .then(|| metric.rates_apart(motion, &reference_run.motion));
         let torque =
             torques.as_mut().map(|torques| torques.apart(mechanism, [motion, &reference_run.motion]));

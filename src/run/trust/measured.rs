@@ -15,6 +15,8 @@ const POWERS: [f64; 2] = [1.0, 2.0];
 
 /// What a number loses where it is written as a double, as a share of it.
 const ROUNDED: f64 = 2.2e-16;
+/// Looks at the end without a comparison of rates after which nothing is told of them.
+const UNTOLD: u32 = 2;
 /// What the last digit of the scene's numbers moves them by, in units of their size; fitted.
 pub(super) const LAST_DIGIT: f64 = 2.5 * 1.1e-16;
 
@@ -42,6 +44,12 @@ pub(super) struct TrustMeasurement {
     pub error: f64,
     pub rate: f64,
     pub torque: Option<f64>,
+    /// Impacts and lasting contacts of the run and of its reference at the last look, and at how many looks
+    /// up to it their rates could not be compared.
+    #[serde(default)]
+    events: [u64; 2],
+    #[serde(default)]
+    untold: u32,
     /// The largest angle \[rad\], whole turns counted, or position over the longest bar, the largest rate
     /// \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
     pub farthest: f64,
@@ -88,6 +96,8 @@ impl TrustMeasurement {
             error: 0.0,
             rate: 0.0,
             torque: None,
+            events: [0; 2],
+            untold: 0,
             farthest: 0.0,
             fastest: 0.0,
             strongest: 0.0,
@@ -112,6 +122,15 @@ impl TrustMeasurement {
 
     pub(super) fn is_sound(&self) -> bool {
         self.stride > 0 && !self.due.is_nan()
+    }
+
+    /// True where rates can be compared: between an impact of the run and that of its reference they differ
+    /// by all of it, unless both have had none since the last look and bounces that died out were of another
+    /// number.
+    pub(super) fn tells_rates(&mut self, events: [u64; 2]) -> bool {
+        let is_told = events[0] == events[1] || events == self.events;
+        (self.events, self.untold) = (events, if is_told { 0 } else { self.untold + 1 });
+        is_told
     }
 
     /// Takes what there is to see at a time \[s\]; true where the horizon is passed by it.
@@ -287,7 +306,8 @@ impl TrustMeasurement {
         }
         trust.is_upper_bound &= trust.error_estimate.is_some();
         if trust.error_estimate.is_some() {
-            trust.rate_error = Some((CAUTION * rate).max(LEAST * self.fastest));
+            let is_told = self.untold <= UNTOLD;
+            trust.rate_error = is_told.then_some((CAUTION * rate).max(LEAST * self.fastest));
             trust.torque_error = torque.map(|torque| (CAUTION * torque).max(LEAST * self.strongest));
         }
         trust
