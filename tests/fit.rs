@@ -511,6 +511,31 @@ fn noise_that_the_data_do_not_tell_is_named() {
     assert!(columns[1].sigma.is_nan() && columns[0].sigma > 0.0, "{columns:?}");
 }
 
+/// A disc on two springs: its period tells the sum of their stiffnesses alone, wherever the search ends.
+#[test]
+fn numbers_of_which_only_the_sum_is_told_are_named_together() {
+    let text = r#"{"name": "disc", "gravity": [0, 0],
+        "bars": [{"name": "a", "mass": 0.7, "centre": [0, 0], "inertia": 0.02, "length": 0.6}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "s", "body": "a", "stiffness": 2, "free_angle": 0},
+            {"name": "r", "body": "a", "stiffness": 1, "free_angle": 0}],
+        "start": {"a": {"phi": 1, "omega": 0}}, "until": 6, "every": 0.05}"#;
+    let rows: Vec<String> = (1..9).map(|k| format!("0.{k},{}\n", (f64::from(k) * 1.1).cos())).collect();
+    let data = Data::parse(&format!("t [s],a.phi [rad]\n{}", rows.concat()), "data.csv").expect("a table");
+    let template = Template::new(text.into(), "disc.json".into(), &[]);
+    let vary = ["s.stiffness", "r.stiffness", "start.a.phi"].map(str::to_owned).to_vec();
+    let request = FitRequest { vary, ..FitRequest::default() };
+    let error = fit(&template, &data, &request, &mut || false).map(|_| ()).expect_err("no fit").to_string();
+    println!("{error}");
+    let [one, other] = ["s", "r"].map(|name| format!("torsion_springs.{name}.stiffness"));
+    let told = [[&one, &other], [&other, &one]]
+        .map(|[a, b]| format!("where the data do not tell {a} apart from {b}\n"));
+    assert!(
+        told.iter().any(|told| error.contains(told)) && error.contains("the search ran from "),
+        "{error}"
+    );
+}
+
 /// An angle that stays where no motion from the start is: ever stiffer springs and dampers fit it better.
 #[test]
 fn a_search_that_runs_away_says_where_to() {

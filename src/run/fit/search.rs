@@ -18,10 +18,12 @@ const FARTHER: f64 = 10.0;
 const LONG: usize = 8;
 /// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
 const NOTHING: f64 = 1e-11;
+/// Share of a number, over the largest one, in a change of several that does nothing, from which it is named.
+const PARTNER: f64 = 0.01;
 
-/// Singular values up to this one are rounding.
+/// Singular values up to this one are rounding, of the derivatives too.
 pub(super) fn rounding(values: &DVector<f64>) -> f64 {
-    f64::EPSILON * values.amax() * values.len() as f64
+    NOTHING * values.amax()
 }
 
 impl FitProblem<'_> {
@@ -99,6 +101,24 @@ impl FitProblem<'_> {
         Ok(told)
     }
 
+    /// Why numbers are not told that change together, in these shares, without changing the columns.
+    fn untold(&self, shares: &[f64]) -> String {
+        let largest = (0..shares.len()).max_by(|&a, &b| shares[a].total_cmp(&shares[b])).unwrap_or_default();
+        let path = &self.variables[largest].path;
+        let others: Vec<&str> = (0..shares.len())
+            .filter(|&k| k != largest && shares[k] > PARTNER * shares[largest])
+            .map(|k| self.variables[k].path.as_str())
+            .collect();
+        let what = match others.is_empty() {
+            true => format!("the data do not depend on {path}"),
+            false => format!("the data do not tell {path} apart from {}", others.join(", ")),
+        };
+        match self.ran_to(largest) {
+            Some(ran) => format!("{ran}, where {what}\n{HINT}"),
+            None => what,
+        }
+    }
+
     /// The covariance of the numbers at the minimum; those at a bound have none.
     pub fn covariance(&mut self, columns: &[FittedColumn]) -> Result<DMatrix<f64>, Lost> {
         self.take(columns);
@@ -111,14 +131,8 @@ impl FitProblem<'_> {
         let least = rounding(&values);
         let places: Vec<Option<usize>> = (0..count).map(|k| free.iter().position(|f| *f == k)).collect();
         if let Some(k) = values.iter().position(|value| *value <= least) {
-            let row = right.row(k);
-            let size = |number: usize| places[number].map_or(0.0, |place| row[place].abs());
-            let most = (0..count).max_by(|&a, &b| size(a).total_cmp(&size(b))).unwrap_or_default();
-            return Err(format!(
-                "the data do not tell {} apart from the other numbers, or do not depend on it",
-                self.variables[most].path
-            )
-            .into());
+            let shares = (0..count).map(|number| places[number].map_or(0.0, |place| right[(k, place)].abs()));
+            return Err(self.untold(&shares.collect::<Vec<_>>()).into());
         }
         Ok(DMatrix::from_fn(count, count, |i, j| {
             let (Some(a), Some(b)) = (places[i], places[j]) else { return 0.0 };
