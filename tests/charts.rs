@@ -135,6 +135,7 @@ fn gallery() -> Vec<(&'static str, Picture)> {
         title: "Angles of the bars".to_owned(),
         caption: words(&["scene chain"]),
         time: time.clone(),
+        is_coarse: false,
         series: (0..count).map(|k| AngleSeries { name: format!("bar {k}"), angle: wave(k) }).collect(),
         travels: Vec::new(),
         positions: Vec::new(),

@@ -168,3 +168,56 @@ fn sweeps_that_no_page_can_show_are_refused() {
         .says(&["--html: 4194304 points are more than a page can hold (1048576)", "hint"]);
     assert!(!program.files().iter().any(|file| file.starts_with("output/")), "{:?}", program.files());
 }
+
+/// The command line of a page names the file as it was given, with what was changed and added.
+#[test]
+fn the_command_on_a_page_makes_its_run_again() {
+    let program = Program::with_scenes(&["free"]);
+    let [scene, set] = ["my free.json", "bar1.length=500 mm"];
+    program.write(scene, &program.read("free.json"));
+    let given = ["--set", set, "--set", "bar1.density=2e3/3", "--output", "reach=bar2.x"];
+    let mut command = program.command("run");
+    command.arg(scene).args(["--until", "0.5", "--html", "--no-charts", "-q"]).args(given);
+    assert!(command.status().expect("the program").success());
+    let folder = "output/free/taylor-1e-9";
+    let (page, table) =
+        (program.read(&format!("{folder}/run.html")), program.read(&format!("{folder}/trajectory.csv")));
+    let told = page.split(r#""command":"driftless "#).nth(1).and_then(|rest| rest.split('"').next());
+    let told = told.expect("a command").to_owned();
+    let named = "run 'my free.json' --set 'bar1.length=500 mm' --set bar1.density=2e3/3 --output reach=bar2.x --method";
+    assert!(told.starts_with(named), "{told}");
+    let words = shell_words(&told);
+    let again = program.command("").args(&words).args(["--out", "again", "-q"]).status();
+    assert!(again.expect("the program").success(), "{words:?}");
+    assert_eq!(program.read("again/free/taylor-1e-9/trajectory.csv"), table);
+    let sweep = "sweep free.json --set gravity[0]=1.62 --vary bar1.phi=0..1:3 --until 0.5 --html -q";
+    program.run(sweep).exits(0);
+    let pages: Vec<String> =
+        program.files().into_iter().filter(|file| file.ends_with("sweep.html")).collect();
+    assert!(program.read(&pages[0]).contains("driftless run free.json --set 'gravity[0]=1.62' --html"));
+}
+
+/// Words of a command line as a shell takes them, where quotes are single ones.
+fn shell_words(line: &str) -> Vec<String> {
+    let parts = line.split('\'').enumerate();
+    let marked: String =
+        parts.map(|(k, part)| if k % 2 == 1 { part.replace(' ', "\0") } else { part.into() }).collect();
+    marked.split_whitespace().map(|word| word.replace('\0', " ")).collect()
+}
+
+/// Rows that are too far apart for curves are drawn alone, and a motor that holds still has its torque drawn.
+#[test]
+fn charts_show_rows_alone_where_they_are_far_apart_and_motors_that_hold() {
+    let program = Program::with_scenes(&["free"]);
+    program.run("run free.json --until 40 --every 4 --trust off --chart-format svg -q").exits(0);
+    let folder = program.files().into_iter().find(|file| file.ends_with("angles.svg")).expect("a chart");
+    assert!(program.read(&folder).contains("rows alone"));
+    let text = program.read("free.json").replacen(
+        r#""start""#,
+        r#""motors": [{"name": "M", "body": "bar1", "law": {"start": "pi/2", "rate": 0}}], "start""#,
+        1,
+    );
+    program.write("held.json", &text);
+    program.run("run held.json --until 0.5 -q").exits(0);
+    assert!(program.files().iter().any(|file| file.ends_with("torque_power.png")));
+}

@@ -43,6 +43,8 @@ def test_numbers_are_those_of_the_program(scenes, program, tmp_path, name, optio
     theirs, ours = record(path.parent / "run.json"), run.report
     for key in ("timings", "hashes"):
         theirs.pop(key), ours.pop(key)
+    # How the scene was named on the command line.
+    assert theirs.pop("given")["scene"].endswith(f"{name}.json")
     assert ours == theirs
 
 

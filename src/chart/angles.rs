@@ -45,6 +45,8 @@ pub struct Angles {
     pub caption: Vec<String>,
     /// Times \[s\], ascending.
     pub time: Vec<f64>,
+    /// True where too much happens between the times for curves through the values.
+    pub is_coarse: bool,
     /// The bars.
     pub series: Vec<AngleSeries>,
     /// Sliders, with their travels \[m\] in place of angles.
@@ -136,7 +138,8 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
     let crowded = {
         let trial = Sheet::new(size, 0.5)?;
         let panels = stacked(&trial, 40.0, &x, ys(), 20.0)?;
-        panels.iter().zip(&lines).any(|(panel, lines)| lines.iter().any(|line| panel.crowded(line)))
+        let mut all = panels.iter().zip(&lines);
+        !chart.is_coarse && all.any(|(panel, lines)| lines.iter().any(|line| panel.crowded(line)))
     };
     if crowded {
         caption.push("bands between the extremes of what oscillates too fast to be drawn".to_owned());
@@ -155,7 +158,10 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
         let mut ends = Vec::new();
         for (line, (series, mark)) in lines.iter().zip(group.series.iter().zip(marks.by_ref())) {
             let width = if lines.len() > APART { 1.4 } else { 1.6 };
-            let pieces = panel.trusted(line, mark.colour, width, chart.horizon)?;
+            let pieces = match chart.is_coarse {
+                true => panel.trusted_dots(line, mark.colour, chart.horizon)?,
+                false => panel.trusted(line, mark.colour, width, chart.horizon)?,
+            };
             if let (true, Some(end)) = (lines.len() > 1, pieces.last().and_then(|piece| piece.last())) {
                 ends.push((end[1], shortened(&sheet, &series.name), mark));
             }

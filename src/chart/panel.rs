@@ -279,6 +279,19 @@ impl<'a> Panel<'a> {
         Ok(pieces.into_iter().rev().flatten().collect())
     }
 
+    /// The points alone in full colour up to a time, and pale beyond it.
+    pub(crate) fn trusted_dots(
+        &self,
+        points: &[Point],
+        colour: Colour,
+        horizon: Option<f64>,
+    ) -> Result<Vec<Vec<Point>>, ChartError> {
+        let known = points.partition_point(|point| horizon.is_none_or(|horizon| point[0] <= horizon));
+        self.dots(&points[known..], pale(colour))?;
+        self.dots(&points[..known], colour)?;
+        Ok(vec![points.iter().map(|&point| self.page(self.fractions(point))).collect()])
+    }
+
     /// A thin upright line at a time, with words at its top where there is room for them.
     pub(crate) fn horizon(&self, at: Option<f64>, words: Option<&str>) -> Result<(), ChartError> {
         let Some(share) = at.map(|at| self.x.fraction(at)).filter(|share| (0.0..=1.0).contains(share)) else {

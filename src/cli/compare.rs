@@ -88,7 +88,7 @@ fn keep(
     }
     #[cfg(feature = "charts")]
     if flags.html {
-        let page = report::view::compared(scene, mechanism, comparison);
+        let page = report::view::compared(scene, mechanism, comparison, &flags.scene.given());
         super::view::keep(folder, "compare.html", &page, &flags.scene.tell)?;
     }
     let record = format!("{:#}\n", report::compare::object(scene, mechanism, comparison));

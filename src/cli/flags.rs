@@ -337,6 +337,13 @@ impl SceneFlags {
     pub(super) fn remark(&self, text: &str) {
         self.tell.remark(text);
     }
+
+    /// The entry `given` of `run.json`: the file, and what is changed and added, as typed.
+    #[cfg(feature = "files")]
+    pub(super) fn given(&self) -> serde_json::Value {
+        let set: Vec<String> = self.set.iter().map(ToString::to_string).collect();
+        serde_json::json!({"scene": self.scene.to_string_lossy(), "set": set, "output": self.output})
+    }
 }
 
 impl TellFlags {

@@ -328,7 +328,9 @@ impl SimulateTask<'_> {
             folder.write(EVENTS, report::events::table(mechanism, &outcome).as_bytes())?;
         }
         draw(scene, mechanism, &outcome, folder, flags)?;
-        let text = format!("{:#}\n", report::result::record(scene, mechanism, &outcome, &hash));
+        let mut record = report::result::record(scene, mechanism, &outcome, &hash);
+        record["given"] = flags.scene.given();
+        let text = format!("{record:#}\n");
         folder.write(RECORD, text.as_bytes())?;
         Ok(outcome)
     }

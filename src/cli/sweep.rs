@@ -201,7 +201,7 @@ impl Swept<'_> {
                 draw(self.plan, curve, folder, _flags)?;
             }
             if _flags.html {
-                let page = report::view::swept(self.plan, curve, &self.totals);
+                let page = report::view::swept(self.plan, curve, &self.totals, &_flags.scene.given());
                 super::view::keep(folder, "sweep.html", &page, &_flags.scene.tell)?;
             }
         }

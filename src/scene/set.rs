@@ -5,6 +5,7 @@ use super::locate::{Located, Member, Text, Texts, Value, push_index, push_key};
 use super::number;
 use super::read::nearest;
 use super::template::{ShortNameError, is_number, whole};
+use std::fmt;
 use std::str::FromStr;
 
 /// One value of a scene set from outside, as `PATH=VALUE`.
@@ -33,6 +34,18 @@ pub struct Override {
 pub struct OverrideError {
     /// The text.
     pub given: String,
+}
+
+impl fmt::Display for Override {
+    /// As it is read: text that would be read as JSON stands in quotes.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.value {
+            serde_json::Value::String(text) if serde_json::from_str::<serde_json::Value>(text).is_err() => {
+                write!(f, "{}={text}", self.path)
+            }
+            value => write!(f, "{}={value}", self.path),
+        }
+    }
 }
 
 impl FromStr for Override {

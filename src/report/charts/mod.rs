@@ -74,11 +74,16 @@ pub fn wanted(mechanism: &Mechanism, outcome: &Outcome) -> Vec<Chart> {
     Chart::ALL.into_iter().filter(has).collect()
 }
 
-/// The rows of motors, of those that events switch as well, and of gears that have done work.
+/// The rows of motors, of those that events switch or that hold still as well, and of gears that have done
+/// work.
 fn motors(mechanism: &Mechanism, outcome: &Outcome) -> Vec<usize> {
     let (all, trace) = (mechanism.with_all_parts(), &outcome.trace);
     let samples = || trace.whole.iter().chain(&trace.head).chain(&trace.part);
-    let works = |row: usize| all.is_motor(row) && samples().any(|sample| sample.motors[row][1] != 0.0);
+    let works = |row: usize| {
+        // Torque of a motor, power of a gear.
+        let what = usize::from(all.constraints[row].law.is_none());
+        all.is_motor(row) && samples().any(|sample| sample.motors[row][what] != 0.0)
+    };
     (0..all.constraints.len()).filter(|&row| all.constraints[row].is_motor() || works(row)).collect()
 }
 
@@ -316,7 +321,11 @@ impl Finished<'_> {
 
     fn angles(&self) -> Angles {
         let (window, more) = self.window();
-        let smooth = smoothed(&window);
+        let is_coarse = is_coarse(&window);
+        let smooth = match is_coarse {
+            true => window.iter().map(|sample| (sample.t, sample.phi.clone())).collect(),
+            false => smoothed(&window),
+        };
         let series = self.mechanism.own_bodies().iter().enumerate().map(|(k, body)| AngleSeries {
             name: plain(&body.name),
             angle: smooth.iter().map(|(_, phi)| phi[k]).collect(),
@@ -330,6 +339,7 @@ impl Finished<'_> {
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
         let mut caption = self.caption(more);
         caption.extend(past);
+        caption.extend(is_coarse.then(|| "rows alone, which are too far apart for curves".to_owned()));
         let travels: Vec<AngleSeries> = travels.collect();
         let positions = if travels.is_empty() { self.positions(&smooth) } else { Vec::new() };
         // A body that keeps its angle is told in a line where others move.
@@ -351,6 +361,7 @@ impl Finished<'_> {
             title: title.to_owned(),
             caption,
             time: smooth.iter().map(|(t, _)| *t).collect(),
+            is_coarse,
             series,
             travels,
             positions,

@@ -9,20 +9,20 @@ use crate::scene::Scene;
 use serde_json::{Value, json};
 
 /// The page: every setting is a row, and a point of each chart that has figures of it.
-pub fn compared(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> Document {
+/// `given` is the scene as the commands of the rows name it.
+pub fn compared(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison, given: &Value) -> Document {
     let told = object(scene, mechanism, comparison);
     let letters = has_letters(comparison);
-    let file = crate::run::files::quoted(format!("{}.json", scene.name).as_ref());
+    let scene_words = super::words::given_scene(given, &scene.name);
     let rows: Vec<Value> = sorted(comparison)
         .into_iter()
         .map(|(number, entry)| {
             let mut row = told["rows"][number].clone();
             row["series"] = json!(if letters { entry.name() } else { entry.method.to_string() });
             row["label"] = json!(short(entry, letters));
-            row["command"] =
-                json!(options(entry).map(|options| {
-                    format!("driftless run {file} {options} --until {}", comparison.until)
-                }));
+            row["command"] = json!(options(entry).map(|options| {
+                format!("driftless run {scene_words} {options} --until {}", comparison.until)
+            }));
             row["why"] = json!(row["stop"]["what"].as_str().or(row["refusal"]["reason"].as_str()));
             row
         })

@@ -27,7 +27,7 @@ pub fn holds(sweep: &Sweep) -> Result<(), ViewError> {
 }
 
 /// The page: a click on a point shows its motion, or that of the nearest of which it is kept.
-pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals) -> Document {
+pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals, given: &Value) -> Document {
     let labels = curve.labels(sweep);
     let mut axes: Vec<Value> = (sweep.grid().axes().iter().zip(sweep.variables()))
         .map(|(axis, variable)| {
@@ -86,7 +86,7 @@ pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals) -> Document {
             "never": labels.never,
             "cells": cells,
             "runs": runs.iter().map(told).collect::<Vec<_>>(),
-            "command": super::words::command_of_points(sweep),
+            "command": super::words::command_of_points(sweep, given),
             "text": text(sweep, totals),
         }),
         tables,

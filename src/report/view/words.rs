@@ -26,11 +26,23 @@ pub(super) fn setting(record: &Value) -> String {
     words.join(", ")
 }
 
+/// The scene in a command line: the file, and what is changed and added, as typed; where that is not known, a
+/// file of its name.
+pub(super) fn given_scene(given: &Value, name: &str) -> String {
+    let word = |text: &str| crate::run::files::quoted(text.as_ref());
+    let file = given["scene"].as_str().filter(|file| *file != "-");
+    let mut words = vec![file.map_or_else(|| word(&format!("{name}.json")), word)];
+    for (key, option) in [("set", "--set"), ("output", "--output")] {
+        let typed = given[key].as_array().into_iter().flatten().filter_map(Value::as_str);
+        words.extend(typed.map(|typed| format!("{option} {}", word(typed))));
+    }
+    words.join(" ")
+}
+
 /// A command line that makes the run again.
 pub(super) fn command(record: &Value, scene: &Scene) -> String {
     let settings = &record["result"]["settings"];
-    let mut words =
-        vec!["driftless run".to_owned(), crate::run::files::quoted(format!("{}.json", scene.name).as_ref())];
+    let mut words = vec!["driftless run".to_owned(), given_scene(&record["given"], &scene.name)];
     words.push(format!("--method {}", text(&record["result"]["method"])));
     for (key, option) in
         [("step", "--step"), ("rtol", "--rtol"), ("atol", "--atol"), ("time_constant", "--time-constant")]
@@ -44,10 +56,9 @@ pub(super) fn command(record: &Value, scene: &Scene) -> String {
 }
 
 /// A command line that runs a point of a sweep; its values are to be added by `--set`.
-pub(super) fn command_of_points(sweep: &Sweep) -> String {
-    let (scene, plan) = (sweep.scene(), sweep.plan());
-    let file = crate::run::files::quoted(format!("{}.json", scene.name).as_ref());
-    let mut words = vec![format!("driftless run {file} --html --method {}", plan.method)];
+pub(super) fn command_of_points(sweep: &Sweep, given: &Value) -> String {
+    let (scene, plan) = (given_scene(given, &sweep.scene().name), sweep.plan());
+    let mut words = vec![format!("driftless run {scene} --html --method {}", plan.method)];
     words.extend(plan.step.map(|step| format!("--step {}", shortest(step))));
     let tolerance = plan.tolerance.filter(|_| plan.step.is_none());
     words.extend(tolerance.map(|tolerance| format!("--rtol {}", shortest(tolerance.relative))));
