@@ -148,6 +148,17 @@ impl Sheet {
         Ok(())
     }
 
+    /// A straight line with round ends in every direction.
+    pub(crate) fn rod(&self, [from, to]: [Point; 2], pen: &Pen) -> Result<(), ChartError> {
+        let (start, end) = (units(from), units(to));
+        if start.0 == end.0 || start.1 == end.1 {
+            // The canvas takes two points along an edge of the page for a rule, which ends in corners.
+            let middle = [0.5 * (from[0] + to[0]), 0.5 * (from[1] + to[1])];
+            return self.line(&[from, middle, to], pen);
+        }
+        self.line(&[from, to], pen)
+    }
+
     /// A filled area.
     pub(crate) fn polygon(&self, points: &[Point], colour: Colour) -> Result<(), ChartError> {
         let corners: Vec<BackendCoord> = points.iter().copied().map(units).collect();
@@ -306,6 +317,22 @@ pub(crate) fn note(colour: Colour, align: Align, level: TextLevel) -> Lettering 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rods_have_round_ends_in_every_direction() {
+        for to in [[70.0, 50.0], [30.0, 70.0], [69.0, 57.0], [10.0, 50.0]] {
+            let sheet = Sheet::new([100.0, 100.0], 1.0).unwrap();
+            let from = [30.0, 50.0];
+            sheet.rod([from, to], &Pen::new(INK, 10.0)).unwrap();
+            let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+            let pixels = sheet.pixels();
+            let is_inked = |away: f64| {
+                let [x, y] = [0, 1].map(|k| (to[k] + away * (to[k] - from[k]) / length) as usize);
+                pixels[3 * (100 * y + x)] < 200
+            };
+            assert!(is_inked(3.0) && !is_inked(7.0), "to {to:?}");
+        }
+    }
 
     #[test]
     fn captions_break_at_dots_first() {

@@ -141,7 +141,7 @@ impl Pencil<'_> {
         let pen = Pen::new(mix(SPINE, WHITE, 0.74 + 0.18 * age), 4.0 * self.size);
         let arms = pose.arms.iter().map(|(_, ends)| ends);
         for bar in pose.bars.iter().chain(arms).filter(|bar| finite(&bar[..])) {
-            self.sheet.line(&bar.map(|end| self.at(end)), &pen)?;
+            self.sheet.rod(bar.map(|end| self.at(end)), &pen)?;
         }
         Ok(())
     }
@@ -234,8 +234,8 @@ impl Pencil<'_> {
             let ends = bar.map(|end| self.at(end));
             // Near the colours of the first two lines in charts of angles.
             let colour = if k % 2 == 0 { SKY } else { ORANGE };
-            self.sheet.line(&ends, &Pen::new(mix(colour, INK, 0.3), 5.6 * size))?;
-            self.sheet.line(&ends, &Pen::new(mix(colour, WHITE, 0.55), 3.6 * size))?;
+            self.sheet.rod(ends, &Pen::new(mix(colour, INK, 0.3), 5.6 * size))?;
+            self.sheet.rod(ends, &Pen::new(mix(colour, WHITE, 0.55), 3.6 * size))?;
             let [from, to] = ends;
             let length = (to[0] - from[0]).hypot(to[1] - from[1]).max(1e-9);
             let edge = [-2.5 * size * (to[1] - from[1]) / length, 2.5 * size * (to[0] - from[0]) / length];
