@@ -280,20 +280,44 @@ impl Sheet {
     }
 }
 
+/// The words of a part, a number and what follows it as one, with a space inside that does not break.
+fn words_of(part: &str) -> Vec<String> {
+    let is_number = |word: &str| {
+        let digits = word.trim_start_matches(['−', '-', '+']);
+        digits.starts_with(|c: char| c.is_ascii_digit())
+            && digits.chars().all(|c| c.is_ascii_digit() || "e.,·×^{}−-+\u{2009}".contains(c))
+    };
+    let mut words: Vec<String> = Vec::new();
+    let mut after_number = false;
+    // Thin spaces stand between the digits of a number.
+    let parts = part.split(|c: char| c.is_whitespace() && c != '\u{2009}').filter(|word| !word.is_empty());
+    for word in parts {
+        match words.last_mut() {
+            Some(number) if after_number && word.starts_with(char::is_alphabetic) => {
+                number.push(' ');
+                number.push_str(word);
+            }
+            _ => words.push(word.to_owned()),
+        }
+        after_number = is_number(word);
+    }
+    words
+}
+
 /// Lines no wider than `room`: parts joined by middle dots, broken at a dot, or between words where one part
 /// is too long.
 fn wrap(parts: &[String], room: f64, width: impl Fn(&str) -> f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut line = String::new();
     for part in parts.iter().filter(|part| !part.trim().is_empty()) {
-        for (k, word) in part.split_whitespace().enumerate() {
+        for (k, word) in words_of(part).iter().enumerate() {
             let joint = match (line.is_empty(), k) {
                 (true, _) => "",
                 (false, 0) => "   ·   ",
                 (false, _) => " ",
             };
             // A part that fits into a line of its own is not torn.
-            let whole = if k == 0 { part.as_str() } else { word };
+            let whole = if k == 0 { part } else { word };
             let fits = width(&format!("{line}{joint}{whole}")) <= room
                 || (k == 0 && width(part) > room && width(&format!("{line}{joint}{word}")) <= room);
             if !fits && !line.is_empty() {
@@ -342,5 +366,12 @@ mod tests {
         assert_eq!(wrap(&parts, 60.0, width), ["one two   ·   three four"]);
         assert_eq!(wrap(&parts, 6.0, width), ["one", "two", "three", "four"]);
         assert!(wrap(&[], 6.0, width).is_empty());
+        let title = ["at most 2·10^{−14} m over 0.4 s".to_owned()];
+        assert_eq!(
+            wrap(&title, 30.0, width),
+            ["at most 2·10^{−14} m over", "0.4 s"],
+            "units stay at numbers"
+        );
+        assert_eq!(wrap(&["over 10\u{2009}000 s".to_owned()], 6.0, width), ["over", "10\u{2009}000 s"]);
     }
 }
