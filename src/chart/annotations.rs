@@ -7,7 +7,7 @@ use super::palette::{Colour, GREY, INK};
 use super::sheet::{CAPTION, NAME, NOTE, Pen, Sheet, note};
 use super::sketch::{NAMES, Pencil, Pose, Sketch, around, finite, trail_colour};
 use super::text::{Align, Lettering, TextLevel};
-use super::ticks::nice_step;
+use super::ticks::{nice_step, nice_words};
 
 /// Share of the panel that a scale bar takes about.
 const BAR: f64 = 0.12;
@@ -115,7 +115,7 @@ impl Pencil<'_> {
         if !(length.is_finite() && length > 0.0) {
             return Ok(());
         }
-        let words = format!("{length} m");
+        let words = format!("{} m", nice_words(length));
         let wide = (length * scale).max(self.sheet.width(&words, CAPTION, false));
         // A corner where one is free, else a place between them.
         let (first, last) = (left + 8.0, right - 8.0 - wide);

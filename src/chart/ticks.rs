@@ -61,6 +61,16 @@ pub(crate) fn nice_step(rough: f64) -> f64 {
     mantissa * ten(power)
 }
 
+/// Words for a [`nice_step`]: a decimal, or a power of ten where the axes beside it have one.
+pub(crate) fn nice_words(step: f64) -> String {
+    let (mantissa, exponent) = nice(step);
+    match (exponent, mantissa == 1.0) {
+        (-4..=5, _) => decimal(step, (-exponent).max(0) as usize),
+        (_, true) => power(exponent),
+        (_, false) => format!("{mantissa}·{}", power(exponent)),
+    }
+}
+
 /// A plain decimal with true minus and thin spaces from five digits on.
 pub(crate) fn decimal(value: f64, decimals: usize) -> String {
     let text = format!("{:.decimals$}", value.abs());
@@ -282,6 +292,14 @@ mod tests {
     fn angles_are_told_in_pi() {
         assert_eq!(labels(&pi(-PI, PI, 5)), ["−π", "−π/2", "0", "π/2", "π"]);
         assert_eq!(labels(&pi(-1.0, 65.0, 5)), ["0", "5π", "10π", "15π", "20π"]);
+    }
+
+    #[test]
+    fn nice_steps_are_told_as_decimals_or_powers() {
+        let words = |step| nice_words(nice_step(step));
+        assert_eq!([words(0.1), words(0.02), words(5.0), words(0.0001)], ["0.1", "0.02", "5", "0.0001"]);
+        assert_eq!(words(2e4), "20\u{2009}000");
+        assert_eq!([words(1e-6), words(2e-9), words(1e6)], ["10^{−6}", "2·10^{−9}", "10^{6}"]);
     }
 
     #[test]
