@@ -856,3 +856,19 @@ fn the_same_data_give_the_same_picture() {
     let twice = [mechanism(&pendulum(), 1.0).unwrap(), mechanism(&pendulum(), 1.0).unwrap()];
     assert_eq!(twice[0].rgb, twice[1].rgb);
 }
+
+/// Torques of more than three motors are not marked, nor are those that are zero.
+#[test]
+fn the_caption_speaks_of_marks_only_where_there_are_any() {
+    let of = |count: usize, value: f64| {
+        let mut chart = torque(times(50, 0.1), vec![value; 50]);
+        let motor = chart.motors[0].clone();
+        chart.motors = (0..count).map(|k| MotorSeries { name: format!("m{k}"), ..motor.clone() }).collect();
+        said(&torque_power(&chart, 1.0).unwrap()).join(" ")
+    };
+    for (count, value, is_marked) in [(1, 2.0, true), (3, 2.0, true), (1, 0.0, false), (5, 2.0, false)] {
+        let words = of(count, value);
+        assert_eq!(words.contains("marked"), is_marked, "{count} motors at {value}: {words}");
+        assert_eq!(words.contains("12.00 W at"), is_marked, "{count} motors at {value}: {words}");
+    }
+}

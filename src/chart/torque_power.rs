@@ -26,6 +26,11 @@ pub struct MotorSeries {
     pub power: Vec<f64>,
 }
 
+/// Motors of which each has its largest magnitudes marked.
+const MARKED: usize = 3;
+/// What the caption says of these.
+const LARGEST: &str = "largest magnitudes of what is drawn marked";
+
 /// Torque and power of one or several motors.
 #[derive(Clone, Debug, Default)]
 pub struct TorquePower {
@@ -97,14 +102,11 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
         let panels = stacked(&trial, 40.0, &x, rows.iter().map(y).collect(), 20.0)?;
         panels.iter().zip(&rows).any(|(panel, row)| row.0.iter().any(|line| panel.crowded(line)))
     };
-    caption.push(
-        if crowded {
-            "bands between the extremes, largest magnitudes of what is drawn marked"
-        } else {
-            "largest magnitudes of what is drawn marked"
-        }
-        .to_owned(),
-    );
+    let is_marked =
+        rows.iter().any(|row| row.0.len() <= MARKED && row.0.iter().any(|line| top(line).is_some()));
+    let drawn = [(crowded, "bands between the extremes"), (is_marked, LARGEST)];
+    let said: Vec<&str> = drawn.into_iter().filter_map(|(is_so, words)| is_so.then_some(words)).collect();
+    caption.push(said.join(", "));
     let under = sheet.heading(&chart.title, &caption)?;
     let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
     let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
@@ -126,8 +128,7 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
             }
         }
         // Rings of many motors would say less than none.
-        for (motor, line) in lines.iter().enumerate().filter(|(_, line)| lines.len() <= 3 && !line.is_empty())
-        {
+        for (motor, line) in lines.iter().enumerate().filter(|_| lines.len() <= MARKED) {
             peak(&sheet, panel, line, unit, mark(motor).colour, &mut occupied)?;
         }
         panel.horizon(chart.horizon, label.as_deref().filter(|_| k == 0))?;
@@ -145,6 +146,12 @@ fn zero(lines: &[Vec<Point>]) -> Option<f64> {
     (!lines.is_empty()).then_some(0.0)
 }
 
+/// The largest magnitude of a line that is not zero all along.
+fn top(line: &[Point]) -> Option<Point> {
+    let usable = line.iter().filter(|p| p[1].abs() <= 1e300 && p[0].is_finite());
+    usable.max_by(|a, b| a[1].abs().total_cmp(&b[1].abs())).copied().filter(|top| top[1] != 0.0)
+}
+
 /// A ring and words at the largest magnitude.
 fn peak(
     sheet: &Sheet,
@@ -154,11 +161,7 @@ fn peak(
     colour: Colour,
     occupied: &mut Occupied,
 ) -> Result<(), ChartError> {
-    let usable = line.iter().filter(|p| p[1].abs() <= 1e300 && p[0].is_finite());
-    let Some(&top) = usable.max_by(|a, b| a[1].abs().total_cmp(&b[1].abs())) else { return Ok(()) };
-    if top[1] == 0.0 {
-        return Ok(());
-    }
+    let Some(top) = top(line) else { return Ok(()) };
     let at = panel.at(top);
     sheet.disc(at, 4.0, super::palette::WHITE)?;
     sheet.ring(at, 2.9, colour, 1.3)?;
