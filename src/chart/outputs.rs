@@ -26,6 +26,21 @@ pub struct OutputSeries {
     pub extremes: Vec<[f64; 2]>,
 }
 
+impl OutputSeries {
+    /// Whether its values differ by rounding at most, so that none of them is an extreme.
+    fn is_constant(&self) -> bool {
+        let all =
+            || self.value.iter().copied().chain(self.extremes.iter().map(|e| e[0])).filter(|v| v.is_finite());
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(f64::NEG_INFINITY, f64::max));
+        high - low <= 16.0 * f64::EPSILON * low.abs().max(high.abs())
+    }
+
+    /// Whether it has extremes to mark.
+    fn has_extremes(&self) -> bool {
+        !self.extremes.is_empty() && !self.is_constant()
+    }
+}
+
 /// Several outputs.
 #[derive(Clone, Debug, Default)]
 pub struct OutputsChart {
@@ -113,7 +128,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         }
     };
     let mut caption = chart.caption.clone();
-    if chart.outputs.iter().any(|output| !output.extremes.is_empty()) {
+    if chart.outputs.iter().any(OutputSeries::has_extremes) {
         let whole = if chart.over.is_some() { "range" } else { "run" };
         caption.push(format!("extremes of the whole {whole} marked"));
     }
@@ -155,8 +170,9 @@ fn extremes(
     occupied: &mut Occupied,
 ) -> Result<(), ChartError> {
     let largest = |output: &OutputSeries| output.extremes.iter().map(|e| e[0].abs()).fold(0.0, f64::max);
-    let most = lines.iter().map(|one| largest(one.0)).fold(0.0, f64::max);
-    let shown = || lines.iter().map(|one| one.0).filter(|one| lines.len() <= RINGED || largest(one) == most);
+    let varied = || lines.iter().map(|one| one.0).filter(|one| one.has_extremes());
+    let most = varied().map(largest).fold(0.0, f64::max);
+    let shown = || varied().filter(|one| lines.len() <= RINGED || largest(one) == most);
     let peak = |output: &OutputSeries| {
         let peak = output.extremes.iter().max_by(|a, b| a[0].abs().total_cmp(&b[0].abs()));
         peak.copied().filter(|peak| peak[0].is_finite())
@@ -172,7 +188,9 @@ fn extremes(
     }
     // All rings have their places before the first figure.
     for (output, [value, t]) in shown().filter_map(|output| Some((output, peak(output)?))) {
-        let said = if unit == "1" { figure(value) } else { format!("{} {unit}", figure(value)) };
+        // A unit that nobody knows is told by the axis alone.
+        let said =
+            if matches!(unit, "" | "1" | "?") { figure(value) } else { format!("{} {unit}", figure(value)) };
         let note = format!("{said} at {} {over_unit}", figure(t));
         panel.note_beside(panel.at([t, value]), &note, readable(mark(output).colour), occupied)?;
     }
@@ -244,6 +262,22 @@ mod tests {
         assert!(has(&changes, "change [rad]"), "{changes:?}");
         let pure = words(vec![series("a", "1"), series("b", "1")], None);
         assert!(has(&pure, "value"), "{pure:?}");
+    }
+
+    #[test]
+    fn constants_have_no_extremes_and_unknown_units_stand_at_the_axis_alone() {
+        let words = |value: Vec<f64>, extremes: Vec<[f64; 2]>| -> String {
+            let outputs = vec![OutputSeries { value, extremes, ..series("a", "?") }];
+            let picture = outputs_of(&OutputsChart { outputs, ..OutputsChart::default() });
+            picture.texts.into_iter().map(|text| text.text + "|").collect()
+        };
+        let level = words(vec![3.0; 3], vec![[3.0, 0.0], [3.0, 1.23]]);
+        assert!(!level.contains(" at ") && !level.contains("marked"), "{level}");
+        let rising = words(vec![0.0, 1.0, 0.5], vec![[0.0, 0.0], [1.0, 1.0]]);
+        assert!(
+            rising.contains("|1.00 at 1.00 s|") && rising.contains("extremes of the whole run"),
+            "{rising}"
+        );
     }
 
     fn outputs_of(chart: &OutputsChart) -> Picture {
