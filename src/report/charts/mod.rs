@@ -171,6 +171,14 @@ fn last_stretch<'a>(samples: impl DoubleEndedIterator<Item = &'a Sample>) -> Vec
     path
 }
 
+/// `last 3 s of 10 s`; `all 10 s` where both are the same to three digits.
+fn part_of(which: &str, part: f64, whole: f64) -> String {
+    if part >= whole || rough(part) == rough(whole) {
+        return format!("all {} s", figure(whole));
+    }
+    format!("{which} {} s of {} s", rough(part), figure(whole))
+}
+
 /// A run and all that belongs to it.
 struct Finished<'a> {
     scene: &'a Scene,
@@ -224,8 +232,8 @@ impl Finished<'_> {
             }
             window.push(sample);
         }
-        let span = span(&window);
-        (window, Some(format!("first {} s of {} s", rough(span), figure(self.outcome.last.t))))
+        let said = part_of("first", span(&window), self.outcome.last.t);
+        (window, Some(said))
     }
 
     /// `10 s to 12 s of 500 s`.
@@ -241,7 +249,7 @@ impl Finished<'_> {
         if trace.window.is_some() {
             return (trace.part.iter().collect(), Some(self.chosen_window()));
         }
-        let whole = figure(self.outcome.last.t);
+        let whole = self.outcome.last.t;
         let last = last_stretch(trace.tail.iter());
         let begin = last.first().map_or(0.0, |sample| sample.t);
         if let Some(horizon) = self.horizon(begin).0 {
@@ -249,14 +257,15 @@ impl Finished<'_> {
             let span = rough(span(&trusted));
             return (
                 trusted,
-                Some(format!("{span} s before the trust horizon, {} s of {whole} s", rough(horizon))),
+                Some(format!(
+                    "{span} s before the trust horizon, {} s of {} s",
+                    rough(horizon),
+                    figure(whole)
+                )),
             );
         }
-        let more = match begin > 0.0 {
-            true => format!("last {} s of {whole} s", rough(span(&last))),
-            false => format!("all {whole} s"),
-        };
-        (last, Some(more))
+        let shown = if begin > 0.0 { span(&last) } else { whole };
+        (last, Some(part_of("last", shown, whole)))
     }
 
     /// The last samples up to a time, of those that lie closest together there.
@@ -385,5 +394,18 @@ impl Finished<'_> {
         })
         .filter(|series| series.spread() > STILL)
         .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::part_of;
+
+    #[test]
+    fn a_part_is_not_told_as_long_as_the_whole() {
+        assert_eq!(part_of("last", 3.0, 10.0), "last 3 s of 10 s");
+        assert_eq!(part_of("first", 10.0, 10.0), "all 10 s");
+        assert_eq!(part_of("last", 29.98, 30.0), "all 30 s");
+        assert_eq!(part_of("first", 9.9, 10.0), "first 9.9 s of 10 s");
     }
 }

@@ -68,10 +68,16 @@ impl Finished<'_> {
     pub fn over_time(&self, outputs: Vec<OutputSeries>, more: Option<String>) -> OutputsChart {
         let end = outputs.iter().filter_map(|output| output.time.last()).copied().fold(0.0, f64::max);
         let (horizon, past) = self.horizon(end);
+        let begin = outputs.iter().filter_map(|output| output.time.first()).copied().fold(end, f64::min);
+        let drawn = match (more.is_some(), begin > 0.0) {
+            (true, true) => format!("from {} s to {} s", figure(begin), figure(end)),
+            (true, false) => format!("over {} s", figure(end)),
+            (false, _) => format!("over {} s", figure(self.outcome.last.t)),
+        };
         OutputsChart {
             over: None,
             quantity: None,
-            title: format!("{} over {} s", names_of(&outputs), figure(self.outcome.last.t)),
+            title: format!("{} {drawn}", names_of(&outputs)),
             caption: self.caption(more).into_iter().chain(past).collect(),
             outputs,
             horizon,
