@@ -872,3 +872,77 @@ fn the_caption_speaks_of_marks_only_where_there_are_any() {
         assert_eq!(words.contains("12.00 W at"), is_marked, "{count} motors at {value}: {words}");
     }
 }
+
+/// Sixty curves in a panel with room for a third as many labels.
+#[test]
+fn labels_of_many_curves_are_those_of_the_largest() {
+    let outputs = (0..60).map(|k| OutputSeries {
+        name: format!("curve {k}"),
+        unit: "rad".to_owned(),
+        time: times(3, 1.0),
+        value: vec![0.0, 0.1 * f64::from(k), 0.001 * f64::from(k)],
+        extremes: Vec::new(),
+    });
+    let chart =
+        OutputsChart { title: "many".to_owned(), outputs: outputs.collect(), ..OutputsChart::default() };
+    let picture = outputs_of(&chart);
+    let labels: Vec<&TextBox> = picture.texts.iter().filter(|text| text.text.starts_with("curve")).collect();
+    let told = said(&picture);
+    assert!(labels.len() > 8 && told.contains(&format!("and {} more", 60 - labels.len())), "{told:?}");
+    for k in 60 - labels.len()..60 {
+        assert!(told.contains(&format!("curve {k}")), "{k} is among the largest: {told:?}");
+    }
+    for (k, one) in picture.texts.iter().enumerate() {
+        assert!(picture.texts[..k].iter().all(|other| !one.overlaps(other)), "{:?}", one.text);
+    }
+}
+
+/// Bars with ordinary names in a panel each, and an output whose values are told from a number on.
+#[test]
+fn names_of_upright_axes_stay_at_their_panels() {
+    let time = times(200, 0.05);
+    let names = ["left_front_suspension_arm", "upper_control_link", "wheel_carrier"];
+    let series = |(k, name): (usize, &&str)| AngleSeries {
+        name: plain(name),
+        angle: time.iter().map(|t| (t + k as f64).sin()).collect(),
+    };
+    let bars = Angles {
+        title: "Angles of the bars".to_owned(),
+        time: time.clone(),
+        series: names.iter().enumerate().map(series).collect(),
+        ..Angles::default()
+    };
+    let output = |name: &str, unit: &str, from: f64| OutputSeries {
+        name: plain(name),
+        unit: unit.to_owned(),
+        time: time.clone(),
+        value: time.iter().map(|t| from + 1e-12 * t.sin()).collect(),
+        extremes: Vec::new(),
+    };
+    let long = "a_name_of_sixty_four_letters_".repeat(2);
+    let far = OutputsChart {
+        title: "Outputs".to_owned(),
+        outputs: vec![output("bearing", "N", 0.6244338578), output(&long, "m", 0.0), output("c", "W", 0.0)],
+        ..OutputsChart::default()
+    };
+    for (name, picture) in [("angles", angles(&bars, 1.0).unwrap()), ("outputs", outputs_of(&far))] {
+        let [_, from, _, to] = picture.panels[0];
+        for (k, one) in picture.texts.iter().enumerate() {
+            let [left, top, right, bottom] = one.bounds();
+            let is_upright = bottom - top > right - left;
+            assert!(
+                left >= 0.0 && top >= 0.0 && bottom <= f64::from(picture.height),
+                "{name}: {:?}",
+                one.text
+            );
+            assert!(!is_upright || bottom - top < to - from + 12.5, "{name}: {:?} is too long", one.text);
+            for other in &picture.texts[..k] {
+                assert!(!one.overlaps(other), "{name}: {:?} lies on {:?}", one.text, other.text);
+            }
+        }
+    }
+}
+
+fn outputs_of(chart: &OutputsChart) -> Picture {
+    outputs(chart, 1.0).unwrap()
+}

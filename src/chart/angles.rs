@@ -2,8 +2,9 @@
 
 use super::axis::Axis;
 use super::file::Picture;
-use super::grid::{label_room, shortened, stacked};
+use super::grid::{label_room, stacked};
 use super::lines::Point;
+use super::names::shortened_apart;
 use super::palette::marks;
 use super::sheet::Sheet;
 use super::ticks::figure;
@@ -147,23 +148,24 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
     let sheet = Sheet::new(size, px_per_pt)?;
     let under = sheet.heading(&chart.title, &caption)?;
     let shared = groups.iter().filter(|group| group.series.len() > 1);
-    let labels: Vec<String> =
-        shared.flat_map(|group| &group.series).map(|series| shortened(&sheet, &series.name)).collect();
+    let shared = shared.flat_map(|group| &group.series).map(|series| series.name.as_str());
+    let labels = shortened_apart(&sheet, shared);
     let right = label_room(&sheet, labels.iter().map(String::as_str), false);
     let names = groups.iter().flat_map(|group| &group.series).map(|series| series.name.as_str());
-    let mut marks = marks(names).into_iter();
+    let (mut marks, mut next_label) = (marks(names).into_iter(), labels.iter());
     let panels = stacked(&sheet, under, &x, ys(), right)?;
     let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
-    for (k, (panel, (group, lines))) in panels.iter().zip(groups.iter().zip(&lines)).enumerate() {
+    for (k, (panel, lines)) in panels.iter().zip(&lines).enumerate() {
         let mut ends = Vec::new();
-        for (line, (series, mark)) in lines.iter().zip(group.series.iter().zip(marks.by_ref())) {
+        for (line, mark) in lines.iter().zip(marks.by_ref()) {
             let width = if lines.len() > APART { 1.4 } else { 1.6 };
             let pieces = match chart.is_coarse {
                 true => panel.trusted_dots(line, mark.colour, chart.horizon)?,
                 false => panel.trusted(line, mark.colour, width, chart.horizon)?,
             };
-            if let (true, Some(end)) = (lines.len() > 1, pieces.last().and_then(|piece| piece.last())) {
-                ends.push((end[1], shortened(&sheet, &series.name), mark));
+            let label = if lines.len() > 1 { next_label.next() } else { None };
+            if let (Some(label), Some(end)) = (label, pieces.last().and_then(|piece| piece.last())) {
+                ends.push((end[1], label.clone(), mark));
             }
         }
         if lines.iter().flatten().all(|p| !p[1].is_finite() || !p[0].is_finite()) {

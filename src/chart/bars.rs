@@ -1,7 +1,8 @@
 //! Signed values as bars from a common zero, in groups, each with its name and figure.
 
 use super::file::Picture;
-use super::grid::{AIR, shortened};
+use super::grid::AIR;
+use super::names::shortened_apart;
 use super::palette::{BLUE, GREY, GUIDE, INK, VERMILLION};
 use super::sheet::{Pen, Sheet, note};
 use super::text::{Align, Lettering, TextLevel};
@@ -47,11 +48,14 @@ pub fn bars(chart: &Bars, px_per_pt: f64) -> Result<Picture, ChartError> {
     let size = [PAGE[0], under + AIR + chart.groups.iter().map(height).sum::<f64>().max(40.0)];
     let sheet = Sheet::new(size, px_per_pt)?;
     sheet.heading(&chart.title, &chart.caption)?;
-    let names = chart.groups.iter().flat_map(|group| &group.bars).map(|(name, _)| shortened(&sheet, name));
-    let left = 16.0 + names.map(|name| sheet.width(&name, super::sheet::NOTE, false)).fold(40.0, f64::max);
+    let of_group =
+        |group: &BarGroup| shortened_apart(&sheet, group.bars.iter().map(|(name, _)| name.as_str()));
+    let names: Vec<Vec<String>> = chart.groups.iter().map(of_group).collect();
+    let width = |name: &String| sheet.width(name, super::sheet::NOTE, false);
+    let left = 16.0 + names.iter().flatten().map(width).fold(40.0, f64::max);
     let (from, to) = (left + 10.0, PAGE[0] - 16.0);
     let mut top = under + AIR;
-    for group in &chart.groups {
+    for (group, names) in chart.groups.iter().zip(&names) {
         let unit = if group.unit.is_empty() { String::new() } else { format!(" [{}]", group.unit) };
         let name = format!("{}{unit}", group.name);
         sheet.words(
@@ -66,13 +70,9 @@ pub fn bars(chart: &Bars, px_per_pt: f64) -> Result<Picture, ChartError> {
         let at = |value: f64| from + rooms[0] + (value - least) / span * (to - from - rooms[0] - rooms[1]);
         let bottom = top + HEAD + PITCH * group.bars.len() as f64;
         sheet.line(&[[at(0.0), top + HEAD - 3.0], [at(0.0), bottom]], &Pen::new(GUIDE, 0.8))?;
-        for (k, (name, value)) in group.bars.iter().enumerate() {
+        for (k, ((_, value), name)) in group.bars.iter().zip(names).enumerate() {
             let middle = top + HEAD + PITCH * (k as f64 + 0.4);
-            sheet.words(
-                &shortened(&sheet, name),
-                note(INK, Align::Right, TextLevel::Middle),
-                [left, middle],
-            )?;
+            sheet.words(name, note(INK, Align::Right, TextLevel::Middle), [left, middle])?;
             if !value.is_finite() {
                 sheet.words("none", note(GREY, Align::Left, TextLevel::Middle), [at(0.0) + 5.0, middle])?;
                 continue;

@@ -2,7 +2,7 @@
 //! side; angles and lengths in rows of their own.
 
 use super::axis::Axis;
-use super::energy_drift::{DriftSeries, draw, drift_axis, is_zero, label};
+use super::energy_drift::{DriftSeries, draw, drift_axis, is_zero, labels};
 use super::file::Picture;
 use super::grid::{label_room, rows};
 use super::lines::{Point, running_maximum};
@@ -86,7 +86,7 @@ pub fn constraint_drift(chart: &ConstraintDrift, px_per_pt: f64) -> Result<Pictu
     });
     let words: Vec<Vec<String>> = (chart.panels.iter().zip(&all))
         .map(|(panel, lines)| {
-            panel.series.iter().zip(lines).map(|(series, line)| label(&sheet, &series.name, line)).collect()
+            labels(&sheet, panel.series.iter().map(|series| series.name.as_str()).zip(lines))
         })
         .collect();
     let right = label_room(&sheet, words.iter().flatten().map(String::as_str), true);

@@ -6,9 +6,10 @@
 
 use super::axis::{Axis, Scale};
 use super::file::Picture;
-use super::grid::{label_room, shortened, stacked};
+use super::grid::{label_room, stacked};
 use super::labels::Occupied;
 use super::lines::{Point, clip, running_maximum};
+use super::names::shortened_apart;
 use super::palette::{GREY, GUIDE, MarkStyle, marks, readable};
 use super::panel::{Panel, TURNS};
 use super::sheet::{NOTE, Pen, Sheet, note};
@@ -53,8 +54,7 @@ pub fn energy_drift(chart: &EnergyDrift, px_per_pt: f64) -> Result<Picture, Char
     let lines: Vec<Vec<Point>> =
         chart.series.iter().map(|series| running_maximum(&series.time, &series.error)).collect();
     let marks = marks(chart.series.iter().map(|series| series.method.as_str()));
-    let labels: Vec<String> =
-        chart.series.iter().zip(&lines).map(|(series, line)| label(&sheet, &series.name, line)).collect();
+    let labels = labels(&sheet, chart.series.iter().map(|series| series.name.as_str()).zip(&lines));
 
     let times = || lines.iter().flatten().map(|p| p[0]);
     let x =
@@ -103,18 +103,22 @@ pub(crate) fn is_zero(line: &[Point]) -> bool {
     !line.is_empty() && line.iter().all(|p| p[1] == 0.0)
 }
 
-/// The name, and what a logarithmic axis cannot show.
-pub(crate) fn label(sheet: &Sheet, name: &str, line: &[Point]) -> String {
-    let zero = is_zero(line);
-    let infinite = line.last().is_some_and(|p| p[1].is_infinite());
-    let remark = if zero {
-        ": exactly 0"
-    } else if infinite {
-        ": infinite"
-    } else {
-        ""
+/// The names, and what a logarithmic axis cannot show.
+pub(crate) fn labels<'a>(
+    sheet: &Sheet,
+    series: impl Iterator<Item = (&'a str, &'a Vec<Point>)>,
+) -> Vec<String> {
+    let label = |(name, line): (&str, &Vec<Point>)| {
+        let is_infinite = line.last().is_some_and(|p| p[1].is_infinite());
+        let remark = match (is_zero(line), is_infinite) {
+            (true, _) => ": exactly 0",
+            (_, true) => ": infinite",
+            _ => "",
+        };
+        format!("{name}{remark}")
     };
-    shortened(sheet, &format!("{name}{remark}"))
+    let whole: Vec<String> = series.map(label).collect();
+    shortened_apart(sheet, whole.iter().map(String::as_str))
 }
 
 /// Draws a running maximum; exact zeros become dots on the lower edge.  Returns the height of its end \[pt\],

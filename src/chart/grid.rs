@@ -24,23 +24,6 @@ pub(crate) fn label_room<'a>(sheet: &Sheet, labels: impl Iterator<Item = &'a str
     }
 }
 
-/// The words, cut in the middle to what [`label_room`] can give them at most: names that begin alike end
-/// otherwise.
-pub(crate) fn shortened(sheet: &Sheet, label: &str) -> String {
-    let room = sheet.size[0] / 3.0 - LEADER - 18.0;
-    if sheet.width(label, NOTE, false) <= room {
-        return label.to_owned();
-    }
-    let letters: Vec<char> = super::text::unmarked(label).chars().collect();
-    let cut = |kept: usize| -> String {
-        let parts = [&letters[..kept.div_ceil(2)], &letters[letters.len() - kept / 2..]];
-        let [head, tail] = parts.map(|part| super::text::plain(&part.iter().collect::<String>()));
-        format!("{head}…{tail}")
-    };
-    let fits = |kept: &usize| sheet.width(&cut(*kept), NOTE, false) <= room;
-    cut((0..letters.len()).rev().find(fits).unwrap_or(0))
-}
-
 /// Panels above each other with one time axis, frames drawn; `under` is the lowest line of the heading,
 /// `right` the room beside them.
 pub(crate) fn stacked<'a>(

@@ -45,6 +45,7 @@ mod matrix;
 mod mechanism;
 mod motion;
 mod multipliers;
+mod names;
 mod outputs;
 mod palette;
 mod panel;

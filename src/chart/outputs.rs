@@ -2,9 +2,10 @@
 
 use super::axis::Axis;
 use super::file::Picture;
-use super::grid::{label_room, shortened, stacked};
+use super::grid::{label_room, stacked};
 use super::labels::Occupied;
 use super::lines::Point;
+use super::names::shortened_apart;
 use super::palette::{MarkStyle, WHITE, marks, readable};
 use super::panel::Panel;
 use super::sheet::Sheet;
@@ -64,6 +65,9 @@ pub struct OutputsChart {
 /// An output and what is drawn of it.
 type Line<'a> = (&'a OutputSeries, Vec<Point>);
 
+/// Height of the end of a line \[pt\], words, mark.
+type End = (f64, String, MarkStyle);
+
 /// Height of the page beyond its panels, and of each of these \[pt\].
 const HEIGHTS: [f64; 2] = [80.0, 110.0];
 /// Panels at most: outputs of further units are left to the table.
@@ -101,11 +105,11 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
     let size = [PAGE[0], HEIGHTS[0] + HEIGHTS[1] * rows.len().max(2) as f64];
     let sheet = Sheet::new(size, px_per_pt)?;
     let marks = marks(chart.outputs.iter().map(|output| output.name.as_str()));
-    let mark = |output: &OutputSeries| {
-        let number = chart.outputs.iter().position(|other| std::ptr::eq(other, output));
-        marks[number.unwrap_or_default()]
+    let number = |output: &OutputSeries| {
+        chart.outputs.iter().position(|other| std::ptr::eq(other, output)).unwrap_or_default()
     };
-    let labels: Vec<String> = chart.outputs.iter().map(|output| shortened(&sheet, &output.name)).collect();
+    let mark = |output: &OutputSeries| marks[number(output)];
+    let labels = shortened_apart(&sheet, chart.outputs.iter().map(|output| output.name.as_str()));
     let [over, over_unit] = chart.over.clone().unwrap_or_else(|| ["time".to_owned(), "s".to_owned()]);
     let x = Axis::tight(
         &format!("{over} [{over_unit}]"),
@@ -113,7 +117,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
     );
     let y = |(unit, lines): &(&str, Vec<Line>)| {
         let name = match &lines[..] {
-            [(output, _)] => format!("{} [{unit}]", shortened(&sheet, &output.name)),
+            [(output, _)] => format!("{} [{unit}]", output.name),
             several => {
                 let names: Vec<&str> = several.iter().map(|(output, _)| output.name.as_str()).collect();
                 named(chart.quantity.as_deref().unwrap_or_else(|| quantity(unit, &names)), unit)
@@ -146,7 +150,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
             let pieces = panel.trusted(line, mark(output).colour, 1.6, chart.horizon)?;
             pieces.iter().for_each(|piece| occupied.line(piece));
             if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
-                ends.push((end[1], shortened(&sheet, &output.name), mark(output)));
+                ends.push((largest_of(line), (end[1], labels[number(output)].clone(), mark(output))));
             }
         }
         extremes(&sheet, panel, (lines, unit, &over_unit), &mark, &mut occupied)?;
@@ -155,7 +159,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
             panel.empty("no data")?;
         }
         if lines.len() > 1 {
-            panel.end_labels(&ends, false)?;
+            panel.end_labels(&named_first(ends, panel), false)?;
         }
     }
     Ok(sheet.picture(&chart.title, &caption))
@@ -195,6 +199,19 @@ fn extremes(
         panel.note_beside(panel.at([t, value]), &note, readable(mark(output).colour), occupied)?;
     }
     Ok(())
+}
+
+/// What [`Panel::end_labels`] takes, the largest first where not all have a label.
+fn named_first(mut ends: Vec<(f64, End)>, panel: &Panel) -> Vec<End> {
+    if ends.len() > panel.labels_that_fit() {
+        ends.sort_by(|a, b| b.0.total_cmp(&a.0));
+    }
+    ends.into_iter().map(|(_, end)| end).collect()
+}
+
+/// The largest magnitude of a line.
+fn largest_of(line: &[Point]) -> f64 {
+    line.iter().map(|p| p[1].abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
 }
 
 /// The ends of settled values with a fifth of their range of air, in which is seen how they settle.

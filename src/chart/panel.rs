@@ -4,6 +4,7 @@ use super::ChartError;
 use super::axis::Axis;
 use super::labels::{Occupied, spread};
 use super::lines::{Point, clip, envelope, is_dense, turns};
+use super::names::axis_lines;
 use super::palette::{Colour, GREY, GRID, GUIDE, INK, MarkStyle, SPINE, WHITE, mix, readable};
 use super::sheet::{NAME, NOTE, Pen, Sheet, TICK, note, units};
 use super::text::{Align, Lettering, TextLevel};
@@ -19,6 +20,13 @@ const GAP: f64 = 3.5;
 /// From the panel's right edge to the words of an end label \[pt\].
 pub(crate) const LEADER: f64 = 11.5;
 
+/// How much longer than its panel the name of an upright axis may be, and between its lines \[pt\].
+const OVER: f64 = 12.0;
+const LINE: f64 = 11.5;
+
+/// Between two labels at the ends of lines, at least \[pt\].
+const LEAST: f64 = 9.5;
+
 /// Rings of places tried for a label beside a point, and the distance from which on a line leads to it
 /// \[pt\].
 const RINGS: u32 = 10;
@@ -31,7 +39,7 @@ pub(crate) const TURNS: [&[f64]; 4] = [&[], &[6.0, 3.2], &[2.0, 3.0], &[7.0, 3.0
 #[derive(Clone, Copy)]
 pub(crate) struct WrittenParts {
     pub x: bool,
-    /// Middle of the name of the y axis \[pt\].
+    /// Middle of the name of the y axis, of its last line \[pt\].
     pub y_name_at: f64,
 }
 
@@ -74,7 +82,9 @@ fn most_along(sheet: &Sheet, axis: &Axis, width: f64) -> usize {
 
 /// Room left of a panel for the labels and the name of its y axis \[pt\].
 pub(crate) fn left_room(sheet: &Sheet, axis: &Axis, height: f64) -> f64 {
-    widest(sheet, &axis.ticks(most_up(height))) + MAJOR + GAP + 8.0 + NAME
+    let ticks = axis.ticks(most_up(height));
+    let lines = axis_lines(sheet, &ticks, &axis.name, height + OVER).len();
+    widest(sheet, &ticks) + MAJOR + GAP + 8.0 + NAME + (lines - 1) as f64 * LINE
 }
 
 fn widest(sheet: &Sheet, ticks: &Ticks) -> f64 {
@@ -191,7 +201,12 @@ impl<'a> Panel<'a> {
             self.sheet.words(&x_ticks.name(&self.x.name), name, [0.5 * (left + right), bottom + 22.0])?;
         }
         let upright = Lettering { angle: FRAC_PI_2, ..name.at(Align::Centre, TextLevel::Middle) };
-        self.sheet.words(&y_ticks.name(&self.y.name), upright, [written.y_name_at, 0.5 * (top + bottom)])
+        let lines = axis_lines(self.sheet, &y_ticks, &self.y.name, bottom - top + OVER);
+        // The last line stands nearest to the axis.
+        for (k, line) in lines.iter().rev().enumerate() {
+            self.sheet.words(line, upright, [written.y_name_at - k as f64 * LINE, 0.5 * (top + bottom)])?;
+        }
+        Ok(())
     }
 
     /// Grid lines at the labelled ticks, by the mesh of plotters.
@@ -329,14 +344,29 @@ impl<'a> Panel<'a> {
         self.sheet.words(words, note(GREY, Align::Centre, TextLevel::Middle), self.page([0.5, 0.5]))
     }
 
-    /// Labels right of the panel at the ends of lines: height of the end \[pt\], words, mark.
+    /// How many labels at the ends of lines can be told apart.
+    pub(crate) fn labels_that_fit(&self) -> usize {
+        1 + ((self.bounds[3] - self.bounds[1] - 4.0).max(0.0) / LEAST) as usize
+    }
+
+    /// Labels right of the panel at the ends of lines: height of the end \[pt\], words, mark.  Of more than
+    /// fit the first have one, and a last line says how many more there are.
     pub(crate) fn end_labels(
         &self,
         ends: &[(f64, String, MarkStyle)],
         markers: bool,
     ) -> Result<(), ChartError> {
+        let most = self.labels_that_fit();
+        let (top, mut bottom) = (self.bounds[1] + 2.0, self.bounds[3] - 2.0);
+        let (ends, more) = ends.split_at(if ends.len() > most { most - 1 } else { ends.len() });
+        if !more.is_empty() {
+            let words = format!("and {} more", more.len());
+            let lettering = note(GREY, Align::Left, TextLevel::Middle);
+            self.sheet.words(&words, lettering, [self.bounds[2] + LEADER, bottom])?;
+            bottom -= LEAST;
+        }
         let wanted: Vec<f64> = ends.iter().map(|end| end.0).collect();
-        let places = spread(&wanted, 12.0, self.bounds[1] + 2.0, self.bounds[3] - 2.0);
+        let places = spread(&wanted, 12.0, top, bottom);
         let right = self.bounds[2];
         for ((at, words, mark), place) in ends.iter().zip(places) {
             // A label hardly moved gets a straight leader.

@@ -26,20 +26,23 @@ pub(crate) struct Ticks {
 impl Ticks {
     /// The axis name with factor and offset.
     pub(crate) fn name(&self, name: &str) -> String {
+        let parts = self.parts(name);
+        parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
+    }
+
+    /// Quantity, offset, and factor and unit in brackets, of an axis name; empty where it has none.
+    pub(crate) fn parts(&self, name: &str) -> [String; 3] {
         let (quantity, unit) = match name.rsplit_once(" [") {
-            Some((quantity, unit)) => (quantity.to_owned(), unit.trim_end_matches(']').to_owned()),
-            None => (name.to_owned(), String::new()),
+            Some((quantity, unit)) => (quantity, unit.trim_end_matches(']')),
+            None => (name, ""),
         };
-        let quantity = match &self.offset {
-            Some(offset) => format!("{quantity} {offset}"),
-            None => quantity,
+        let unit = match (&self.factor, unit.is_empty()) {
+            (Some(factor), true) => format!("[{factor}]"),
+            (Some(factor), false) => format!("[{factor} {unit}]"),
+            (None, true) => String::new(),
+            (None, false) => format!("[{unit}]"),
         };
-        match (&self.factor, unit.is_empty()) {
-            (Some(factor), true) => format!("{quantity} [{factor}]"),
-            (Some(factor), false) => format!("{quantity} [{factor} {unit}]"),
-            (None, true) => quantity,
-            (None, false) => format!("{quantity} [{unit}]"),
-        }
+        [quantity.to_owned(), self.offset.clone().unwrap_or_default(), unit]
     }
 }
 

@@ -3,9 +3,10 @@
 
 use super::axis::Axis;
 use super::file::Picture;
-use super::grid::{label_room, shortened, stacked};
+use super::grid::{label_room, stacked};
 use super::labels::Occupied;
 use super::lines::Point;
+use super::names::shortened_apart;
 use super::palette::{BLUE, Colour, MarkStyle, MarkerShape, SPINE, VERMILLION, marks, readable};
 use super::panel::Panel;
 use super::sheet::{Pen, Sheet};
@@ -87,7 +88,7 @@ pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Re
     let sheet = Sheet::new(size, px_per_pt)?;
     let marks = marks(chart.motors.iter().map(|motor| motor.name.as_str()));
     let several = chart.motors.len() > 1;
-    let labels: Vec<String> = chart.motors.iter().map(|motor| shortened(&sheet, &motor.name)).collect();
+    let labels = shortened_apart(&sheet, chart.motors.iter().map(|motor| motor.name.as_str()));
 
     let powers = rows.iter().flat_map(|row| &row.0);
     let x = Axis::tight("time [s]", powers.flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));

@@ -6,9 +6,10 @@
 
 use super::axis::{Axis, Scale};
 use super::file::Picture;
-use super::grid::{shortened, stacked};
+use super::grid::stacked;
 use super::labels::{Occupied, place};
 use super::lines::{Point, clip};
+use super::names::shortened_apart;
 use super::palette::{Colour, GREY, INK, MarkStyle, ORANGE, WHITE, marks, mix, readable};
 use super::panel::{Panel, TURNS};
 use super::sheet::{NOTE, Pen, Sheet, note};
@@ -148,14 +149,13 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
         let pen = Pen::new(mark.colour, if is_best[k] { LINE } else { OTHER });
         curve(&sheet, panel, &points[k].iter().map(at).collect::<Vec<_>>(), &mark, pen, &mut occupied)?;
     }
+    let labels = labels(&sheet, chart.series.iter().zip(&points));
     for &k in order.iter().rev() {
-        let zero = if points[k].iter().all(|p| p[1] == 0.0) { ": exactly 0" } else { "" };
-        let label = shortened(&sheet, &format!("{}{zero}", chart.series[k].name));
         along(
             &sheet,
             panel,
             &points[k].iter().map(at).collect::<Vec<_>>(),
-            &label,
+            &labels[k],
             readable(marks[k].colour),
             &mut occupied,
         )?;
@@ -172,6 +172,16 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
         panel.empty("no data")?;
     }
     Ok(sheet.picture(&chart.title, &chart.caption))
+}
+
+/// The names, and what a logarithmic axis cannot show.
+fn labels<'a>(sheet: &Sheet, series: impl Iterator<Item = (&'a WorkSeries, &'a Vec<Point>)>) -> Vec<String> {
+    let label = |(series, points): (&WorkSeries, &Vec<Point>)| {
+        let zero = if points.iter().all(|p| p[1] == 0.0) { ": exactly 0" } else { "" };
+        format!("{}{zero}", series.name)
+    };
+    let whole: Vec<String> = series.map(label).collect();
+    shortened_apart(sheet, whole.iter().map(String::as_str))
 }
 
 /// A logarithmic axis with air on both sides, ending at 1, 2 or 5 times a power of ten.
