@@ -407,7 +407,7 @@ fn charts_come_in_the_formats_and_of_the_columns_and_window_asked_for() {
         ("--chart-format bmp", vec!["bmp", "svg"]),
         ("--window 2..1", vec!["FROM..TO"]),
         ("--window 600..700", vec!["0 rows", "the run ends at 500 s"]),
-        ("--window 1.001..1.002", vec!["rows of the trajectory", "--every 1.00e-5"]),
+        ("--window 1.001..1.002", vec!["rows of the trajectory", "--every 1e-5"]),
     ] {
         program.run(&format!("run motor.json {flags} --out f")).exits(2).says(&words);
     }
@@ -581,4 +581,29 @@ fn no_study_overwrites_results_unasked() {
         program.run(&format!("{changed} --no-charts -q --force")).exits(0);
     }
     program.run("kinematics crank_rocker.json --rate 0").exits(2).says(&["--rate", "other than 0"]);
+}
+
+/// Estimates in notes have no exponent where they are of everyday size, and no zeros that say nothing.
+#[test]
+fn numbers_in_messages_are_of_everyday_form() {
+    let program = Program::with_scenes(&["kepler", "kite"]);
+    let noted = program.run("check kepler.json --until 30").exits(0);
+    let words = noted.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    let swing = "oscillates at 1.7 rad/s, 8.3 periods until t = 30 s, about 20 steps; energy in it 0 of";
+    assert!(words.contains(swing), "{words}");
+    assert!(!words.contains("e0 ") && !words.contains("e1 "), "{words}");
+    let short = program.run("check kepler.json --until 1e-6 --every 1e-8").exits(0);
+    assert!(short.stdout.contains("1e-6 s, a row every 1e-8 s"), "{}", short.stdout);
+    program.run("check kepler.json --rtol 0").exits(2).says(&["0 is not within 1e-19 to 0.1"]);
+    program.run("check kepler.json --step 0").exits(2).says(&["0 is not a number of seconds"]);
+    let limited = program.run("check kepler.json --until 30 --max-evaluations 5").exits(0);
+    let words = limited.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(words.contains("30 s take taylor about ") && words.contains("and 5 evaluations are"), "{words}");
+    assert!(!words.contains("up to"), "{words}");
+    let damped = "run kite.json --method dp8 --stabilize baumgarte --until 0.1 --no-charts --json";
+    let notes = program.run(damped).exits(0).object()["notes"].to_string();
+    let constant = notes.split("time constant is ").nth(1).and_then(|rest| rest.split(' ').next());
+    let constant = constant.unwrap_or_else(|| panic!("{notes}"));
+    assert!(constant.parse().is_ok_and(|number: f64| number > 0.0), "{notes}");
+    assert!(!constant.contains("e-3") && !constant.contains("0e"), "{notes}");
 }

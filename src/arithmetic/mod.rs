@@ -30,6 +30,7 @@ pub mod lanes;
 #[doc(hidden)]
 pub mod pairs;
 pub(crate) mod scratch;
+pub(crate) mod shown;
 #[doc(hidden)]
 pub mod sincos;
 #[doc(hidden)]

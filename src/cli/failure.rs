@@ -2,6 +2,7 @@
 //! stdout.
 
 use super::output::print_object;
+use crate::arithmetic::shown::about;
 use crate::dynamics::CompileError;
 use crate::dynamics::assembly::StartChange;
 use crate::run::files::quoted;
@@ -147,7 +148,7 @@ impl From<StepError> for Failure {
             _ => Exit::Stopped,
         };
         let StepError { method, t, step, what, hint, .. } = &error;
-        let step = if *step > 0.0 { format!(" (step {step:.3e} s)") } else { String::new() };
+        let step = if *step > 0.0 { format!(" (step {} s)", about(*step)) } else { String::new() };
         let message = format!("{method} stopped at t = {t} s{step}: {what}\nhint: {hint}");
         Self { details: json!(error), ..Self::new(exit, message) }
     }

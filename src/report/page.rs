@@ -1,5 +1,7 @@
 //! A page of text for people: labelled entries and small tables, 80 columns wide.
 
+pub(crate) use crate::arithmetic::shown::{figure, magnitude, rough};
+
 /// Columns of a page.
 const WIDTH: usize = 80;
 /// Columns of the labels.
@@ -94,44 +96,9 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-/// A number to six digits, plain where it is of everyday size.
-pub fn figure(x: f64) -> String {
-    digits(x, 6)
-}
-
-/// A number to three digits, for what need not be exact.
-pub fn rough(x: f64) -> String {
-    digits(x, 3)
-}
-
-fn digits(x: f64, digits: i32) -> String {
-    let size = x.abs();
-    if x == 0.0 {
-        return "0".into();
-    }
-    if !x.is_finite() {
-        return not_finite(x).into();
-    }
-    if !(1e-4..1e6).contains(&size) {
-        return format!("{x:.0$e}", digits as usize - 1);
-    }
-    let decimals = (digits - 1 - size.log10().floor() as i32).clamp(0, 9) as usize;
-    let plain = format!("{x:.decimals$}");
-    if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.').to_owned() } else { plain }
-}
-
 /// So many of something: `1 point`, `4096 points`.
 pub fn counted(count: u64, one: &str, many: &str) -> String {
     if count == 1 { format!("1 {one}") } else { format!("{count} {many}") }
-}
-
-/// A size that matters by its magnitude only: `2.1e-13`.
-pub fn magnitude(x: f64) -> String {
-    match x {
-        0.0 => "0".into(),
-        x if x.is_finite() => format!("{x:.1e}"),
-        _ => not_finite(x).into(),
-    }
 }
 
 /// A number and its uncertainty with the same decimals, as far as two digits of the uncertainty reach:
@@ -147,38 +114,9 @@ pub fn with_uncertainty(x: f64, uncertainty: f64) -> [String; 2] {
     [format!("{x:.decimals$}"), format!("{uncertainty:.decimals$}")]
 }
 
-fn not_finite(x: f64) -> &'static str {
-    match x {
-        f64::INFINITY => "infinite",
-        f64::NEG_INFINITY => "-infinite",
-        _ => "not a number",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_short_and_keep_their_size() {
-        for (x, shown) in [
-            (0.0, "0"),
-            (-20.990_323, "-20.9903"),
-            (100.0, "100"),
-            (0.005, "0.005"),
-            (1.234_567_8e-5, "1.23457e-5"),
-            (123_456.7, "123457"),
-            (1e6, "1.00000e6"),
-            (f64::NAN, "not a number"),
-            (f64::INFINITY, "infinite"),
-        ] {
-            assert_eq!(figure(x), shown);
-        }
-        assert_eq!(
-            (magnitude(2.14e-13), rough(10.4609), rough(10_000.0)),
-            ("2.1e-13".into(), "10.5".into(), "10000".into())
-        );
-    }
 
     #[test]
     fn a_number_has_the_decimals_of_its_uncertainty() {

@@ -146,7 +146,7 @@ pub fn matrix(plan: &Stress, lines: &[StressLine]) -> Result<Picture, ChartError
 /// `3e-9`, or 0.
 #[cfg(feature = "charts")]
 fn short(error: f64) -> String {
-    if error == 0.0 { "0".into() } else { format!("{error:.0e}") }
+    crate::arithmetic::shown::order(error)
 }
 
 /// The chart of steps and stiffnesses.

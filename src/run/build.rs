@@ -6,6 +6,7 @@ use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
 use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::shown::about;
 use crate::dynamics::canonical::Canonical;
 use crate::dynamics::elimination::Elimination;
 use crate::dynamics::looped::Looped;
@@ -96,7 +97,7 @@ fn built(mechanism: &Arc<Mechanism>, plan: &mut Plan, start: &Motion) -> Result<
     if plan.stabilization == Stabilization::Baumgarte && plan.time_constant.is_none() {
         let found = pilot(mechanism, plan, start)?;
         plan.notes
-            .push(format!("Baumgarte's time constant is {found:.3e} s, five mean steps of a pilot run"));
+            .push(format!("Baumgarte's time constant is {} s, five mean steps of a pilot run", about(found)));
         plan.time_constant = Some(found);
     }
     // A saved plan may ask for it where there is nothing to be projected, and no energy kept of it.

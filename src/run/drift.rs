@@ -7,9 +7,9 @@
 use super::allowance::{Allowance, AllowanceMoment, EnergyLimit};
 use super::plan::Plan;
 use super::sample::Sample;
+use crate::arithmetic::shown::{about, estimate};
 use crate::arithmetic::sum::larger;
 use crate::dynamics::Mechanism;
-use crate::scene::about;
 
 /// Intervals the horizon is divided into.
 const INTERVALS: usize = 64;
@@ -148,7 +148,7 @@ impl Limits {
         if beyond(off, limit) {
             let explained =
                 if self.energy.is_none() && limit < ENERGY_MOST { " of errors at the tolerance" } else { "" };
-            let limit = if explained.is_empty() { format!("{limit:e}") } else { format!("{limit:.1e}") };
+            let limit = if explained.is_empty() { format!("{limit:e}") } else { estimate(limit) };
             return Err(format!(
                 "{kind} is off by {} of the scale, the limit{explained} is {limit}",
                 about(off)

@@ -6,6 +6,7 @@
 
 use super::methods::MethodId;
 use super::plan::{Request, RequestRefusal};
+use crate::arithmetic::shown::{estimate, order, plain, steps};
 use crate::dynamics::Stiffness;
 
 /// How much faster than all else a mode must be to be worth a note.
@@ -78,14 +79,15 @@ impl FastMode {
         if is_asked_for || !self.swings() || self.rate * until <= MOST_RADIANS {
             return Ok(());
         }
-        let (rate, periods) = (self.rate, self.periods);
         Err(RequestRefusal {
             is_usage: false,
             what: format!("{} over {until} s", self.name()),
             reason: format!(
-                "it oscillates at {rate:.1e} rad/s, {periods:.1e} periods until t = {until} s, \
-                about {:.1e} steps",
-                self.steps
+                "it oscillates at {} rad/s, {} periods until t = {} s, about {}",
+                estimate(self.rate),
+                estimate(self.periods),
+                plain(until),
+                steps(self.steps)
             ),
             alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --max-evaluations with \
                 the evaluations that may take"
@@ -98,30 +100,32 @@ impl FastMode {
         if !self.is_stiff() {
             return None;
         }
-        let (name, rate, share) = (self.name(), self.rate, self.energy_share);
+        let (name, rate, share) = (self.name(), estimate(self.rate), self.energy_share);
         if !self.swings() {
             let cost = if self.steps > 0.0 {
-                format!("; {method} follows it in about {:.1e} steps", self.steps)
+                format!("; {method} follows it in about {}", steps(self.steps))
             } else {
                 String::new()
             };
             return Some(format!(
-                "{name} is stiff, {rate:.1e} rad/s, and dies away at {:.1e} /s{cost}",
-                self.decay
+                "{name} is stiff, {rate} rad/s, and dies away at {} /s{cost}",
+                estimate(self.decay)
             ));
         }
         let swing = format!(
-            "{name} oscillates at {rate:.1e} rad/s, {:.1e} periods until t = {until} s",
-            self.periods
+            "{name} oscillates at {rate} rad/s, {} periods until t = {} s",
+            estimate(self.periods),
+            plain(until)
         );
         Some(match method {
             MethodId::Radau(_) if share > EXCITED => {
                 format!(
-                    "{swing}; {method} takes its energy away, {share:.0e} of the scale, wherever its steps \
-                        are longer than a period"
+                    "{swing}; {method} takes its energy away, {} of the scale, wherever its steps are \
+                        longer than a period",
+                    order(share)
                 )
             }
-            _ => format!("{swing}, about {:.1e} steps; energy in it {share:.0e} of the scale", self.steps),
+            _ => format!("{swing}, about {}; energy in it {} of the scale", steps(self.steps), order(share)),
         })
     }
 }

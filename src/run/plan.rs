@@ -17,6 +17,7 @@ use super::custom::Custom;
 use super::fast::{self, FastMode};
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
+use crate::arithmetic::shown::{self, count, figure, order, plain};
 use crate::dynamics::{Mechanism, Stiffness, Time};
 use crate::scene::Scene;
 use crate::stepping::{Taylor, Tolerance};
@@ -175,7 +176,7 @@ impl Plan {
         if rows > MAX_ROWS {
             return Err(usage(
                 "--every",
-                format!("{rows:.1e} rows would be written; at most {MAX_ROWS:.0e}"),
+                format!("{} rows would be written; at most {MAX_ROWS:e}", count(rows)),
                 "a longer output interval",
             ));
         }
@@ -183,7 +184,8 @@ impl Plan {
         if request.every.is_none() && numbers > MOST_NUMBERS {
             let what = format!("an output interval of {every} s up to {until} s");
             let reason = format!(
-                "the trajectory would hold {numbers:.1e} numbers, about {:.0} GB",
+                "the trajectory would hold {} numbers, about {:.0} GB",
+                count(numbers),
                 (numbers * 2e-8).ceil()
             );
             return Err(mismatch(
@@ -337,9 +339,12 @@ fn cut_short(
     let reached = max_evaluations as f64 / (steps * fast::evaluations_a_step(method)) * until;
     (reached < until).then(|| {
         format!(
-            "{until} s take {method} up to {steps:.0e} steps, and {max_evaluations:.0e} evaluations are \
-                allowed: it may stop from about {reached:.0e} s on; \
-             {MORE_IS_ALLOWED}"
+            "{} s take {method} about {}, and {} evaluations are allowed: it may stop at about \
+                {} s; {MORE_IS_ALLOWED}",
+            plain(until),
+            shown::steps(steps),
+            figure(max_evaluations as f64),
+            order(reached)
         )
     })
 }
@@ -365,11 +370,9 @@ fn check_numbers(request: &Request) -> Result<(), RequestRefusal> {
     ];
     for (option, value, most) in positive {
         if let Some(value) = value.filter(|&value| !(value > 0.0 && value <= most)) {
-            let is_short = value == 0.0 || (1e-6..1e16).contains(&value.abs());
-            let value = if is_short { value.to_string() } else { format!("{value:e}") };
             return Err(usage(
                 option,
-                format!("{value} is not a number of seconds above 0 and up to {most:e}"),
+                format!("{} is not a number of seconds above 0 and up to {most:e}", plain(value)),
                 "give a positive number of seconds",
             ));
         }
@@ -419,10 +422,9 @@ fn check_tolerances(request: &Request, method: MethodId, extended: bool) -> Resu
     for (option, value) in [("--rtol", request.rtol), ("--atol", request.atol)] {
         if let Some(value) = value.filter(|&value| !(least..=0.1).contains(&value)) {
             let by = if extended { format!("{method} --extended") } else { method.to_string() };
-            let shown = if value.abs() < 1e-3 { format!("{value:e}") } else { value.to_string() };
             return Err(usage(
                 option,
-                format!("{shown} is not within {least:e} to 0.1, what {by} takes"),
+                format!("{} is not within {least:e} to 0.1, what {by} takes", plain(value)),
                 "1e-9 is a good beginning",
             ));
         }

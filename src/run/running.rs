@@ -23,6 +23,7 @@ use super::plan::{Plan, Request};
 use super::sample::Sample;
 use super::trust::ErrorEstimator;
 use super::turns::Turns;
+use crate::arithmetic::shown::estimate;
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
 use crate::stepping::{Statistics, StepError};
@@ -379,8 +380,9 @@ impl Running {
             let how = if self.outcome.plan.step.is_some() { "a shorter step" } else { "a tighter tolerance" };
             let off = self.outcome.drift.energy_share;
             self.outcome.plan.notes.push(format!(
-                "the energy balance is off by {off:.1e} of its scale, and the motion may be \
-                    off by more: try {how}"
+                "the energy balance is off by {} of its scale, and the motion may be off by more: try \
+                    {how}",
+                estimate(off)
             ));
         }
         self.outcome.trust = self.error_estimator.take().map(|error_estimator| {

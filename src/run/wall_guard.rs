@@ -7,8 +7,8 @@
 
 use super::contact::tighter;
 use super::impact_monitor::{gap, gap_rate};
+use crate::arithmetic::shown::about;
 use crate::dynamics::{BodyAngles, Mechanism};
-use crate::scene::about;
 use crate::stepping::search::golden_sections;
 use crate::stepping::{Cause, StepError};
 

@@ -31,7 +31,6 @@ mod write;
 pub use build::{SceneBuilder, ground, on};
 pub use digits::WrittenNumber;
 pub use error::{Refusal, SceneError};
-pub(crate) use format::about;
 pub use friction::{Friction, FrictionPlace};
 pub use law::{Direction, Integral, Load, LoadLaw, NamedPoint, Parameter, PointTable, SceneEvent, Signal};
 pub use names::{Bound, Meaning, Names, Scope};

@@ -47,6 +47,7 @@ mod sums;
 mod tableau;
 
 use super::{Cause, Integrator, Statistics, StepError};
+use crate::arithmetic::shown::{estimate, order};
 use crate::dynamics::{OdeSystem, State, Time};
 use lanes::GaussScratch;
 use newton::Newton;
@@ -251,11 +252,11 @@ impl Gauss {
             t: state.time.hi,
             step: self.scratch.step,
             what: format!(
-                "{whose} oscillates at {:.2e} rad/s, {radians:.1} rad a step, with {:.0e} of the energy \
-                    scale",
-                found.fastest, found.share
+                "{whose} oscillates at {} rad/s, {radians:.1} rad a step, with {} of the energy scale",
+                estimate(found.fastest),
+                order(found.share)
             ),
-            hint: format!("a step of {:.1e} s follows it", 1.0 / found.fastest),
+            hint: format!("a step of {} s follows it", estimate(1.0 / found.fastest)),
         })
     }
 

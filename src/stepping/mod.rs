@@ -35,6 +35,7 @@ pub use radau::Radau;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
+use crate::arithmetic::shown::about;
 use crate::dynamics::{MotionPowers, OdeSystem, State, Time};
 
 /// Counts of one run, and the effort it is allowed.
@@ -351,7 +352,7 @@ impl Cause {
 
 /// A typed stop.
 #[derive(Clone, Debug, PartialEq, thiserror::Error, serde::Serialize, serde::Deserialize)]
-#[error("{method} stopped at t = {t} s (step {step:.3e} s): {what}; {hint}")]
+#[error("{method} stopped at t = {t} s (step {} s): {what}; {hint}", about(*step))]
 pub struct StepError {
     /// Why.
     pub cause: Cause,

@@ -33,6 +33,7 @@ use self::substep::{SubstepFailure, SubstepScratch};
 use super::composition::Composition;
 use super::{Cause, Integrator, Statistics, StepError};
 use crate::arithmetic::Scalar;
+use crate::arithmetic::shown::estimate;
 use crate::dynamics::natural::Natural;
 use crate::dynamics::{State, Time};
 
@@ -249,7 +250,7 @@ impl Rattle {
         };
         let hint = match cause {
             Cause::NotFinite => "check springs that can shrink to length zero".into(),
-            _ => format!("try a step of {:.1e} s", 0.25 * self.step),
+            _ => format!("try a step of {} s", estimate(0.25 * self.step)),
         };
         StepError { cause, method: self.name().into(), t, step: self.step, what, hint }
     }

@@ -1,8 +1,8 @@
 //! Why a scene has no equations.
 
 use super::DENSE_LIMIT;
+use crate::arithmetic::shown::about;
 use crate::dynamics::assembly::Closest;
-use crate::scene::about;
 
 /// Why a scene has no equations.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -52,8 +52,8 @@ pub enum CompileError {
         unit: &'static str,
     },
     /// Coordinates, or rates, that neither the rows nor the scene give: as many as have to be added.
-    #[error("the start leaves {} open: no constraint gives {}\nhint: add {} to the scene", quoted(.0),
-        them(.0), them(.0))]
+    #[error("the start leaves {} open: no constraint gives {}\nhint: add {} to the scene{}", quoted(.0),
+        them(.0), them(.0), or_a_hinge(.0))]
     Undetermined(Vec<String>),
     /// More than one start fits what is given.
     #[error(
@@ -166,6 +166,12 @@ pub(in crate::dynamics) fn quoted(names: &[String]) -> String {
         Some((last, before)) if !before.is_empty() => format!("{} and {last}", before.join(", ")),
         _ => all.join(""),
     }
+}
+
+/// What else may give a place.
+fn or_a_hinge(names: &[String]) -> &'static str {
+    let is_place = |name: &String| name.ends_with(".origin");
+    if names.iter().any(is_place) { ", or the hinge, weld or slider that holds the bar" } else { "" }
 }
 
 fn them(names: &[String]) -> &'static str {

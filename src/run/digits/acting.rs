@@ -15,11 +15,11 @@ use super::posture::DigitsCoordinates;
 use super::resting::{self, Unheld};
 use super::wall;
 use crate::arithmetic::digits::Digits;
+use crate::arithmetic::shown::about;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::CompileError;
 use crate::dynamics::compile::exact::{Acting, ExactMechanism};
 use crate::dynamics::series::Series;
-use crate::scene::about;
 use crate::stepping::{Cause, StepError};
 
 /// Part of the digits in which the laws of motors agree on both sides of a corner.

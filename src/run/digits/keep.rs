@@ -9,13 +9,13 @@
 use super::precision::Precision;
 use super::wall::travel_rate;
 use crate::arithmetic::digits::Digits;
+use crate::arithmetic::shown::about;
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::ExactMechanism;
 use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::dot;
 use crate::dynamics::{schur, tree};
-use crate::scene::about;
 use crate::stepping::{Cause, StepError};
 
 /// Newton iterations at most.

@@ -1,9 +1,10 @@
 //! What moves a mechanism: one of its motors, or a coordinate that gets one.
 
 use crate::arithmetic::Complex;
+use crate::arithmetic::shown::about;
 use crate::dynamics::compile::CompileError;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::scene::{self, Law, Motor, Scene, about};
+use crate::scene::{self, Law, Motor, Scene};
 use std::f64::consts::TAU;
 use std::str::FromStr;
 use std::sync::Arc;

@@ -1,6 +1,7 @@
 //! Which methods go with which scenes and stabilizations, and why the others do not.
 
 use super::{MANY_COORDINATES, Request, RequestRefusal, mismatch};
+use crate::arithmetic::shown::{about, estimate};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::DENSE_LIMIT;
 use crate::dynamics::force::Vibration;
@@ -193,8 +194,9 @@ pub(super) fn check_vibration(
     }
     if *frequency < SEPARATE * rate {
         let reason = format!(
-            "it vibrates at {frequency:.3e} rad/s, not {SEPARATE} times as fast as all else, up to \
-                {rate:.3e} rad/s"
+            "it vibrates at {} rad/s, not {SEPARATE} times as fast as all else, up to {} rad/s",
+            about(*frequency),
+            about(rate)
         );
         return Err(mismatch(
             format!("the rigid spring `{name}`"),
@@ -204,8 +206,11 @@ pub(super) fn check_vibration(
     }
     let share = energy / mechanism.energy_scale;
     notes.push(format!(
-        "rigid spring {name}: {energy:.3e} J of vibration ({share:.1e} of the scale) at {frequency:.3e} \
-            rad/s act on average; its force is a mean"
+        "rigid spring {name}: {} J of vibration ({} of the scale) at {} rad/s act on average; its force \
+            is a mean",
+        about(*energy),
+        estimate(share),
+        about(*frequency)
     ));
     Ok(())
 }

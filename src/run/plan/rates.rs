@@ -1,6 +1,7 @@
 //! Steps of fixed-step methods, and how fast a scene moves at most.
 
 use super::{Request, RequestRefusal, is_whole, usage};
+use crate::arithmetic::shown::order;
 use crate::dynamics::Mechanism;
 use crate::dynamics::kernel::Kernel;
 use crate::run::methods::MethodId;
@@ -109,8 +110,9 @@ pub(super) fn model_error(mechanism: &Mechanism, rate: f64, notes: &mut Vec<Stri
     let share = rate / mechanism.rigid_rate?;
     let error = if mechanism.vibration.is_some() { 2.0 * share } else { share * share };
     notes.push(format!(
-        "rigid springs are a model: angles may be off by about {error:.0e} rad, whatever the tolerance, and \
-            more where errors grow"
+        "rigid springs are a model: angles may be off by about {} rad, whatever the tolerance, and more \
+            where errors grow",
+        order(error)
     ));
     Some(error)
 }

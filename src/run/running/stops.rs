@@ -6,6 +6,7 @@ use super::super::driver::MOST_TURNS;
 use super::super::methods::{MethodId, Stabilization};
 use super::super::plan::Plan;
 use super::super::sample::Sample;
+use crate::arithmetic::shown::estimate;
 use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::stepping::{Cause, StepError};
 
@@ -43,12 +44,13 @@ pub(super) fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<
         step: plan.step.unwrap_or(0.0),
         what: match drift.singular {
             Some(_) => format!(
-                "the energy balance is off by {off:.1e} of its scale: constraint {weakest} or \
-                its like has let go"
+                "the energy balance is off by {} of its scale: constraint {weakest} or its like has let \
+                go",
+                estimate(off)
             ),
             None => format!(
-                "the energy balance is off by {off:.1e} of its scale, and nothing puts loops and \
-                sliders back"
+                "the energy balance is off by {} of its scale, and nothing puts loops and sliders back",
+                estimate(off)
             ),
         },
         hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),

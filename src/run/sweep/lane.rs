@@ -1,6 +1,7 @@
 //! A point of a sweep that is integrated in a lane.
 
 use super::point::{Ready, Status, SweepPoint};
+use crate::arithmetic::shown::{about, estimate};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use crate::dynamics::constraint::ConstraintArguments;
@@ -10,7 +11,6 @@ use crate::run::allowance::{Allowance, AllowanceMoment, EnergyLimit};
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip;
 use crate::run::plan::Plan;
-use crate::scene::about;
 use crate::stepping::taylor::batch::{BatchMember, TakenStep, read};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
@@ -127,8 +127,9 @@ impl Lane {
             }
             None if point.energy > limit => {
                 let what = format!(
-                    "energy is off by {} of the scale, the limit is {limit:.1e}",
-                    about(point.energy)
+                    "energy is off by {} of the scale, the limit is {}",
+                    about(point.energy),
+                    estimate(limit)
                 );
                 Some(stop(Cause::DriftLimit, what, "tighten the tolerance"))
             }

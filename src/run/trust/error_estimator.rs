@@ -263,7 +263,7 @@ impl ErrorEstimator {
         if let Some(finer::Finer { mut plan, name }) =
             is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten()
         {
-            let from = crate::scene::about(reference_run.motion.time.hi);
+            let from = crate::arithmetic::shown::about(reference_run.motion.time.hi);
             (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
             reference_run.change(&self.mechanism, plan)?;

@@ -3,6 +3,7 @@
 use super::growth::{Growth, Nature};
 use super::tangent::TangentFlow;
 use super::{CAUTION, HORIZON, How, LEAST, LOST, Level, Trust};
+use crate::arithmetic::shown::estimate;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -228,8 +229,7 @@ impl TrustMeasurement {
         let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
         if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
             let why = || {
-                let seconds =
-                    if followed >= 0.01 { format!("{followed:.2}") } else { format!("{followed:.1e}") };
+                let seconds = if followed >= 0.01 { format!("{followed:.2}") } else { estimate(followed) };
                 format!(
                     "it was followed to t = {seconds} s only, more would have taken too large a share of the \
                         run (see --trust full)"

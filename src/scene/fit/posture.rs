@@ -1,8 +1,8 @@
 //! Where everything is at the start, where that can be told from angles alone, and what must not begin there.
 
 use super::{Hanging, HungBar, SAME};
+use crate::arithmetic::shown::about;
 use crate::scene::error::SceneError;
-use crate::scene::format::about;
 use crate::scene::read::At;
 use crate::scene::{Place, Scene, Spring, Start, Wall};
 

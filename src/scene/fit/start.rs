@@ -1,8 +1,9 @@
 //! Angle and rate of every bar at t = 0: as given, or as motors and locks tell, or a guess.
 
 use super::{Groups, Places, SAME, body};
+use crate::arithmetic::shown::about;
 use crate::scene::error::SceneError;
-use crate::scene::format::{ANGLE, RATE, about};
+use crate::scene::format::{ANGLE, RATE};
 use crate::scene::read::{At, GivenStart};
 use crate::scene::{Given, Law, Scene, Start};
 

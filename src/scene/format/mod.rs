@@ -3,6 +3,7 @@
 
 mod tables;
 
+use crate::arithmetic::shown::plain;
 pub(super) use tables::*;
 
 /// An object with a fixed set of keys.
@@ -51,7 +52,7 @@ pub(super) enum FieldShape {
     Outputs,
     /// Names of parts.
     Names,
-    /// A name: 1 to 64 letters, digits, `-`, `_`.
+    /// A name: 1 to 64 letters `a` to `z` or `A` to `Z`, digits, `-`, `_`.
     Name,
     /// The name of the scene, which also names a folder.
     FolderName,
@@ -194,9 +195,12 @@ impl FieldShape {
             }
             Self::Outputs => "must be {name: formula in quotes}, or a list of formulas in quotes".to_owned(),
             Self::Names => "must be a list of names of parts".to_owned(),
-            Self::Name => format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _"),
+            Self::Name => {
+                format!("must be a name: 1 to {LONGEST_NAME} letters a to z or A to Z, digits, - or _")
+            }
             Self::FolderName => {
-                format!("must be a name: 1 to {LONGEST_NAME} letters, digits, - or _, not starting with -")
+                let letters = "letters a to z or A to Z";
+                format!("must be a name: 1 to {LONGEST_NAME} {letters}, digits, - or _, not starting with -")
             }
             Self::Text => format!("must be text on one line, at most {LONGEST_TEXT} characters"),
             Self::Body { ground: true } => "must be the name of a bar, or \"ground\"".to_owned(),
@@ -236,15 +240,4 @@ impl QuantityRange {
     pub fn holds(&self, number: f64) -> bool {
         (self.least..=self.most).contains(&number)
     }
-}
-
-/// A number to four digits, for what is measured rather than given.
-pub(crate) fn about(number: f64) -> String {
-    plain(format!("{number:.3e}").parse().unwrap_or(number))
-}
-
-/// A number as people write it.
-pub(super) fn plain(number: f64) -> String {
-    let size = number.abs();
-    if size != 0.0 && !(1e-3..1e6).contains(&size) { format!("{number:e}") } else { number.to_string() }
 }

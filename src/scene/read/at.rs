@@ -1,8 +1,9 @@
 //! A value of the tree with its path, judged against the tables of `format`: what it must be, and the refusal
 //! where it is not.
 
+use crate::arithmetic::shown::about;
 use crate::scene::error::SceneError;
-use crate::scene::format::{Field, FieldShape, KeyTable, LONGEST_NAME, LONGEST_TEXT, QuantityRange, about};
+use crate::scene::format::{Field, FieldShape, KeyTable, LONGEST_NAME, LONGEST_TEXT, QuantityRange};
 use crate::scene::locate::{Located, Member, Span, Texts, Value, clipped, push_index, push_key};
 
 /// A value with its path.

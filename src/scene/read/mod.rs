@@ -21,10 +21,11 @@ pub(super) use start::GivenStart;
 
 use super::error::SceneError;
 use super::fit;
-use super::format::{LONGEST_FILE, SCENE, plain};
+use super::format::{LONGEST_FILE, SCENE};
 use super::locate::{Located, Text, Texts};
 use super::set::{Override, put};
 use super::{Coupling, Drive, Motor, Scene};
+use crate::arithmetic::shown::plain;
 use laws::Either;
 use loads::AnyMotor;
 use names::{BarNames, named};
@@ -227,7 +228,8 @@ fn times(scene: &Fields) -> Result<[f64; 2], SceneError> {
         return Err(every_at.refuse_value(&allowed, "shorten the output interval or lengthen the horizon"));
     }
     if until / every > MOST_OUTPUTS {
-        let allowed = format!("must be at least {:e} s: 2⁵³ outputs up to the horizon", until / MOST_OUTPUTS);
+        let allowed =
+            format!("must be at least {} s: 2⁵³ outputs up to the horizon", plain(until / MOST_OUTPUTS));
         return Err(every_at.refuse_value(&allowed, "beyond that the output times are no longer distinct"));
     }
     Ok([until, every])

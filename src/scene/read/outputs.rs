@@ -32,7 +32,7 @@ pub(super) fn outputs(fields: &Fields) -> Result<Vec<Output>, SceneError> {
         if !output.name.bytes().all(is_plain) && output.name != output.formula {
             return Err(at.refuse(
                 "has a name that no column can have",
-                "must be plain letters, digits, -, _, .",
+                "must be letters a to z or A to Z, digits, -, _, .",
                 HINT,
             ));
         }

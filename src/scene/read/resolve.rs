@@ -6,8 +6,9 @@
 use super::at::At;
 use super::names::set_by_events;
 use super::tables;
+use crate::arithmetic::shown::about;
 use crate::scene::error::SceneError;
-use crate::scene::format::{FACTOR_LAW, FieldShape, KeyTable, QuantityRange, SCENE, about, kind};
+use crate::scene::format::{FACTOR_LAW, FieldShape, KeyTable, QuantityRange, SCENE, kind};
 use crate::scene::formula::unit::Dimension;
 use crate::scene::formula::{DEEPEST, FUNCTIONS, Formula, FormulaError, Interpolant};
 use crate::scene::locate::{Located, Member, Span, Texts, Value, push_index, push_key};
@@ -90,7 +91,7 @@ pub(super) fn check_name(
     let is_plain = bytes.next().is_some_and(|byte| byte.is_ascii_alphabetic() || byte == b'_')
         && bytes.all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
         && name.len() <= crate::scene::format::LONGEST_NAME;
-    let allowed = "must be a name: a letter, then letters, digits or _";
+    let allowed = "must be a name: a letter a to z or A to Z, then such letters, digits or _";
     if !is_plain {
         return Err(source.refusal(span, path, "is no name for formulas", allowed, "for example \"k\""));
     }
@@ -437,13 +438,8 @@ pub(super) fn fits(
                 false if quantity.unit.is_empty() => "write it without a unit".to_owned(),
                 false => format!("write it in {unit}; numbers without a unit are in {unit} as well"),
             };
-            Err(FormulaError::new(
-                formula.text(),
-                0,
-                formula.text().len(),
-                format!("is {found}, not {unit}"),
-                hint,
-            ))
+            let (text, what) = (formula.text(), format!("is {found}, not {unit}"));
+            Err(FormulaError::new(text, 0, text.len(), what, hint))
         }
         _ => Ok(()),
     }
