@@ -607,3 +607,30 @@ fn numbers_in_messages_are_of_everyday_form() {
     assert!(constant.parse().is_ok_and(|number: f64| number > 0.0), "{notes}");
     assert!(!constant.contains("e-3") && !constant.contains("0e"), "{notes}");
 }
+
+/// A sweep whose points end by an event tells when they do.
+#[cfg(feature = "charts")]
+#[test]
+fn a_sweep_tells_when_its_points_end() {
+    let program = Program::with_scenes(&["free"]);
+    let mut scene = record(&program, "free.json");
+    let sweep = "sweep free.json --vary bar1.phi=0.1..1:5 --until 10 --map bar2.phi --html";
+    for (when, told, drawn, caption) in [
+        ("t - 1", "by t = 1 s", "bar2.phi at 1 s", "5 points, 1 s each"),
+        ("t - 1 - b", "by the end of each run", "bar2.phi at the end of each run", "up to 10 s each"),
+        ("t - 11", "by t = 10 s", "bar2.phi at 10 s", "5 points, 10 s each"),
+    ] {
+        scene["parameters"] = serde_json::json!({"b": 0.5});
+        scene["events"] = serde_json::json!([{"name": "end", "when": when, "action": "stop"}]);
+        program.write("free.json", &scene.to_string());
+        let varied = if when.contains('b') { sweep.replace("bar1.phi=0.1", "b=0") } else { sweep.to_owned() };
+        let ran = program.run(&format!("{varied} --chart-format svg --force --out swept")).exits(0);
+        let words = ran.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(words.contains(told), "{words}");
+        let files = program.files();
+        let chart = files.iter().rev().find(|file| file.ends_with("profile.svg")).expect("a chart");
+        let chart = program.read(chart);
+        assert!(chart.contains(drawn) && chart.contains(caption), "{when}: {chart}");
+        std::fs::remove_dir_all(program.path("swept")).expect("a folder");
+    }
+}

@@ -198,7 +198,7 @@ impl Swept<'_> {
         #[cfg(feature = "charts")]
         if let (Some(curve), None) = (&self.curve, self.plan.shard()) {
             if !_flags.charts.no_charts {
-                draw(self.plan, curve, folder, _flags)?;
+                draw(self, curve, folder, _flags)?;
             }
             if _flags.html {
                 let page = report::view::swept(self.plan, curve, &self.totals, &_flags.scene.given());
@@ -344,9 +344,14 @@ fn curve(plan: &Sweep, flags: &SweepFlags) -> Result<Option<SweepChart>, Failure
 }
 
 #[cfg(feature = "charts")]
-fn draw(plan: &Sweep, curve: &SweepChart, folder: &mut Folder, flags: &SweepFlags) -> Result<(), Failure> {
-    let name = if plan.grid().axes().len() == 2 { "map" } else { "profile" };
-    match curve.draw(plan)? {
+fn draw(
+    swept: &Swept<'_>,
+    curve: &SweepChart,
+    folder: &mut Folder,
+    flags: &SweepFlags,
+) -> Result<(), Failure> {
+    let name = if swept.plan.grid().axes().len() == 2 { "map" } else { "profile" };
+    match curve.draw(swept.plan, &swept.totals)? {
         Ok(picture) => flags.charts.keep(folder, name, &picture, &flags.scene.tell)?,
         Err(reason @ NoChart::Nothing(_)) if !flags.scene.tell.quiet => {
             super::output::message(&format!("no chart: {reason}"))

@@ -108,7 +108,10 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
     }
     page.entry(
         "turned over",
-        &format!("{} of {points}, by t = {} s", totals.flipped, figure(sweep.plan().until)),
+        &match common_end(sweep, totals) {
+            Some(end) => format!("{} of {points}, by t = {} s", totals.flipped, figure(end)),
+            None => format!("{} of {points}, by the end of each run", totals.flipped),
+        },
     );
     if sweep.trust() != Level::Off {
         let (of, without) = (totals.judged, totals.done - totals.judged.min(totals.done));
@@ -131,6 +134,12 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
         page.entry("constraints", &format!("{position} {unit} and {velocity} {} at most", per_second(unit)));
     }
     page.into_text()
+}
+
+/// When all runs ended \[s\], but for those that end as a bar turns over; none where events ended them at
+/// different times.
+fn common_end(sweep: &Sweep, totals: &Totals) -> Option<f64> {
+    if sweep.ends_at_flips() || totals.ends.is_none() { Some(sweep.plan().until) } else { totals.end() }
 }
 
 /// The unit of the rate of a constraint.
@@ -269,7 +278,8 @@ impl SweepChart {
     }
 
     /// What its chart says.
-    pub(super) fn labels(&self, sweep: &Sweep) -> Labels {
+    pub(super) fn labels(&self, sweep: &Sweep, totals: &Totals) -> Labels {
+        let end = common_end(sweep, totals);
         let names = results(sweep);
         let is_flip = self.column.is_none_or(|column| column + 1 == names.len());
         let name = if is_flip {
@@ -292,18 +302,24 @@ impl SweepChart {
             })
             .collect();
         let title =
-            if is_flip { "Time until a bar first turns over".to_owned() } else { titled(&bare, sweep) };
-        let plan = sweep.plan();
-        let mut caption = vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(plan))];
+            if is_flip { "Time until a bar first turns over".to_owned() } else { titled(&bare, sweep, end) };
+        let mut caption =
+            vec![format!("scene {}", plain(&sweep.scene().name)), plain(&super::setting(sweep.plan()))];
         caption.push(format!(
-            "{} {}, {} s each",
+            "{} {}, {}",
             axes.iter().map(|axis| axis.count.to_string()).collect::<Vec<_>>().join(" × "),
             if sweep.grid().count() == 1 { "point" } else { "points" },
-            figure(plan.until)
+            end.map_or_else(
+                || format!("up to {} s each", figure(sweep.plan().until)),
+                |end| format!("{} s each", figure(end))
+            )
         ));
         let is_log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
-        let never =
-            if is_flip { format!("not within {} s", figure(plan.until)) } else { "no value".to_owned() };
+        let never = match end {
+            _ if !is_flip => "no value".to_owned(),
+            Some(end) => format!("not within {} s", figure(end)),
+            None => "not before the end".to_owned(),
+        };
         Labels { title, caption, value: name, axes, is_log, is_flip, never }
     }
 
@@ -334,8 +350,8 @@ impl SweepChart {
     ///
     /// # Errors
     /// Drawing fails; `Ok` with the reason where there is nothing to show.
-    pub fn draw(&self, sweep: &Sweep) -> Result<Result<Picture, NoChart>, ChartError> {
-        let labels = self.labels(sweep);
+    pub fn draw(&self, sweep: &Sweep, totals: &Totals) -> Result<Result<Picture, NoChart>, ChartError> {
+        let labels = self.labels(sweep, totals);
         if labels.is_flip && self.seen.iter().all(|time| time.is_nan()) {
             return Ok(Err(NoChart::Nothing(listed(sweep))));
         }
@@ -396,7 +412,7 @@ fn spaced(name: &str) -> String {
 
 /// What a column is, and of which time: `max:O` is the largest O over the run, an angle that at its end.
 #[cfg(feature = "charts")]
-fn titled(column: &str, sweep: &Sweep) -> String {
+fn titled(column: &str, sweep: &Sweep, end: Option<f64>) -> String {
     let of = |(kind, name)| match kind {
         "min" => Some(format!("Least {name}")),
         "max" => Some(format!("Largest {name}")),
@@ -404,15 +420,18 @@ fn titled(column: &str, sweep: &Sweep) -> String {
         "rms" => Some(format!("Rms of {name}")),
         _ => None,
     };
-    let until = figure(sweep.plan().until);
+    let until = figure(end.unwrap_or(sweep.plan().until));
     let over = column.split_once(':').and_then(of);
     let over = over.or_else(|| column.contains("drift").then(|| format!("Largest {column}")));
     match over {
+        Some(over) if end.is_none() => format!("{over} over each run"),
         Some(over) => format!("{over} over {until} s"),
         None if matches!(column, "steps" | "horizon" | "t") => {
-            format!("{} of runs of {until} s", capital(column))
+            let up_to = if end.is_none() { "up to " } else { "" };
+            format!("{} of runs of {up_to}{until} s", capital(column))
         }
         None if sweep.ends_at_flips() => format!("{} at the end", capital(column)),
+        None if end.is_none() => format!("{} at the end of each run", capital(column)),
         None => format!("{} at {until} s", capital(column)),
     }
 }

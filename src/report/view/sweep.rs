@@ -28,7 +28,7 @@ pub fn holds(sweep: &Sweep) -> Result<(), ViewError> {
 
 /// The page: a click on a point shows its motion, or that of the nearest of which it is kept.
 pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals, given: &Value) -> Document {
-    let labels = curve.labels(sweep);
+    let labels = curve.labels(sweep, totals);
     let mut axes: Vec<Value> = (sweep.grid().axes().iter().zip(sweep.variables()))
         .map(|(axis, variable)| {
             json!({"name": variable.path, "unit": variable.unit, "from": axis.from, "to": axis.to,

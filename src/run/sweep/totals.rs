@@ -3,6 +3,9 @@
 use super::{Status, SweepPoint};
 use std::time::Duration;
 
+/// Ends are the same up to so much of their time: an event's time is known to rounding only.
+const SAME_END: f64 = 1e-9;
+
 /// What a sweep amounted to, or the points of it seen so far.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Totals {
@@ -28,6 +31,8 @@ pub struct Totals {
     /// Largest violation of a constraint among those done, at position \[rad or m\] and velocity level,
     /// whichever point.
     pub constraint: [f64; 2],
+    /// Earliest and latest end of those done \[s\], where there are any.
+    pub ends: Option<[f64; 2]>,
     /// Threads used.
     pub threads: usize,
     /// Time spent, interruptions left out.
@@ -38,6 +43,18 @@ impl Totals {
     /// Points seen.
     pub fn points(&self) -> u64 {
         [self.done, self.stopped, self.refused, self.skipped].into_iter().fold(0, u64::saturating_add)
+    }
+
+    /// The time at which all of those done ended \[s\]; none where they ended at different ones.
+    pub fn end(&self) -> Option<f64> {
+        self.ends.filter(|[first, last]| last - first <= SAME_END * last.abs()).map(|[_, last]| last)
+    }
+
+    fn ended(&mut self, next: Option<[f64; 2]>) {
+        self.ends = match (self.ends, next) {
+            (Some([first, last]), Some(next)) => Some([first.min(next[0]), last.max(next[1])]),
+            (ends, next) => ends.or(next),
+        };
     }
 
     /// With those of the points that follow; times add up, and of threads the most counts.
@@ -56,6 +73,7 @@ impl Totals {
         for (most, level) in self.constraint.iter_mut().zip(next.constraint) {
             *most = most.max(level);
         }
+        self.ended(next.ends);
         self.threads = self.threads.max(next.threads);
         self.wall += next.wall;
     }
@@ -74,6 +92,7 @@ impl Totals {
         }
         self.steps += point.steps;
         if point.status == Status::Done {
+            self.ended(Some([point.t; 2]));
             if point.energy > self.energy.0 {
                 self.energy = (point.energy, point.index);
             }
