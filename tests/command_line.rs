@@ -634,3 +634,18 @@ fn a_sweep_tells_when_its_points_end() {
         std::fs::remove_dir_all(program.path("swept")).expect("a folder");
     }
 }
+
+/// Lists of names are whole, or say how many more there are.
+#[test]
+fn lists_of_names_are_whole_or_say_how_many_are_left_out() {
+    let program = Program::with_scenes(&["andrews", "free"]);
+    program.run("check free.json --output 5*joule").exits(2).says(&["known are t, bar1.phi", "B.fy\n"]);
+    program
+        .run("sensitivity andrews.json --to gravity[0] --of kinetic")
+        .exits(2)
+        .says(&["AG.cos and 91 more"]);
+    let mut scene = record(&program, "free.json");
+    scene["torques"] = serde_json::json!([{"name": "d", "body": "bar1", "torque": "5 joule"}]);
+    program.write("unit.json", &scene.to_string());
+    program.run("check unit.json").exits(3).says(&["joule is no unit", "kN, J, kJ, W, kW, lbf; write"]);
+}

@@ -69,6 +69,18 @@ pub(crate) fn meant(name: &str, known: &[&str]) -> String {
     match crate::scene::read::nearest(name, known.iter().copied()) {
         Some(near) => format!("did you mean {near}?"),
         None if known.is_empty() => "nothing has a name here".into(),
-        None => format!("known are {}", known.iter().take(20).copied().collect::<Vec<_>>().join(", ")),
+        None => format!("known are {}", first_of(known)),
     }
+}
+
+/// Words that a hint names at most, and at most so many more where that is all of them.
+const NAMED: [usize; 2] = [20, 10];
+
+/// All of a few words, or the first of many and how many more there are.
+fn first_of(known: &[&str]) -> String {
+    let more = known.len().saturating_sub(NAMED[0]);
+    if more <= NAMED[1] {
+        return known.join(", ");
+    }
+    format!("{} and {more} more", known[..NAMED[0]].join(", "))
 }
