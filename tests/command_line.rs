@@ -649,3 +649,17 @@ fn lists_of_names_are_whole_or_say_how_many_are_left_out() {
     program.write("unit.json", &scene.to_string());
     program.run("check unit.json").exits(3).says(&["joule is no unit", "kN, J, kJ, W, kW, lbf; write"]);
 }
+
+/// Where growth is told neither as an exponent nor as a power, the reason is.
+#[test]
+fn growth_is_told_or_why_it_is_not() {
+    let program = Program::with_scenes(&["iftomm_pendulum", "bang_bang", "free"]);
+    for scene in ["iftomm_pendulum", "bang_bang", "free"] {
+        let ran = program.run(&format!("run {scene}.json --no-charts --json --out {scene}")).exits(0);
+        let trust = ran.object()["trust"].clone();
+        let told = ["lyapunov", "growth_power", "growth_why"].map(|key| !trust[key].is_null());
+        assert!(told.into_iter().any(|told| told), "{scene}: {trust:#}");
+        assert!(!(told[2] && (told[0] || told[1])), "{scene}: {trust:#}");
+    }
+    program.run("run free.json --until 0.01 --no-charts --out short").exits(0).shows(&["too short to tell"]);
+}

@@ -37,7 +37,7 @@ pub fn object(trust: Option<&Trust>) -> Value {
             "until_s": found.until,
         })),
         "growth_power": trust.growth_power,
-        "growth_why": trust.no_growth,
+        "growth_why": trust.no_growth.as_ref().or(trust.unclear_growth.as_ref()),
         "input_error": trust.input_error,
         "inputs": super::inputs::object(trust.inputs.as_ref()),
         "model_error": trust.model_error,
@@ -73,7 +73,7 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
                 "trust",
                 &format!(
                     "angles accurate to {} {} {what} at {} s ({source})",
-                    how_near(trust),
+                    how_near(trust.is_upper_bound),
                     magnitude(error),
                     rough(trust.at)
                 ),
@@ -130,7 +130,7 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         };
         page.entry("growth", &format!("regular motion: {how}"));
     }
-    if let Some(why) = &trust.no_growth {
+    if let Some(why) = trust.no_growth.as_ref().or(trust.unclear_growth.as_ref()) {
         page.entry("growth", &format!("not known: {why}"));
     }
     if let Some(inputs) = &trust.inputs {
@@ -147,8 +147,8 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
 }
 
 /// How the estimate is to be read.
-fn how_near(trust: &Trust) -> &'static str {
-    if trust.is_upper_bound { "at most about" } else { "typically" }
+pub(super) fn how_near(is_upper_bound: bool) -> &'static str {
+    if is_upper_bound { "at most about" } else { "typically" }
 }
 
 /// The errors of rates and torques, at the same time.
@@ -157,7 +157,7 @@ fn beside(trust: &Trust) -> Option<String> {
     let torque =
         trust.torque_error.map_or(String::new(), |torque| format!(", torques to {} N·m", magnitude(torque)));
     let at = if trust.horizon.is_some() { "then " } else { "" };
-    Some(format!("rates {at}to {} {} rad/s{torque}", how_near(trust), magnitude(rate)))
+    Some(format!("rates {at}to {} {} rad/s{torque}", how_near(trust.is_upper_bound), magnitude(rate)))
 }
 
 /// What still holds beyond the horizon.

@@ -1,6 +1,7 @@
 //! What a run's record says, for people.
 
 use crate::report::page::{counted, figure, magnitude, rough};
+use crate::report::trust::how_near;
 use crate::run::Sweep;
 use crate::scene::Scene;
 use serde_json::{Value, json};
@@ -109,7 +110,10 @@ pub(super) fn summary(record: &Value) -> Vec<[String; 2]> {
                 format!("trusted until {} s (to {tolerance:e} rad{beside}); pale beyond", rough(horizon)),
             );
         }
-        (None, Some(error)) => entry("trust", format!("angles accurate to {} rad{beside}", magnitude(error))),
+        (None, Some(error)) => {
+            let how = how_near(trust["is_upper_bound"].as_bool().unwrap_or_default());
+            entry("trust", format!("angles accurate to {how} {} rad{beside}", magnitude(error)));
+        }
         (None, None) => {
             let why = trust["why"].as_str().unwrap_or("none was asked for");
             entry("trust", format!("no estimate of the error: {why}"));

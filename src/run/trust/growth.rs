@@ -41,7 +41,14 @@ pub(super) struct Growth {
     pub lyapunov: Option<Lyapunov>,
     /// By a power of time.
     pub power: Option<f64>,
+    /// Why it is neither.
+    pub why: Option<&'static str>,
 }
+
+const TOO_SHORT: &str = "the run is too short to tell";
+const NEITHER: &str = "it is neither exponential in both halves of the run nor a power of time";
+const NEAR_UNSTABLE: &str = "it does not follow a power of time in this run, and a single degree of freedom \
+    that nothing drives is not chaotic";
 
 impl Nature {
     /// Of a mechanism whose flow has begun.
@@ -62,10 +69,11 @@ impl Nature {
     pub fn judge(self, history: &[[f64; 2]]) -> Growth {
         let mut growth = Growth::default();
         let (Some(&[begin, first]), Some(&[end, last])) = (history.first(), history.last()) else {
-            return growth;
+            return Growth { why: Some("it was not followed"), ..growth };
         };
         if history.len() < 2 * BLOCKS || !last.is_finite() {
-            return growth;
+            let why = if last.is_finite() { TOO_SHORT } else { "it came out not finite" };
+            return Growth { why: Some(why), ..growth };
         }
         let at = |share: f64| interpolated(history, begin + share * (end - begin));
         let [early, late] = [at(0.5) - first, last - at(0.5)];
@@ -83,6 +91,14 @@ impl Nature {
             // Where growth is slow both lines fit.
             let is_steady = power.slope < 0.5 || power.rest <= line.rest;
             growth.power = (is_steady && power.slope.is_finite()).then_some(power.slope.max(0.0));
+        }
+        if growth.lyapunov.is_none() && growth.power.is_none() {
+            let has_shown = grows || self.has_shown(end - begin);
+            growth.why = Some(match self.is_planar {
+                _ if !has_shown => TOO_SHORT,
+                true => NEAR_UNSTABLE,
+                false => NEITHER,
+            });
         }
         growth
     }

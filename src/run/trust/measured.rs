@@ -223,7 +223,7 @@ impl TrustMeasurement {
         if self.until > t {
             self.cut(t);
         }
-        let Growth { lyapunov, power: found } =
+        let Growth { lyapunov, power: found, why: neither } =
             if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
         // A power shows over most of the run only: in the beginning it is that of one oscillation.
         let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
@@ -237,6 +237,8 @@ impl TrustMeasurement {
             };
             self.no_growth.get_or_insert_with(why);
         }
+        let is_open = self.no_growth.is_none() && growth_power.is_none() && lyapunov.is_none();
+        let unclear_growth = neither.filter(|_| is_open).map(str::to_owned);
         let input_error =
             self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
         let Self {
@@ -268,6 +270,7 @@ impl TrustMeasurement {
             lyapunov,
             growth_power,
             no_growth,
+            unclear_growth,
             // More is no more uncertain.
             input_error: input_error.filter(|&error| error > 0.0).map(|error| error.min(TAU)),
             inputs: None,

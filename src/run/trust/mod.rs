@@ -173,6 +173,9 @@ pub struct Trust {
     /// Why nothing is known of the growth of small differences, or not from some time on.
     #[serde(default)]
     pub no_growth: Option<String>,
+    /// Why it is told neither as an exponent nor as a power where it was followed.
+    #[serde(default)]
+    pub unclear_growth: Option<String>,
     /// What changes of the scene's numbers by about a last digit of a double come to at `at` \[rad\], or,
     /// with `inputs`, of their last digits as written; no error of the method.
     pub input_error: Option<f64>,
