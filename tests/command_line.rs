@@ -663,3 +663,18 @@ fn growth_is_told_or_why_it_is_not() {
     }
     program.run("run free.json --until 0.01 --no-charts --out short").exits(0).shows(&["too short to tell"]);
 }
+
+/// The times of the extremes of an output that does not change are those of rounding.
+#[test]
+fn outputs_that_do_not_change_are_said_to_be_constant() {
+    let program = Program::with_scenes(&["free"]);
+    let ran = program
+        .run("run free.json --until 1 --no-charts --output three=3 --output moves=bar1.phi --out run")
+        .exits(0);
+    let row = |name: &str| {
+        let row = ran.stdout.lines().find(|line| line.contains(name)).unwrap_or_else(|| panic!("{ran:#?}"));
+        row.split_whitespace().map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(row("three")[2..6], ["3", "constant", "3", "constant"], "{ran:#?}");
+    assert!(!row("moves").contains(&"constant".to_owned()), "{ran:#?}");
+}

@@ -5,6 +5,10 @@ use crate::dynamics::Mechanism;
 use crate::run::{Extremes, Outcome};
 use serde_json::{Map, Value, json};
 
+/// An output that changes by less over its size does so by rounding.
+const CONSTANT: f64 = 1e-12;
+const CONSTANT_TOLD: &str = "constant";
+
 /// True where forces are those of least norm among what rigid bodies leave open.
 fn is_open(mechanism: &Mechanism) -> bool {
     !mechanism.redundant().is_empty()
@@ -39,7 +43,13 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome
         .map(|Extremes { name, unit, min, max, mean, rms }| {
             let head = format!("{name} [{unit}]");
             let numbers = [min[0], min[1], max[0], max[1], *mean, *rms];
-            std::iter::once(head).chain(numbers.into_iter().map(figure)).collect()
+            let mut cells: Vec<String> =
+                std::iter::once(head).chain(numbers.into_iter().map(figure)).collect();
+            // Of a constant the times of both extremes are those of rounding.
+            if cells[1] == cells[3] && max[0] - min[0] <= CONSTANT * max[0].abs().max(min[0].abs()) {
+                (cells[2], cells[4]) = (CONSTANT_TOLD.into(), CONSTANT_TOLD.into());
+            }
+            cells
         })
         .collect();
     page.table(&["output", "least", "at t [s]", "largest", "at t [s]", "mean", "rms"], &rows);
