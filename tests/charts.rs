@@ -287,7 +287,10 @@ fn a_missing_folder_and_a_silly_resolution_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("missing").join("torque.png");
     let error = picture.write(&path).unwrap_err();
-    assert!(matches!(error, ChartError::Write { .. }) && error.to_string().contains("torque.png"), "{error}");
+    assert!(
+        matches!(error, ChartError::Folder { .. }) && error.to_string().contains("torque.png"),
+        "{error}"
+    );
     assert!(std::fs::read_dir(folder.path()).unwrap().next().is_none());
     for resolution in [0.0, -1.0, f64::NAN, 1e9] {
         assert!(matches!(

@@ -678,3 +678,35 @@ fn outputs_that_do_not_change_are_said_to_be_constant() {
     assert_eq!(row("three")[2..6], ["3", "constant", "3", "constant"], "{ran:#?}");
     assert!(!row("moves").contains(&"constant".to_owned()), "{ran:#?}");
 }
+
+/// What cannot be is told in words of our own, with the place at fault.
+#[test]
+fn small_faults_are_told_with_their_place() {
+    let program = Program::with_scenes(&["free", "motor"]);
+    program.run("run free.json --show-digits 5").exits(2).says(&["--digits <D>", "--trusted-until <S>"]);
+    for (command, allowed) in [
+        ("modes free.json --starts -1", "from 0 to 1000000"),
+        ("kinematics motor.json --positions -3", "from 1 to 10000000"),
+        ("sweep free.json --vary bar1.phi=0..1:3 --threads -1", "from 1 to 1024"),
+        ("stress free.json --max-evaluations -1", "from 1 to 1e18"),
+        ("fit free.json --data x.csv --vary gravity[1] --segments -2", "from 1 to 10000"),
+        ("run free.json --digits 30 --show-digits -1", "from 1 to 2000"),
+    ] {
+        let refused = program.run(command).exits(2).says(&["a whole number", allowed]);
+        assert!(!refused.stderr.contains("tip:"), "{refused:#?}");
+    }
+    #[cfg(feature = "charts")]
+    {
+        let refused = program.run("check free.json --chart nowhere/c.png").exits(6);
+        let refused = refused.says(&["cannot write nowhere/c.png", "no folder nowhere", "hint: "]);
+        assert!(!refused.stderr.contains(".chart-"), "{refused:#?}");
+    }
+    let mut scene = record(&program, "free.json");
+    scene.as_object_mut().expect("a scene").remove("hinges");
+    program.write("loose.json", &scene.to_string());
+    program.run("check loose.json").exits(3).says(&["origin", "or the hinge, weld or slider"]);
+    program.write("ragged.csv", "t [s],bar1.phi [rad]\n0.1,0.2\n0.2\n");
+    let ragged = program.run("fit free.json --data ragged.csv --vary gravity[1]");
+    let ragged = ragged.says(&["line 3 has 1 cell, and the header has 2"]);
+    assert!(!ragged.stderr.contains("record"), "{ragged:#?}");
+}

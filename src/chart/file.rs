@@ -139,9 +139,14 @@ impl Picture {
 
 /// Writes next to the target first, so that a reader never meets half a file.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), ChartError> {
-    let failed = |source: std::io::Error| ChartError::Write { path: path.to_owned(), source };
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::Builder::new().prefix(".chart-").tempfile_in(folder).map_err(failed)?;
+    if !folder.is_dir() {
+        return Err(ChartError::Folder { path: path.to_owned(), folder: folder.to_owned() });
+    }
+    let failed = |source: std::io::Error| ChartError::Write { path: path.to_owned(), source };
+    let file = tempfile::Builder::new().prefix(".chart-").tempfile_in(folder);
+    // What the system says names the temporary file.
+    let mut file = file.map_err(|error| failed(error.kind().into()))?;
     file.write_all(bytes).map_err(failed)?;
     #[cfg(unix)]
     {

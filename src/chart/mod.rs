@@ -114,8 +114,18 @@ pub enum ChartError {
     /// The GIF encoder gave up.
     #[error("encoding a GIF animation failed: {0}")]
     Gif(#[from] ::gif::EncodingError),
+    /// The folder of the file is not there.
+    #[error("cannot write {}: there is no folder {}\nhint: make it first, or name another", path.display(),
+        folder.display())]
+    Folder {
+        /// The file.
+        path: PathBuf,
+        /// Its folder.
+        folder: PathBuf,
+    },
     /// The file cannot be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}: {source}\nhint: is the disk full, or the folder closed to you?",
+        path.display())]
     Write {
         /// The file.
         path: PathBuf,

@@ -206,7 +206,7 @@ impl From<crate::chart::ChartError> for Failure {
     fn from(error: crate::chart::ChartError) -> Self {
         use crate::chart::ChartError;
         let exit = match error {
-            ChartError::Write { .. } => Exit::Io,
+            ChartError::Folder { .. } | ChartError::Write { .. } => Exit::Io,
             ChartError::Format { .. } => Exit::Usage,
             _ => Exit::Other,
         };

@@ -75,7 +75,7 @@ pub fn text(found: &Fit) -> String {
                 return vec![name, "no values".into(), String::new()];
             }
             let sigma = format!("{}{}", rough(column.sigma), if column.is_given { "" } else { " (found)" });
-            vec![name, magnitude(rms(column)), sigma]
+            vec![name, rough(rms(column)), sigma]
         })
         .collect();
     page.entry("columns", "residuals and the noise they were weighted with");

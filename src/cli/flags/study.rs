@@ -1,6 +1,8 @@
 //! The flags of commands that study a scene by more than a run.
 
-use super::values::{limit, methods, number, positive, rate, stabilizations, wait};
+use super::values::{
+    count, limit, methods, number, positions, positive, rate, segments, stabilizations, starts, threads, wait,
+};
 use super::*;
 use crate::run::Measure;
 
@@ -24,7 +26,7 @@ pub struct SweepFlags {
     #[arg(long, help_heading = "Points")]
     pub to_flip: bool,
     /// Threads [default: all processors]; the table is the same whatever their number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024),
+    #[arg(long, value_name = "N", value_parser = threads, allow_hyphen_values = true,
         help_heading = "Points")]
     pub threads: Option<u16>,
     /// Run part I of N alone, into a folder shard-I-of-N of the sweep's own; `driftless merge` joins them
@@ -84,14 +86,14 @@ pub struct StressFlags {
     pub methods: Vec<MethodId>,
     /// Evaluations allowed for each scene and method
     #[arg(long, alias = "effort", value_name = "N", default_value_t = MAX_EVALUATIONS,
-        value_parser = clap::value_parser!(u64).range(1..))]
+        value_parser = count, allow_hyphen_values = true)]
     pub max_evaluations: u64,
     /// What the end of a scene given may be off, in rad
     #[arg(long, value_name = "RAD", default_value_t = 1e-4, value_parser = limit, allow_hyphen_values = true,
         requires = "scenes")]
     pub tolerance: f64,
     /// Threads [default: all processors]; the cells are the same whatever their number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = threads, allow_hyphen_values = true)]
     pub threads: Option<u16>,
     /// Folder under which `stress` is made
     #[arg(long, help_heading = "Files", value_name = "DIR", default_value = "output")]
@@ -124,7 +126,7 @@ pub struct KinematicsFlags {
     pub rate: Option<f64>,
     /// Positions at equal distances over the range; one more stands at its end
     #[arg(long, value_name = "N", default_value_t = 360,
-        value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+        value_parser = positions, allow_hyphen_values = true)]
     pub positions: u32,
     #[allow(missing_docs)]
     #[command(flatten)]
@@ -139,7 +141,7 @@ pub struct ModesFlags {
     pub scene: SceneFlags,
     /// Positions from which equilibria or periodic motions are looked for, beside the scene's start
     #[arg(long, value_name = "N", default_value_t = 64,
-        value_parser = clap::value_parser!(u32).range(0..=1_000_000))]
+        value_parser = starts, allow_hyphen_values = true)]
     pub starts: u32,
     /// Look for motions of this period in seconds; by default that of motors at a constant rate and of sines
     #[arg(long, value_name = "S", value_parser = positive, allow_hyphen_values = true)]
@@ -244,7 +246,7 @@ pub struct FitFlags {
     /// Parts of the data for multiple shooting, short against the growth of small differences of a chaotic
     /// motion
     #[arg(long, value_name = "N", default_value_t = 1,
-        value_parser = clap::value_parser!(u32).range(1..=10_000))]
+        value_parser = segments, allow_hyphen_values = true)]
     pub segments: u32,
     /// Tolerance of the motion [default: 1e-14]
     #[arg(long, value_name = "TOL", value_parser = positive, allow_hyphen_values = true)]

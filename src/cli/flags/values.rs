@@ -45,6 +45,32 @@ pub(super) fn count(text: &str) -> Result<u64, String> {
     }
 }
 
+/// A whole number of a range.
+pub(super) fn whole(text: &str, [least, most]: [u32; 2]) -> Result<u32, String> {
+    let read = text.trim().parse().ok().filter(|number| (least..=most).contains(number));
+    read.ok_or_else(|| format!("a whole number from {least} to {most}"))
+}
+
+/// Threads to be used.
+pub(super) fn threads(text: &str) -> Result<u16, String> {
+    whole(text, [1, 1024]).map(|threads| threads as u16)
+}
+
+/// Positions of a range.
+pub(super) fn positions(text: &str) -> Result<u32, String> {
+    whole(text, [1, 10_000_000])
+}
+
+/// Parts of data.
+pub(super) fn segments(text: &str) -> Result<u32, String> {
+    whole(text, [1, 10_000])
+}
+
+/// Starts of a search.
+pub(super) fn starts(text: &str) -> Result<u32, String> {
+    whole(text, [0, 1_000_000])
+}
+
 /// A time to wait \[s\]: any number that is not negative.
 pub(super) fn wait(text: &str) -> Result<f64, String> {
     let value = number(text)?;
@@ -81,6 +107,8 @@ mod tests {
         assert!(
             count("0").is_err() && count("1.5").is_err() && count("1e19").is_err() && count("-1").is_err()
         );
+        assert_eq!((threads("8"), starts("0"), positions("360")), (Ok(8), Ok(0), Ok(360)));
+        assert!(threads("-1").is_err() && threads("1025").is_err() && starts("-1").is_err());
         assert!(
             number("1/").is_err() && number("ten").is_err() && limit("nan").is_err() && limit("-1").is_err()
         );

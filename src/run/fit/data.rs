@@ -70,7 +70,7 @@ impl Data {
         }
         for record in reader.records() {
             let record = record
-                .map_err(|error| fail(error.to_string(), "every row has as many cells as the header"))?;
+                .map_err(|error| fail(unreadable(&error), "every row has as many cells as the header"))?;
             let line = record.position().map_or(0, csv::Position::line);
             let mut cells = Vec::new();
             for ((cell, name), scale) in record.iter().zip(&names).zip(&scales) {
@@ -97,6 +97,18 @@ impl Data {
             0 => Err(fail("has no rows".into(), "at least one row of measurements")),
             _ => Ok(data),
         }
+    }
+}
+
+/// What is wrong with a row.
+fn unreadable(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
+            let line = pos.as_ref().map_or(0, csv::Position::line);
+            let cells = if *len == 1 { "cell" } else { "cells" };
+            format!("line {line} has {len} {cells}, and the header has {expected_len}")
+        }
+        _ => error.to_string(),
     }
 }
 
