@@ -710,3 +710,16 @@ fn small_faults_are_told_with_their_place() {
     let ragged = ragged.says(&["line 3 has 1 cell, and the header has 2"]);
     assert!(!ragged.stderr.contains("record"), "{ragged:#?}");
 }
+
+/// Positions in which loops cannot be closed are counted.
+#[test]
+fn modes_say_what_became_of_the_positions_asked_for() {
+    let program = Program::with_scenes(&["andrews"]);
+    let found =
+        program.run("modes andrews.json --starts 20 --no-charts --json --out modes").exits(0).object();
+    let of = |key: &str| found["starts"][key].as_u64().unwrap_or_else(|| panic!("{found:#}"));
+    assert_eq!(of("asked"), 20);
+    assert!(of("unassembled") > 0 && of("unassembled") + of("repeated") <= 20, "{found:#}");
+    let page = program.run("modes andrews.json --starts 20 --no-charts --out page").exits(0);
+    page.shows(&["of 20 other positions asked for", "could not be assembled"]);
+}

@@ -53,7 +53,13 @@ pub fn object(found: &Modes) -> Value {
     json!({
         "scene": found.scene.name,
         "degrees_of_freedom": found.degrees_of_freedom,
-        "starts": {"tried": found.starts[0], "settled": found.starts[1]},
+        "starts": {
+            "tried": found.starts[0],
+            "settled": found.starts[1],
+            "asked": found.asked[0],
+            "unassembled": found.asked[1],
+            "repeated": found.asked[2],
+        },
         "equilibria": found.equilibria.iter().map(equilibrium).collect::<Vec<_>>(),
         "left_out": found.left_out,
     })
@@ -65,9 +71,26 @@ pub(super) fn by_coordinate<T: Serialize>(mechanism: &Mechanism, values: &[T]) -
     named.collect::<Map<String, Value>>().into()
 }
 
-/// How many starts of a search were tried and settled, and at how many of what.
-pub(super) fn search(page: &mut Page, [tried, settled]: [usize; 2], found: &str) {
+/// How many starts of a search were tried and settled, and at how many of what; and what became of the other
+/// positions asked for that are no starts.
+pub(super) fn search(
+    page: &mut Page,
+    [tried, settled]: [usize; 2],
+    found: &str,
+    [asked, unassembled, repeated]: [usize; 3],
+) {
     page.entry("search", &format!("{settled} of {tried} starts settled, at {found}"));
+    let mut left = Vec::new();
+    if unassembled > 0 {
+        left.push(format!("{unassembled} could not be assembled"));
+    }
+    if repeated > 0 {
+        left.push(format!("{repeated} came to a position among the starts"));
+    }
+    if !left.is_empty() {
+        let positions = counted(asked as u64, "other position", "other positions");
+        page.entry("", &format!("of {positions} asked for {}", left.join(", ")));
+    }
 }
 
 /// A numbered row of a table; numbers that are none are left out.
@@ -99,7 +122,8 @@ fn words(one: &Equilibrium) -> String {
 pub fn text(found: &Modes) -> String {
     let mut page = Page::new(&found.scene.name, &found.scene.description);
     page.entry("freedom", &counted(found.degrees_of_freedom as u64, "degree", "degrees"));
-    search(&mut page, found.starts, &counted(found.equilibria.len() as u64, "equilibrium", "equilibria"));
+    let equilibria = counted(found.equilibria.len() as u64, "equilibrium", "equilibria");
+    search(&mut page, found.starts, &equilibria, found.asked);
     let is_told = |k: usize, one: &Equilibrium| k < TOLD || one.from_start;
     for (k, one) in found.equilibria.iter().enumerate().filter(|(k, one)| is_told(*k, one)) {
         let start = if one.from_start { ", next to the start" } else { "" };

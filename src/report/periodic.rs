@@ -45,6 +45,9 @@ pub fn object(found: &PeriodicMotions) -> Value {
         "starts": {
             "tried": found.starts[0],
             "settled": found.starts[1],
+            "asked": found.asked[0],
+            "unassembled": found.asked[1],
+            "repeated": found.asked[2],
             "unstable": found.unstable,
             "at_rest": found.at_rest.unwrap_or(0),
         },
@@ -71,7 +74,7 @@ pub fn text(found: &PeriodicMotions) -> String {
     page.entry("freedom", &counted(found.degrees_of_freedom as u64, "degree", "degrees"));
     page.entry("period", &format!("{} s", figure(found.period)));
     let motions = counted(found.motions.len() as u64, "periodic motion", "periodic motions");
-    search(&mut page, found.starts, &motions);
+    search(&mut page, found.starts, &motions, found.asked);
     let is_told = |k: usize, one: &PeriodicMotion| k < TOLD || one.from_start;
     for (k, one) in found.motions.iter().enumerate().filter(|(k, one)| is_told(*k, one)) {
         let start = if one.from_start { ", next to the start" } else { "" };

@@ -185,7 +185,7 @@ pub fn kinematics(
     let [below, above] = sides;
     let all: Vec<SolvedPosition> = below.into_iter().rev().chain(above).collect();
     let mut found = Kinematics {
-        branches: mechanism.other_assemblies(&scene, ATTEMPTS),
+        branches: mechanism.other_assemblies(&scene, ATTEMPTS).0,
         left_out: left_out(&scene),
         is_closed: is_turn && all.first().zip(all.last()).is_some_and(|(a, b)| a.is_as(b, &mechanism)),
         dead_centres: Vec::new(),

@@ -127,6 +127,9 @@ pub struct Modes {
     pub equilibria: Vec<Equilibrium>,
     /// How many starts the search had, some of them twice, and how many ended at an equilibrium.
     pub starts: [usize; 2],
+    /// The other positions asked for: all of them, those in which loops cannot be closed, and those that come
+    /// to a position among the starts.
+    pub asked: [usize; 3],
     /// What of the scene has no part in this.
     pub left_out: Vec<&'static str>,
 }
@@ -202,8 +205,8 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     }
     let start = mechanism.start(scene);
     let [first, _] = start.rounded();
-    let others = mechanism.other_assemblies(scene, starts);
-    let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST) } else { Vec::new() };
+    let (others, unassembled) = mechanism.other_assemblies(scene, starts);
+    let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST).0 } else { Vec::new() };
     let mut search = EquilibriumSearch::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
     if search.local.depends_on_time(&first) {
         return Err(ModesError::Forced);
@@ -242,6 +245,7 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
         degrees_of_freedom: freedom,
         equilibria,
         starts: count,
+        asked: [starts, unassembled, starts - unassembled - others.len()],
         left_out: left_out(scene).into_iter().chain(search.has_jump.then_some(JUMPS)).collect(),
     })
 }

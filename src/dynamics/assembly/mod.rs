@@ -152,8 +152,9 @@ impl Mechanism {
     }
 
     /// Other positions that close all rows at the start's time, of which that of the motors is one: angles
-    /// and translational coordinates of each, found from so many guesses of a fixed set.
-    pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> Vec<Vec<f64>> {
+    /// and translational coordinates of each, found from so many guesses of a fixed set; and from how many
+    /// of these no position was found.
+    pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> (Vec<Vec<f64>>, usize) {
         let start: Vec<DoubleDouble> = self.start(scene).phi;
         let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };
         let problem = AssemblyProblem { aims: Vec::new(), ..AssemblyProblem::new(self, scene, &[], &given) };
@@ -165,6 +166,7 @@ impl Mechanism {
             held: Vec::new(),
             is_of_family: false,
         }];
+        let mut unassembled = 0;
         for k in 1..=guesses {
             let mut q = problem.other_guess(&start, &all, k);
             if problem.descend(&mut q, &problem.active, &[], HOPEFUL) < NEARLY && problem.closes(&mut q, &[])
@@ -174,6 +176,8 @@ impl Mechanism {
                 if found.iter().all(|known| problem.differs(known, &other).is_some()) {
                     found.push(other);
                 }
+            } else {
+                unassembled += 1;
             }
         }
         let plain = |found: ClosedStart| {
@@ -184,7 +188,7 @@ impl Mechanism {
             self.wind(&mut q);
             q
         };
-        found.into_iter().skip(1).map(plain).collect()
+        (found.into_iter().skip(1).map(plain).collect(), unassembled)
     }
 
     /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where

@@ -103,6 +103,9 @@ pub struct PeriodicMotions {
     pub motions: Vec<PeriodicMotion>,
     /// How many starts the search had, and how many came to a periodic motion.
     pub starts: [usize; 2],
+    /// The other positions asked for: all of them, those in which loops cannot be closed, and those that come
+    /// to a position among the starts.
+    pub asked: [usize; 3],
     /// How many were left since small differences grow too far within a period.
     pub unstable: usize,
     /// How many came to an equilibrium of a scene that nothing drives, which has every period; none where
@@ -151,7 +154,9 @@ pub fn periodic(
     let mut at_rest = (!is_driven).then_some(0);
     let settled = shooting.settled(&first);
     let near = [Some(first.clone()), settled];
-    for (k, begin) in near.into_iter().chain(shooting.others(scene, starts)).enumerate() {
+    let (others, unassembled) = shooting.others(scene, starts);
+    let repeated = starts - unassembled - others.len();
+    for (k, begin) in near.into_iter().chain(others).enumerate() {
         let Some(begin) = begin else { continue };
         count[0] += 1;
         let Some(motion) = shooting.close(begin, k < 2 && found.is_empty(), freedom) else { continue };
@@ -178,6 +183,7 @@ pub fn periodic(
         period,
         motions: found,
         starts: count,
+        asked: [starts, unassembled, repeated],
         unstable: shooting.unstable,
         at_rest,
         left_out: if scene.events.is_empty() { Vec::new() } else { vec!["events"] },
@@ -402,14 +408,16 @@ impl Shooting<'_> {
         (0..SETTLING).try_fold(begin.clone(), |state, _| self.after(&state))
     }
 
-    /// Other states to begin with: at rest, and turning with the drives.
-    fn others(&mut self, scene: &Scene, starts: usize) -> Vec<Option<[Vec<f64>; 2]>> {
+    /// Other states to begin with, at rest and turning with the drives, and how many more could not be
+    /// assembled.
+    fn others(&mut self, scene: &Scene, starts: usize) -> (Vec<Option<[Vec<f64>; 2]>>, usize) {
         let laws = self.whole.constraints.iter().filter_map(|row| row.law.as_ref());
         let turning = laws.map(|law| law.rate).find(|rate| *rate != 0.0).unwrap_or(0.0);
         let bodies = self.whole.bodies.len();
         let rates = |rate: f64| (0..self.local.unit.len()).map(move |k| if k < bodies { rate } else { 0.0 });
-        let others = self.whole.other_assemblies(scene, starts).into_iter().enumerate();
-        others.map(|(k, phi)| Some([phi, rates(if k % 2 == 0 { turning } else { 0.0 }).collect()])).collect()
+        let (others, unassembled) = self.whole.other_assemblies(scene, starts);
+        let begin = |(k, phi)| Some([phi, rates(if k % 2 == 0 { turning } else { 0.0 }).collect()]);
+        (others.into_iter().enumerate().map(begin).collect(), unassembled)
     }
 
     /// True where nothing moves in a period.
