@@ -47,9 +47,7 @@ pub(super) struct TrustMeasurement {
     pub torque: Option<f64>,
     /// Impacts and lasting contacts of the run and of its reference at the last look, and at how many looks
     /// up to it their rates could not be compared.
-    #[serde(default)]
     events: [u64; 2],
-    #[serde(default)]
     untold: u32,
     /// The largest angle \[rad\], whole turns counted, or position over the longest bar, the largest rate
     /// \[rad/s\] and torque \[N·m\] seen: what their rounding is measured against.
