@@ -1,9 +1,10 @@
 //! Joints, locks and motors that events release and close, and events whose functions have corners, in many digits:
 //! against closed forms in integer arithmetic.
 
-use super::many_digits::{cosine, fixed, last, near, number, pi, shipped, source};
+use super::many_digits::{begun, cosine, fixed, last, near, number, pi, shipped, source};
 use driftless::arithmetic::Real;
 use driftless::run::digits::{Precision, ShownRow, long_run};
+use driftless::stepping::Cause;
 use num_bigint::BigInt;
 
 const DIGITS: usize = 60;
@@ -205,4 +206,25 @@ fn events_of_the_moment_at_which_a_lock_closes_happen() {
     }
     let names: Vec<_> = run.events().iter().map(|event| event.name.clone()).collect();
     assert_eq!((run.ended_by(), names), (Some("second"), vec!["caught".to_owned(), "second".into()]));
+}
+
+/// A lock that closes between two bars of a slider-crank whose crank a motor turns: no rates fit both, and the run
+/// ends at the event, as it does in doubles.
+#[test]
+fn a_lock_that_holds_what_a_motor_drives_stops_the_run_at_once() {
+    let text = r#"{"name": "press", "gravity": [0, -9.81],
+        "bars": [{"name": "crank", "mass": 1, "centre": [0.1, 0], "inertia": 0.01, "length": 0.2},
+            {"name": "rod", "mass": 1, "centre": [0.25, 0], "inertia": 0.03, "length": 0.5}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "crank", "point": [0.2, 0]}, {"body": "rod", "point": [0, 0]}]}],
+        "sliders": [{"name": "piston", "point": {"body": "rod", "point": [0.5, 0]},
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+        "motors": [{"name": "M", "body": "crank", "law": {"start": 1, "rate": 2}}],
+        "locks": [{"name": "brake", "body": "rod", "relative_to": "crank"}], "inactive": ["brake"],
+        "events": [{"name": "grips", "when": "t - 0.3", "on": ["brake"]}],
+        "start": {"rod": {"phi": -0.34}}, "until": 1, "every": 1}"#;
+    let mut run = begun(&source(text, &[], "1", "1"), 22);
+    let stop = run.row(1, &mut || false).expect_err("no rates fit");
+    assert!(stop.what.contains("an event closes brake, and leaves constraint "), "{stop:?}");
+    assert!((stop.t - 0.3).abs() < 1e-14 && stop.cause == Cause::Unsuited, "{stop:?}");
 }

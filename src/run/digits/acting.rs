@@ -218,7 +218,23 @@ impl<const W: usize> DigitsMotion<W> {
             }
         };
         let LongState { t, u, rate, .. } = &mut self.state;
-        keeper.project(&mechanism, *t, u, rate)
+        keeper.project(&mechanism, *t, u, rate)?;
+        let rates = self.residuals_and_rates().into_iter().map(|[_, rate]| rate.abs()).enumerate();
+        let Some((worst, left)) = rates.max_by(|(_, a), (_, b)| a.log2().total_cmp(&b.log2())) else {
+            return Ok(());
+        };
+        if left.log2() <= self.precision.rounding(SAME) {
+            return Ok(());
+        }
+        let [row, closed] = [worst, closing[0]].map(|r| &self.mechanism.structure.constraints[r]);
+        let left = about(left.value());
+        let what = format!(
+            "an event closes {}, and leaves constraint {} by {left} {}/s",
+            closed.name,
+            row.name,
+            row.unit()
+        );
+        Err(self.stop(Cause::Unsuited, 0.0, &what, "change rates along what the constraints allow"))
     }
 
     /// Kinetic and potential energy of the state \[J\].
