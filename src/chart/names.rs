@@ -38,8 +38,8 @@ fn cut_to(label: &str, fits: &impl Fn(&str) -> bool) -> String {
         return label.to_owned();
     }
     let letters = letters(label);
-    let cuts = (0..letters.len()).rev().map(|kept| cut(&letters, kept));
-    cuts.into_iter().find(|cut| fits(cut)).unwrap_or_else(|| "…".to_owned())
+    let mut cuts = (0..letters.len()).rev().map(|kept| cut(&letters, kept));
+    cuts.find(|cut| fits(cut)).unwrap_or_else(|| "…".to_owned())
 }
 
 fn apart(labels: &[&str], fits: &impl Fn(&str) -> bool) -> Vec<String> {

@@ -53,15 +53,20 @@ pub fn object(found: &Modes) -> Value {
     json!({
         "scene": found.scene.name,
         "degrees_of_freedom": found.degrees_of_freedom,
-        "starts": {
-            "tried": found.starts[0],
-            "settled": found.starts[1],
-            "asked": found.asked[0],
-            "unassembled": found.asked[1],
-            "repeated": found.asked[2],
-        },
+        "starts": starts(found.starts, found.asked),
         "equilibria": found.equilibria.iter().map(equilibrium).collect::<Vec<_>>(),
         "left_out": found.left_out,
+    })
+}
+
+/// What became of the starts of a search, and of the other positions asked for.
+pub(super) fn starts([tried, settled]: [usize; 2], [asked, unassembled, repeated]: [usize; 3]) -> Value {
+    json!({
+        "tried": tried,
+        "settled": settled,
+        "asked": asked,
+        "unassembled": unassembled,
+        "repeated": repeated,
     })
 }
 

@@ -4,7 +4,7 @@
 use super::drawing::MechanismDrawing;
 #[cfg(feature = "charts")]
 use super::modes::Charts;
-use super::modes::{by_coordinate, rounded, row, search};
+use super::modes::{by_coordinate, rounded, row, search, starts};
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{self, ChartError, FILE_RESOLUTION, MechanismChart, MotionGif, Multipliers, plain};
@@ -38,19 +38,14 @@ pub fn object(found: &PeriodicMotions) -> Value {
             "multipliers": one.multipliers,
         })
     };
+    let mut starts = starts(found.starts, found.asked);
+    starts["unstable"] = json!(found.unstable);
+    starts["at_rest"] = json!(found.at_rest.unwrap_or(0));
     json!({
         "scene": found.scene.name,
         "degrees_of_freedom": found.degrees_of_freedom,
         "period": found.period,
-        "starts": {
-            "tried": found.starts[0],
-            "settled": found.starts[1],
-            "asked": found.asked[0],
-            "unassembled": found.asked[1],
-            "repeated": found.asked[2],
-            "unstable": found.unstable,
-            "at_rest": found.at_rest.unwrap_or(0),
-        },
+        "starts": starts,
         "periodic_motions": found.motions.iter().map(motion).collect::<Vec<_>>(),
         "left_out": found.left_out,
     })

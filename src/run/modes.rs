@@ -205,7 +205,7 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     }
     let start = mechanism.start(scene);
     let [first, _] = start.rounded();
-    let (others, unassembled) = mechanism.other_assemblies(scene, starts);
+    let (others, asked) = mechanism.other_assemblies(scene, starts);
     let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST).0 } else { Vec::new() };
     let mut search = EquilibriumSearch::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
     if search.local.depends_on_time(&first) {
@@ -245,7 +245,7 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
         degrees_of_freedom: freedom,
         equilibria,
         starts: count,
-        asked: [starts, unassembled, starts - unassembled - others.len()],
+        asked,
         left_out: left_out(scene).into_iter().chain(search.has_jump.then_some(JUMPS)).collect(),
     })
 }

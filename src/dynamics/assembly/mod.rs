@@ -152,9 +152,9 @@ impl Mechanism {
     }
 
     /// Other positions that close all rows at the start's time, of which that of the motors is one: angles
-    /// and translational coordinates of each, found from so many guesses of a fixed set; and from how many
-    /// of these no position was found.
-    pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> (Vec<Vec<f64>>, usize) {
+    /// and translational coordinates of each, found from so many guesses of a fixed set; and how many guesses
+    /// there were, how many led to no position, and how many to one that was known.
+    pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> (Vec<Vec<f64>>, [usize; 3]) {
         let start: Vec<DoubleDouble> = self.start(scene).phi;
         let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };
         let problem = AssemblyProblem { aims: Vec::new(), ..AssemblyProblem::new(self, scene, &[], &given) };
@@ -188,7 +188,9 @@ impl Mechanism {
             self.wind(&mut q);
             q
         };
-        (found.into_iter().skip(1).map(plain).collect(), unassembled)
+        let others: Vec<Vec<f64>> = found.into_iter().skip(1).map(plain).collect();
+        let repeated = guesses - unassembled - others.len();
+        (others, [guesses, unassembled, repeated])
     }
 
     /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where

@@ -154,9 +154,8 @@ pub fn periodic(
     let mut at_rest = (!is_driven).then_some(0);
     let settled = shooting.settled(&first);
     let near = [Some(first.clone()), settled];
-    let (others, unassembled) = shooting.others(scene, starts);
-    let repeated = starts - unassembled - others.len();
-    for (k, begin) in near.into_iter().chain(others).enumerate() {
+    let (others, asked) = shooting.others(scene, starts);
+    for (k, begin) in near.into_iter().chain(others.into_iter().map(Some)).enumerate() {
         let Some(begin) = begin else { continue };
         count[0] += 1;
         let Some(motion) = shooting.close(begin, k < 2 && found.is_empty(), freedom) else { continue };
@@ -183,7 +182,7 @@ pub fn periodic(
         period,
         motions: found,
         starts: count,
-        asked: [starts, unassembled, repeated],
+        asked,
         unstable: shooting.unstable,
         at_rest,
         left_out: if scene.events.is_empty() { Vec::new() } else { vec!["events"] },
@@ -408,16 +407,16 @@ impl Shooting<'_> {
         (0..SETTLING).try_fold(begin.clone(), |state, _| self.after(&state))
     }
 
-    /// Other states to begin with, at rest and turning with the drives, and how many more could not be
-    /// assembled.
-    fn others(&mut self, scene: &Scene, starts: usize) -> (Vec<Option<[Vec<f64>; 2]>>, usize) {
+    /// Other states to begin with, at rest and turning with the drives, and what became of the positions
+    /// asked for, as [`Mechanism::other_assemblies`] tells it.
+    fn others(&mut self, scene: &Scene, starts: usize) -> (Vec<[Vec<f64>; 2]>, [usize; 3]) {
         let laws = self.whole.constraints.iter().filter_map(|row| row.law.as_ref());
         let turning = laws.map(|law| law.rate).find(|rate| *rate != 0.0).unwrap_or(0.0);
         let bodies = self.whole.bodies.len();
         let rates = |rate: f64| (0..self.local.unit.len()).map(move |k| if k < bodies { rate } else { 0.0 });
-        let (others, unassembled) = self.whole.other_assemblies(scene, starts);
-        let begin = |(k, phi)| Some([phi, rates(if k % 2 == 0 { turning } else { 0.0 }).collect()]);
-        (others.into_iter().enumerate().map(begin).collect(), unassembled)
+        let (others, asked) = self.whole.other_assemblies(scene, starts);
+        let begin = |(k, phi)| [phi, rates(if k % 2 == 0 { turning } else { 0.0 }).collect()];
+        (others.into_iter().enumerate().map(begin).collect(), asked)
     }
 
     /// True where nothing moves in a period.
