@@ -40,7 +40,8 @@ fn points_of_a_comparison_tell_their_settings() {
     tab.mouse(place, false);
     let told = tab.eval("driftless.charts[0].tip.hidden ? '' : driftless.charts[0].tip.textContent");
     let told = told.as_str().expect("words").to_owned();
-    assert!(told.contains("dp5") && told.contains("driftless run free.json --method dp5 --rtol"), "{told}");
+    let command = format!("driftless run {scene} --method dp5 --rtol");
+    assert!(told.contains("dp5") && told.contains(&command), "{told}: {command}");
     tab.mouse(place, true);
     let row = tab.eval("document.querySelector('#table tr.chosen td').textContent");
     let label = row.as_str().expect("a row").trim_start_matches("* ").to_owned();
