@@ -27,6 +27,7 @@ mod batch;
 mod batch_couplings;
 mod batch_loops;
 mod benchmarks;
+mod bounces_beside_friction;
 mod breaking_away;
 mod chains;
 mod contact;

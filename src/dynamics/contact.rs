@@ -12,6 +12,7 @@
 //! hardest and dropping those that would be pulled (C. Lawson, R. Hanson, *Solving Least Squares Problems*
 //! (1974), chapter 23).
 
+pub mod bounces;
 pub mod metric;
 pub mod scale;
 

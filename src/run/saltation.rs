@@ -418,9 +418,9 @@ fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Delta) -> Re
     let new: Vec<usize> =
         mechanism.held.iter().copied().filter(|contact| !before.held.contains(contact)).collect();
     // Bounces that are left out matter to friction alone, and neighbours must make them as well.
-    let flights = |of: &Mechanism, motion: &Motion| match of.sliding().next() {
-        Some(_) => Flight::all(of, &new, motion),
-        None => Vec::new(),
+    let flights = |of: &Mechanism, motion: &Motion| match of.frictions.is_empty() {
+        false => Flight::all(of, &new, motion),
+        true => Vec::new(),
     };
     let rates = |of: &Arc<Mechanism>, motion: &Motion| {
         let mut after = motion.clone();

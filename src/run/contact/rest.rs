@@ -17,14 +17,18 @@
 //! ```text
 //! Δw = (a_flight - a_held) T, the constraints kept,   Δq = -T Δw / 2        T: how long all bounces last
 //! ```
+//!
+//! Where a place with friction turns in flight, or that of the wall within an impact, bounces are followed
+//! one by one ([`bounces`](crate::dynamics::contact::bounces)), and a_flight is the mean of all.
 
 use super::super::running::Outcome;
 use super::impacts::PresentState;
 use super::{ContactDriver, NO_SPEED, in_modes};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::constraint::ConstraintArguments;
+use crate::dynamics::contact::bounces::{self, Bounced, Bouncing, Course, FlightMoment, MotionRates};
 use crate::dynamics::contact::metric::MetricRow;
-use crate::dynamics::friction::{FrictionMode, FrictionMoment, Normal};
+use crate::dynamics::friction::{CompiledFriction, FrictionMode, FrictionMoment, Normal, Transition};
 use crate::dynamics::impact::Contact;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -37,38 +41,44 @@ const LEAVING: f64 = 1e3;
 /// it is made of, up to which its path touches the wall: it goes behind it by half the square of that.
 const GRAZING: f64 = 1e-7;
 
+/// Impulse over that of an impact from which on it takes part in it.
+const LEAST_PART: f64 = 1e-9;
+
+/// Part of a rebound down to which bounces are followed: rates have the digits for it.
+const FOLLOWED: f64 = 1e-4;
+
 /// A motion between bounces that are left out.
 pub(in crate::run) struct Flight {
     /// The wall.
     pub contact: usize,
     /// How long all of them last \[s\].
     pub last: f64,
-    /// How it goes on from the first.
-    course: Course,
+    /// How the state changes from the first on, the mean of all where they differ.
+    rates: MotionRates<f64>,
+    /// How far the coordinates are at the end from where the rates there had brought them, where bounces were
+    /// followed one by one.
+    behind: Option<Vec<f64>>,
 }
 
-/// Accelerations of all coordinates, power \[W\], and power that friction takes \[W\].
-struct Course {
-    accelerations: Vec<f64>,
-    power: f64,
-    lost: f64,
+/// How a motion changes.
+fn rates(mechanism: &Mechanism, motion: &Motion) -> MotionRates<f64> {
+    let [phi, omega] = motion.rounded();
+    rates_at(mechanism, motion.time, &phi, &omega)
 }
 
-impl Course {
-    fn of(mechanism: &Mechanism, motion: &Motion) -> Self {
-        let [phi, omega] = motion.rounded();
-        let mut kernel = Kernel::<f64>::new(mechanism);
-        kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
-        let (power, _) = kernel.powers(mechanism, motion.time, &phi, &omega);
-        let lost = kernel.friction_power(&omega);
-        Self { accelerations: kernel.load[..phi.len()].to_vec(), power, lost }
-    }
+/// The same at a time, of coordinates and rates.
+fn rates_at(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> MotionRates<f64> {
+    let mut kernel = Kernel::<f64>::new(mechanism);
+    kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
+    let (power, _) = kernel.powers(mechanism, t, phi, omega);
+    let lost = kernel.friction_power(omega);
+    MotionRates { accelerations: kernel.load[..phi.len()].to_vec(), power, lost }
+}
 
-    /// Acceleration of a point towards its wall \[m/s²\].
-    fn inward(&self, wall: &Contact, t: Time, at: ConstraintArguments<f64>) -> f64 {
-        let MetricRow { row, along } = MetricRow::of(&wall.row, t, at);
-        -(dot(&along, &self.accelerations) + row.convective)
-    }
+/// Acceleration of a point towards its wall \[m/s²\], of all coordinates.
+fn inward(accelerations: &[f64], wall: &Contact, t: Time, at: ConstraintArguments<f64>) -> f64 {
+    let MetricRow { row, along } = MetricRow::of(&wall.row, t, at);
+    -(dot(&along, accelerations) + row.convective)
 }
 
 impl Flight {
@@ -93,14 +103,101 @@ impl Flight {
                 *mode = FrictionMode::Open;
             }
         }
-        let course = Course::of(&held.moving(&others, &modes), motion);
+        let flying = FlyingPoint { held, contact, t: motion.time, others: &others };
+        if let Some(bounced) = flying.bounced([&phi, &omega], &modes) {
+            let rates = bounced.mean(&omega);
+            return Some(Self { contact, last: bounced.last, rates, behind: Some(bounced.behind) });
+        }
+        let rates = rates(&held.moving(&others, &modes), motion);
         let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
-        let inward = course.inward(wall, motion.time, at);
+        let inward = inward(&rates.accelerations, wall, motion.time, at);
         let last = 2.0 * speed / (inward * (1.0 - wall.restitution));
         // Others at their limits may not share the load without it.
         let at = FrictionMoment { t: motion.time, phi: &phi, z: &z, omega: &omega };
         let is_motion = inward > 0.0 && last.is_finite() && held.hold_so(at, &others, &modes);
-        is_motion.then_some(Self { contact, last, course })
+        is_motion.then_some(Self { contact, last, rates, behind: None })
+    }
+
+    /// How the mechanism moves that holds the point at once, halfway to the end of the bounces.
+    fn beside(&self, held: &Mechanism, motion: &Motion, closed: &[f64]) -> MotionRates<f64> {
+        let ([mut phi, mut omega], Self { last, rates, .. }) = (motion.rounded(), self);
+        let first = rates_at(held, motion.time, &phi, closed).accelerations;
+        for (k, (phi, omega)) in phi.iter_mut().zip(&mut omega).enumerate() {
+            let end = *omega + rates.accelerations[k] * last;
+            *phi += 0.5 * last * (end - 0.75 * last * first[k]);
+            *omega = end - 0.5 * last * first[k];
+        }
+        rates_at(held, motion.time + 0.5 * last, &phi, &omega)
+    }
+}
+
+/// A mechanism of which a point bounces on its wall, others held.
+struct FlyingPoint<'a> {
+    held: &'a Mechanism,
+    contact: usize,
+    t: Time,
+    others: &'a [usize],
+}
+
+impl FlyingPoint<'_> {
+    /// All bounces of a motion, where they are not alike: see [`bounces::all`].
+    fn bounced(&self, [phi, omega]: [&[f64]; 2], modes: &[FrictionMode]) -> Option<Bounced<f64>> {
+        if self.held.frictions.is_empty() {
+            return None;
+        }
+        let start = FlightMoment { late: 0.0, phi: phi.to_vec(), omega: omega.to_vec() };
+        bounces::all(self, start, modes, self.held.contacts[self.contact].restitution, FOLLOWED)
+    }
+}
+
+impl Bouncing<f64> for FlyingPoint<'_> {
+    fn rebound(&self, FlightMoment { late, phi, omega }: &FlightMoment<f64>) -> f64 {
+        let z = self.held.elements(phi);
+        self.held.contacts[self.contact].gap_rate(self.t + *late, phi, &z, omega)
+    }
+
+    fn modes(
+        &self,
+        FlightMoment { late, phi, omega }: &FlightMoment<f64>,
+        before: &[FrictionMode],
+        transition: Transition,
+    ) -> Option<Vec<FrictionMode>> {
+        let z = self.held.elements(phi);
+        let at = FrictionMoment { t: self.t + *late, phi, z: &z, omega };
+        let (closed, modes) = self.held.modes_at(at, before, [self.others, self.others], transition).ok()?;
+        (closed == self.others).then_some(modes)
+    }
+
+    fn course(
+        &self,
+        FlightMoment { late, phi, omega }: &FlightMoment<f64>,
+        modes: &[FrictionMode],
+    ) -> Option<Course<f64>> {
+        let (t, z) = (self.t + *late, self.held.elements(phi));
+        let rates = rates_at(&self.held.moving(self.others, modes), t, phi, omega);
+        let accelerations = &rates.accelerations;
+        let at = ConstraintArguments { phi, z: &z, omega };
+        let inward = inward(accelerations, &self.held.contacts[self.contact], t, at);
+        let sliding = |friction: &CompiledFriction| {
+            let MetricRow { row, along } = MetricRow::of(&friction.tangent, t, at);
+            [dot(&along, omega) + row.drive, dot(&along, accelerations) + row.convective]
+        };
+        let sliding = self.held.frictions.iter().map(sliding).collect();
+        let is_finite = accelerations.iter().all(|a| a.is_finite());
+        is_finite.then_some(Course { rates, inward, sliding })
+    }
+
+    fn strike(&self, FlightMoment { late, phi, omega }: &FlightMoment<f64>) -> Option<(Vec<f64>, f64)> {
+        let open = vec![FrictionMode::Open; self.held.frictions.len()];
+        let striking = self.held.moving(self.others, &open);
+        let impact = striking.impact_at(self.contact, self.t + *late, phi, omega)?;
+        // What is pulled would be let go, and what rubs takes part.
+        let takes_part = |(&other, &pull): (&usize, &f64)| {
+            pull.abs() > LEAST_PART * impact.impulse && (pull > 0.0 || striking.friction_at(other).is_some())
+        };
+        let mut others = striking.held.iter().zip(&impact.row_impulses[striking.standing_rows()..]);
+        let is_alone = !others.any(takes_part);
+        is_alone.then_some((impact.omega, impact.motor_work))
     }
 }
 
@@ -115,7 +212,8 @@ pub(in crate::run) fn come_to_rest(
     motion: &mut Motion,
 ) -> Option<()> {
     let is_new = |normal| matches!(normal, Normal::Contact(contact) if new.contains(&contact));
-    let flights = if held.sliding().any(|(friction, _)| !is_new(friction.normal)) { flights } else { &[] };
+    let rubs = held.sliding().any(|(friction, _)| !is_new(friction.normal));
+    let flights: Vec<&Flight> = flights.iter().filter(|flight| rubs || flight.behind.is_some()).collect();
     let [phi, omega] = motion.rounded();
     let t = motion.time;
     let close = |omega: &[f64]| held.without_normal_rates(t, &phi, omega);
@@ -125,16 +223,21 @@ pub(in crate::run) fn come_to_rest(
         return Some(());
     }
     let (mut turned, mut rates) = (vec![0.0; omega.len()], closed.clone());
-    let at_once = Course::of(held, motion);
+    let at_once = self::rates(held, motion);
     for flight in flights {
-        let (last, flown) = (flight.last, &flight.course);
+        let (last, flown) = (flight.last, &flight.rates);
+        let beside = flight.behind.is_some().then(|| flight.beside(held, motion, &closed));
+        let at_once = beside.as_ref().unwrap_or(&at_once);
         let changes = flown.accelerations.iter().zip(&at_once.accelerations);
         let changed: Vec<f64> =
             omega.iter().zip(changes).map(|(omega, (flown, held))| omega + (flown - held) * last).collect();
         let (flown_rates, flown_work) = close(&changed)?;
         for (k, flown) in flown_rates.into_iter().enumerate() {
             rates[k] += flown - closed[k];
-            turned[k] -= 0.5 * last * (flown - closed[k]);
+            turned[k] += match &flight.behind {
+                Some(behind) => behind[k] + 0.5 * at_once.accelerations[k] * last * last,
+                None => -(0.5 * last * (flown - closed[k])),
+            };
         }
         motion.work += DoubleDouble::from((flown.power - at_once.power) * last + flown_work - work);
         motion.friction += (flown.lost - at_once.lost) * last;
@@ -192,11 +295,12 @@ impl ContactDriver {
         }
         let motion = self.motion();
         let PresentState { t, z, phi, omega } = self.present_state();
-        let course = Course::of(&in_modes(&self.free, held, modes), &motion);
+        let rates = rates(&in_modes(&self.free, held, modes), &motion);
         touching.iter().copied().find(|contact| {
             let wall = &self.free.contacts[*contact];
             let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
-            let (speed, inward) = (wall.gap_rate(t, &phi, &z, &omega), course.inward(wall, t, at));
+            let (speed, inward) =
+                (wall.gap_rate(t, &phi, &z, &omega), inward(&rates.accelerations, wall, t, at));
             !still.contains(contact) && wall.rebounds_low([speed, inward], self.rest_height)
         })
     }

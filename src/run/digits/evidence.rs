@@ -28,7 +28,7 @@ const LATER: f64 = 1.5 * A_MOMENT;
 pub(super) struct InDigits<'a, const W: usize> {
     motion: &'a DigitsMotion<W>,
     /// Time \[s\].
-    t: Digits<W>,
+    pub t: Digits<W>,
     /// All coordinates.
     pub posture: DigitsCoordinates<W>,
     z: Vec<Complex<Digits<W>>>,
@@ -43,7 +43,13 @@ impl<'a, const W: usize> InDigits<'a, W> {
         Self::at(motion, motion.state.t, motion.state_posture(), motion.precision.rounding(SURE))
     }
 
-    fn at(motion: &'a DigitsMotion<W>, t: Digits<W>, posture: DigitsCoordinates<W>, rounding: f64) -> Self {
+    /// What is known of another time and other coordinates.
+    pub fn at(
+        motion: &'a DigitsMotion<W>,
+        t: Digits<W>,
+        posture: DigitsCoordinates<W>,
+        rounding: f64,
+    ) -> Self {
         let mechanism = &motion.mechanism;
         let z = mechanism.elements(&posture.phi);
         let anchor = |(friction, mode): (&CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| match mode {

@@ -5,17 +5,21 @@
 //! what is rounding in three quarters of the digits is zero.  Whether a place is held by the others, a matter
 //! of geometry, is told in doubles.  A place that sticks is a row like any other, the last ones.
 
+use super::bounces;
 use super::evidence::{InDigits, gradient, second};
 use super::keep::DigitsKeeper;
 use super::motion::{DigitsMotion, LongState};
 use super::posture::DigitsCoordinates;
+use super::resting;
 use super::wall::{GapRate, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::Time;
 use crate::dynamics::compile::exact::Acting;
+use crate::dynamics::contact::bounces::MotionRates;
 use crate::dynamics::friction::evidence::Evidence;
-use crate::dynamics::friction::paradox::HINT;
+use crate::dynamics::friction::modes::Modes;
+use crate::dynamics::friction::paradox::{HINT, Paradox};
 use crate::dynamics::friction::{self, FrictionMode, FrictionMoment, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
@@ -80,8 +84,8 @@ pub fn mode_from_words<const W: usize>(
     }
 }
 
-/// How long bounces last \[s\], and the motion between them.
-type Flight<const W: usize> = (Digits<W>, Series<Digits<W>>);
+/// How long bounces last that are left out \[s\], and how the state changes, the mean of all where they differ.
+type Flight<const W: usize> = (Digits<W>, MotionRates<Digits<W>>);
 
 /// What a motion between bounces that are left out has that one on the wall has not: normal forces of other
 /// places, and their friction with them, are others.
@@ -96,6 +100,14 @@ pub(super) struct Flown<const W: usize> {
 
 /// Walls that hold a point, and what places with friction do.
 pub(super) type Decided<const W: usize> = (Vec<usize>, Vec<FrictionMode<Digits<W>>>);
+
+/// How the state changes where a series begins.
+pub(super) fn first_powers<const W: usize>(series: &Series<Digits<W>>) -> MotionRates<Digits<W>> {
+    let n = series.elements();
+    let first = |of: &[Digits<W>]| of.first().copied().unwrap_or(Digits::ZERO);
+    let accelerations = series.omega[n..2 * n].to_vec();
+    MotionRates { accelerations, power: first(&series.power), lost: first(series.lost()) }
+}
 
 impl<const W: usize> DigitsMotion<W> {
     /// True where there is dry friction.
@@ -114,22 +126,23 @@ impl<const W: usize> DigitsMotion<W> {
         structure.energy_scale / structure.displacement_unit(place)
     }
 
-    /// What is told in doubles of the present moment.
+    /// What is told in doubles of a moment.
     fn seen_in_doubles<R>(
         &self,
+        t: Digits<W>,
         posture: &DigitsCoordinates<W>,
         tell: impl FnOnce(FrictionMoment) -> R,
     ) -> R {
         let in_doubles = |x: &[Digits<W>]| -> Vec<f64> { x.iter().map(|x| x.value()).collect() };
         let (phi, omega) = (in_doubles(&posture.phi), in_doubles(&posture.omega));
         let z = self.mechanism.structure.elements(&phi);
-        tell(FrictionMoment { t: Time::from(self.state.t.value()), phi: &phi, z: &z, omega: &omega })
+        tell(FrictionMoment { t: Time::from(t.value()), phi: &phi, z: &z, omega: &omega })
     }
 
     /// True where motors and locks hold a place, whose velocity friction has no part in.
     pub(super) fn is_driven(&self, place: usize) -> bool {
         let structure = &self.mechanism.structure;
-        self.seen_in_doubles(&self.state_posture(), |at| structure.is_driven(at, place))
+        self.seen_in_doubles(self.state.t, &self.state_posture(), |at| structure.is_driven(at, place))
     }
 
     /// The walls that hold a point and the modes of all places from the present moment on; of walls those
@@ -142,9 +155,7 @@ impl<const W: usize> DigitsMotion<W> {
         let (evidence, structure) = (InDigits::of(self), &self.mechanism.structure);
         let before: Vec<FrictionMode> =
             self.state.acting.sliding.iter().map(FrictionMode::in_doubles).collect();
-        let found = self.seen_in_doubles(&evidence.posture, |at| {
-            structure.modes_by(&evidence, at, &before, contacts, transition)
-        });
+        let found = self.modes_by(&evidence, &before, contacts, transition);
         let (walls, modes) = found.map_err(|paradox| {
             let places: Vec<&str> =
                 structure.frictions.iter().map(|friction| friction.name.as_str()).collect();
@@ -152,6 +163,19 @@ impl<const W: usize> DigitsMotion<W> {
         })?;
         let modes = evidence.exact(&modes);
         Ok((walls, modes))
+    }
+
+    /// The same at a moment of which this is known.
+    pub(super) fn modes_by(
+        &self,
+        evidence: &InDigits<W>,
+        before: &[FrictionMode],
+        contacts: [&[usize]; 2],
+        transition: Transition,
+    ) -> Result<Modes, Paradox> {
+        self.seen_in_doubles(evidence.t, &evidence.posture, |at| {
+            self.mechanism.structure.modes_by(evidence, at, before, contacts, transition)
+        })
     }
 
     /// Decides anew what sticks and what slides, and which walls hold a point: those that do so, or others
@@ -175,9 +199,17 @@ impl<const W: usize> DigitsMotion<W> {
             self.state.acting.held.contains(&wall)
                 || !self.is_off(row)
                     && !contact.is_dead(dot(&gap.gradient, &gap.gradient).value())
-                    && self.follows(wall, distance(self, row))
+                    && self.stands_at(wall, distance(self, row))
         };
         (0..self.mechanism.walls.len()).filter(touches).collect()
+    }
+
+    /// True where the point of a wall is on it and moves with it, not at the top of a rebound that is to be
+    /// followed.
+    fn stands_at(&self, wall: usize, gap: Digits<W>) -> bool {
+        let length = libm::log2(self.mechanism.structure.contacts[wall].length);
+        let is_low = gap < Digits::ZERO || gap.log2() - length <= resting::least(self, wall) - 1.0;
+        is_low && self.follows(wall, gap)
     }
 
     /// The same with walls that would hold a point without friction, and those that touch.
@@ -216,13 +248,16 @@ impl<const W: usize> DigitsMotion<W> {
             if flies(friction.normal) { FrictionMode::Open } else { mode.in_doubles() }
         };
         let modes: Vec<FrictionMode> = self.mechanism.frictions.iter().zip(modes).map(mode).collect();
+        if let Some(bounced) = bounces::all(self, wall, &others, &modes) {
+            return Some((bounced.last, bounced.mean(&evidence.posture.omega)));
+        }
         let mechanism = evidence.mechanism(&others, &modes)?;
         let series = evidence.series(&mechanism);
         let inward = -second(&series, self.state.t, &mechanism.walls[wall].0);
         let last = speed.scale(2.0) / (inward * (Digits::ONE - restitution));
         // Others at their limits may not share the load without it.
         let is_motion = inward > Digits::ZERO && evidence.hold_so(&others, &modes);
-        is_motion.then_some((last, series))
+        is_motion.then(|| (last, first_powers(&series)))
     }
 
     /// What flights change while bounces last, beside what is so where these walls hold their points at once.
@@ -237,15 +272,15 @@ impl<const W: usize> DigitsMotion<W> {
         let evidence = InDigits::of(self);
         let modes: Vec<FrictionMode> = modes.iter().map(FrictionMode::in_doubles).collect();
         let held = evidence.series(&evidence.mechanism(walls, &modes)?);
-        let n = held.elements();
-        let first = |of: &[Digits<W>]| of.first().copied().unwrap_or(Digits::ZERO);
-        let nothing = Flown { change: vec![Digits::ZERO; n], work: Digits::ZERO, lost: Digits::ZERO };
+        let held = first_powers(&held);
+        let change = vec![Digits::ZERO; held.accelerations.len()];
+        let nothing = Flown { change, work: Digits::ZERO, lost: Digits::ZERO };
         Some(flights.fold(nothing, |mut flown, (last, flight)| {
-            let accelerations = flight.omega[n..2 * n].iter().zip(&held.omega[n..2 * n]);
+            let accelerations = flight.accelerations.iter().zip(&held.accelerations);
             let changes = flown.change.iter_mut().zip(accelerations);
             changes.for_each(|(change, (&flies, &is_held))| *change += (flies - is_held) * *last);
-            flown.work += (first(&flight.power) - first(&held.power)) * *last;
-            flown.lost += (first(flight.lost()) - first(held.lost())) * *last;
+            flown.work += (flight.power - held.power) * *last;
+            flown.lost += (flight.lost - held.lost) * *last;
             flown
         }))
     }

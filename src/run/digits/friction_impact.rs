@@ -8,7 +8,8 @@
 use super::evidence::gradient;
 use super::friction::SURE;
 use super::keep::DigitsKeeper;
-use super::motion::DigitsMotion;
+use super::motion::{DigitsMotion, LongState};
+use super::posture::DigitsCoordinates;
 use super::resting;
 use super::several::Meeting;
 use super::wall::{GapRate, ImpulseJump, work_of_rows};
@@ -59,16 +60,31 @@ pub(super) fn alone<const W: usize>(
     }
 }
 
+/// A jump, and the impulses of the constraints over that of the wall.
+type Jump<const W: usize> = (Option<ImpulseJump<W>>, Vec<Digits<W>>);
+
 /// The jump, and the impulses of the constraints over that of the wall; where no impulses fit, those for a
 /// normal impulse alone.
 fn jump<const W: usize>(
     motion: &DigitsMotion<W>,
     wall: usize,
+    gap: &GapRate<W>,
+) -> Result<Jump<W>, StepError> {
+    let LongState { t, acting, .. } = motion.state();
+    jump_at(motion, (*t, &motion.state_posture()), &acting.held, wall, gap)
+}
+
+/// The same at another time and other coordinates, while these walls hold points.
+pub(super) fn jump_at<const W: usize>(
+    motion: &DigitsMotion<W>,
+    (t, posture): (Digits<W>, &DigitsCoordinates<W>),
+    held: &[usize],
+    wall: usize,
     GapRate { gradient: normal, travel, rate }: &GapRate<W>,
-) -> Result<(Option<ImpulseJump<W>>, Vec<Digits<W>>), StepError> {
-    let (t, posture) = (motion.state().t, motion.state_posture());
+) -> Result<Jump<W>, StepError> {
     let sliding = vec![FrictionMode::Open; motion.mechanism.frictions.len()];
-    let striking = motion.mechanism.with(Acting { sliding, ..motion.state().acting.clone() });
+    let acting = Acting { held: held.to_vec(), sliding, ..motion.state().acting.clone() };
+    let striking = motion.mechanism.with(acting);
     let striking = striking.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
     let mut keeper = DigitsKeeper::new(&striking, motion.precision);
     let at = [&posture.phi[..], &posture.omega[..]];
@@ -78,7 +94,7 @@ fn jump<const W: usize>(
     let Some(friction) = motion.mechanism.frictions.iter().find(is_here) else {
         let impulse = -(Digits::ONE + restitution) * *rate / dot(normal, &response);
         let change = response.iter().map(|&a| a * impulse).collect();
-        let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
+        let work = impulse * (*travel + work_of_rows(&striking, t, posture, &pulls));
         return Ok((Some(ImpulseJump { change, work, walls: 1 }), pulls));
     };
     let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
@@ -107,6 +123,6 @@ fn jump<const W: usize>(
     let ratio = tangential / impulse;
     let pulls: Vec<_> =
         pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
-    let work = impulse * (*travel + work_of_rows(&striking, t, &posture, &pulls));
+    let work = impulse * (*travel + work_of_rows(&striking, t, posture, &pulls));
     Ok((Some(ImpulseJump { change, work, walls: 1 }), pulls))
 }

@@ -5,6 +5,7 @@
 //! digits they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
 mod acting;
+mod bounces;
 mod branches;
 mod confirm;
 mod events;

@@ -120,7 +120,7 @@ fn sure<const W: usize>(motion: &DigitsMotion<W>) -> f64 {
 }
 
 /// log2 of the height, over the length of its contact, that a point has to rebound to.
-fn least<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> f64 {
+pub(super) fn least<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> f64 {
     let lost = 1.0 - motion.mechanism.walls[wall].1.value();
     let sums = if lost > 0.0 { 2.0 * libm::log2(0.5 * lost) } else { f64::NEG_INFINITY };
     (motion.precision.tolerance() + sums).max(ABOVE - motion.precision.bits as f64)

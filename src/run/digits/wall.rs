@@ -285,7 +285,16 @@ fn no_way_back<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> StepErr
 /// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap
 /// \[m/s\].
 pub(super) fn gap_rate<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> GapRate<W> {
-    let (t, posture) = (motion.state.t, motion.state_posture());
+    gap_rate_at(motion, wall, motion.state.t, &motion.state_posture())
+}
+
+/// The same at another time and other coordinates.
+pub(super) fn gap_rate_at<const W: usize>(
+    motion: &DigitsMotion<W>,
+    wall: usize,
+    t: Digits<W>,
+    posture: &DigitsCoordinates<W>,
+) -> GapRate<W> {
     let z = motion.mechanism.elements(&posture.phi);
     let row = &motion.mechanism.walls[wall].0;
     let mut gradient = vec![Digits::ZERO; posture.phi.len()];
