@@ -524,6 +524,35 @@ fn painleves_paradox_is_named() {
     }
 }
 
+/// On a rail, which pulls as well as it presses, no force fits from the same coefficient on, whichever sign it is
+/// given: N (1 + 3 cos² - 3 mu sin |cos|) = m g with friction by N > 0, and + with that by N < 0.
+#[test]
+fn on_a_rail_the_paradox_is_named_as_well() {
+    for phi in [1.1_f64, 0.9, 1.35] {
+        let critical = (1.0 + 3.0 * phi.cos().powi(2)) / (3.0 * phi.sin() * phi.cos());
+        for (share, speed) in [(1.0 - 1e-7, -1.0), (1.0 + 1e-7, -1.0), (1.5, -1.0), (1.5, 1.0)] {
+            let mu = critical * share;
+            let text = format!(
+                r#"{{"name": "rod", "gravity": [0, -{G}],
+                "bars": [{{"name": "rod", "mass": 1, "centre": [0.5, 0], "inertia": {}, "length": 1}}],
+                "sliders": [{{"name": "s", "point": {{"body": "rod", "point": [0, 0]}}, "friction": {{"kinetic": {mu}}},
+                    "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}}}],
+                "start": {{"rod": {{"phi": {phi}, "omega": 0, "origin": [0, 0], "velocity": [{speed}, 0]}}}},
+                "until": 1e-12, "every": 1e-12}}"#,
+                1.0 / 12.0
+            );
+            let is_paradox = speed < 0.0 && share > 1.0;
+            for request in methods() {
+                let said = run(&scene(&text), &request).stop.map(|stop| stop.what);
+                let is_named = said.as_ref().is_some_and(|said| said.contains("inconsistent"));
+                assert_eq!((is_named, said.is_none()), (is_paradox, !is_paradox), "{phi} {share}: {said:?}");
+            }
+            #[cfg(feature = "digits")]
+            assert_eq!(super::many_digits_friction::goes_on(&text, "1e-12"), !is_paradox, "{phi} {share}");
+        }
+    }
+}
+
 /// Where 1 + 3 cos² = 3 mu sin |cos| the pressure on a uniform rod that is pushed over the floor grows without
 /// bound; the least such coefficient is 4/3, where tan phi = 2.
 #[test]

@@ -32,6 +32,11 @@ fn tried(text: &str, until: &str, digits: usize) -> Result<Ran, StepError> {
     Ok(Ran { row, turns: run.turns(), impacts: run.counts()[1] })
 }
 
+/// True where a run in many digits comes to its end.
+pub fn goes_on(text: &str, until: &str) -> bool {
+    tried(text, until, 30).is_ok()
+}
+
 #[track_caller]
 fn ran(text: &str, until: &str, digits: usize) -> Ran {
     let ran = tried(text, until, digits).unwrap_or_else(|stop| panic!("{stop}\n{text}"));

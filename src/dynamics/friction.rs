@@ -29,6 +29,7 @@ pub mod simultaneous;
 pub use modes::{FrictionMoment, Transition};
 pub use paradox::Paradox;
 
+use self::paradox::JAMMED;
 use super::Mechanism;
 use super::compile::{CompileError, Joint};
 use super::constraint::{self, ConstraintEquation, RowMeasure};
@@ -44,6 +45,11 @@ const ROUNDS: usize = 40;
 const MORE_ROUNDS: usize = 3;
 /// The same of many digits: each step doubles them.
 const MOST_ROUNDS: usize = 9;
+
+/// What is left of the equations of friction after all steps, over their forces, where they have no solution.
+const UNSETTLED: f64 = 1e-3;
+/// What is returned in place of a determinant where no forces of friction fit a motion.
+const NO_FORCES: f64 = -1.0;
 
 /// A place with dry friction.
 #[derive(Clone, Debug, PartialEq)]
@@ -286,7 +292,7 @@ pub fn size<T: Real>(normal: Normal, force: Complex<T>) -> (T, Complex<T>) {
 
 /// Finds tau of places with these coefficients c, `tau_j = c_j N_j`, whose normal forces are `start`
 /// without it and change by `response(j, k)` with that of place k, from the tau given; returns the
-/// determinant of the equations.
+/// determinant of the equations, and [`NO_FORCES`] where they have no solution near.
 pub(super) fn forces<T: Real>(
     sliding: &[(Normal, T)],
     start: &[Complex<T>],
@@ -296,10 +302,12 @@ pub(super) fn forces<T: Real>(
     let more = if T::HAS_CONSTANTS { MOST_ROUNDS } else { MORE_ROUNDS };
     let (mut left, mut last) = (more, f64::INFINITY);
     let mut regularity = T::ONE.value();
-    for _ in 0..ROUNDS {
+    for round in 1..=ROUNDS {
         // F_j = tau_j - c_j N_j(tau), and its Jacobian.
         let f = sliding.len();
         let (mut matrix, mut change) = (vec![T::ZERO; f * f], vec![T::ZERO; f]);
+        // Steps that do not end go to and fro between the signs of a force, none of which it has.
+        let mut goes_on = false;
         for (j, &(normal, coefficient)) in sliding.iter().enumerate() {
             let mut force = start[j];
             for (k, &tau) in tau.iter().enumerate() {
@@ -307,6 +315,8 @@ pub(super) fn forces<T: Real>(
             }
             let (size, along) = size(normal, force);
             change[j] = coefficient * size - tau[j];
+            let parts = coefficient.value() * size.value();
+            goes_on |= change[j].value().abs() > UNSETTLED * (parts.abs() + tau[j].value().abs());
             for k in 0..f {
                 matrix[j * f + k] = -coefficient * along.dot(response(j, k));
             }
@@ -324,6 +334,10 @@ pub(super) fn forces<T: Real>(
             if T::IS_PLAIN || left == 0 {
                 break;
             }
+        }
+        let is_linear = || sliding.iter().all(|(normal, _)| matches!(normal, Normal::Contact(_)));
+        if round == ROUNDS && goes_on && regularity.abs() > JAMMED && !is_linear() {
+            return NO_FORCES;
         }
         last = moved;
     }
