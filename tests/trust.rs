@@ -644,6 +644,42 @@ fn companions_are_finer_than_the_runs_they_judge() {
     }
 }
 
+/// Where the horizon or knots of tables end the steps, those of a coarse series and of its reference are the
+/// same: it is the order that tells them apart.
+#[test]
+fn companions_have_other_errors_where_their_steps_are_those_of_the_run() {
+    let knots: Vec<String> = [-1.05, 0.18, -0.52, 0.42, 0.5, -1.74, -1.95, 1.35, -0.96]
+        .iter()
+        .enumerate()
+        .map(|(k, value)| format!("[{}, {value}]", 0.05 * k as f64))
+        .collect();
+    let driven = format!(
+        r#"{{"name": "driven", "gravity": [0, -9.81],
+        "bars": [{{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}},
+                                            {{"body": "a", "point": [0, 0]}}]}}],
+        "tables": {{"g": [{}]}}, "torques": [{{"name": "q", "body": "a", "torque": "8*g(t)"}}],
+        "start": {{"a": {{"phi": 0, "omega": 2}}}}, "until": 0.4, "every": 0.05}}"#,
+        knots.join(", ")
+    );
+    let driven = driftless::scene::parse_scene(&driven, "driven.json", &[]).expect("a scene");
+    for (scene, until) in [(driven, 0.4), (shipped("free", &[]), 0.08)] {
+        let run = |rtol: f64| {
+            let mut angles = Vec::new();
+            let run = begun(&scene, &asked("taylor", rtol, until, until / 40.0), Level::Auto);
+            let outcome = integrate(run, &mut |sample| {
+                angles.extend_from_slice(&sample.phi);
+                Ok(())
+            });
+            (angles, outcome.expect("no observer fails").trust.expect("asked for").error_estimate)
+        };
+        let ((coarse, told), (fine, _)) = (run(1e-3), run(1e-14));
+        let off = coarse.iter().zip(&fine).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        let told = told.expect("a figure");
+        assert!(off > 1e-11 && (0.3..10.0).contains(&(told / off)), "{}: {told:e} for {off:e}", scene.name);
+    }
+}
+
 /// Extended orders leave less than doubles can show, and it is seen.
 #[test]
 fn extended_runs_are_judged_in_double_double() {
