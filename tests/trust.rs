@@ -644,6 +644,26 @@ fn companions_are_finer_than_the_runs_they_judge() {
     }
 }
 
+/// The unit of time of a mechanism of heavy parts at rest is 1024 s: a run of half a second is looked at inside
+/// its steps all the same, where a spring swings that is light beside them.
+#[test]
+fn short_runs_of_slow_mechanisms_are_looked_at_inside_their_steps() {
+    let text = r#"{"name": "slow", "gravity": [0, 0],
+        "bars": [{"name": "heavy", "mass": 1, "centre": [0, 0], "inertia": 1e4, "length": 1},
+            {"name": "light", "mass": 1, "centre": [0.2, 0], "inertia": 0.1, "length": 0.5}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "heavy", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "ground", "point": [1, 0]}, {"body": "light", "point": [0, 0]}]}],
+        "springs": [{"name": "k", "between": [{"body": "ground", "point": [1, 1]}, {"body": "light", "point": [0.5, 0]}],
+            "stiffness": 1000, "free_length": 1.1}],
+        "start": {"heavy": {"phi": 0, "omega": 0}, "light": {"phi": 0, "omega": 0}}, "until": 0.5, "every": 0.0078125}"#;
+    let scene = driftless::scene::parse_scene(text, "slow.json", &[]).expect("a scene");
+    assert_eq!(compile(&scene).units.time, 1024.0);
+    for (method, rtol) in [("radau9", 1e-6), ("radau5", 1e-8)] {
+        let [[told, truth], _] = told_and_true(&scene, &asked(method, rtol, 0.5, 0.0078125));
+        assert!((0.3..10.0).contains(&(told / truth)), "{method}: {told:e} for {truth:e}");
+    }
+}
+
 /// Where the horizon or knots of tables end the steps, those of a coarse series and of its reference are the
 /// same: it is the order that tells them apart.
 #[test]

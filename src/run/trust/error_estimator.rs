@@ -28,7 +28,7 @@ use std::time::Duration;
 const NEAR: f64 = 0.03 * HORIZON;
 /// Growth \[ln\] beyond which the exponent is known well enough.
 const ENOUGH: f64 = 2000.0;
-/// The first look, in units of time of the mechanism.
+/// The first look, in units of time of the mechanism, where the run is not short.
 const FIRST: f64 = 1e-3;
 /// The time to the next look over the reference solution's mean step: in the beginning, usually, near the
 /// horizon, and where the run is lost.
@@ -321,8 +321,9 @@ impl ErrorEstimator {
         if is_polynomial && measured.lost.is_none() {
             gap = gap.min((INSIDE * t / statistics.steps.max(1) as f64).max(until / LOOKS_INSIDE));
         }
-        let due = if t > 0.0 { t + gap } else { FIRST * self.mechanism.units.time };
-        measured.due = due.max(t.next_up());
+        // Units are powers of 1024: in those of slow mechanisms a whole run may be short.
+        let first = (FIRST * self.mechanism.units.time).min(until / LOOKS_INSIDE);
+        measured.due = (if t > 0.0 { t + gap } else { first }).max(t.next_up());
     }
 
     /// Measures how far the run and its reference solution are apart.
