@@ -897,6 +897,29 @@ mod command {
     }
 
     #[test]
+    fn starts_that_are_not_as_varied_are_told() {
+        let program = Program::with_scenes(&["kite"]);
+        let words = "start.crank.phi is not as varied at the start of 3 of 3 points, but up to 0.4";
+        let sweep = "sweep kite.json --vary crank.phi=0.5..1:3 --until 0.05 --every 0.01 --force";
+        let ran = program.run(&format!("{sweep} --html --chart-format svg")).exits(0);
+        let told = ran.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(told.contains(words), "{told}");
+        let folder = "output/kite/sweep-start.crank.phi-taylor-1e-9-projection";
+        let record: serde_json::Value =
+            serde_json::from_str(&program.read(&format!("{folder}/sweep.json"))).expect("JSON");
+        let notes = record["result"]["notes"].to_string();
+        assert!(notes.contains(words), "{notes}");
+        assert!(program.read(&format!("{folder}/sweep.html")).contains("off at the start"));
+        assert!(program.read(&format!("{folder}/profile.svg")).contains("off at the start"));
+        // Where what follows is not given, what is varied stays.
+        let text =
+            program.read("kite.json").replace(r#""rocker": {"phi": 2.214297435588181}"#, r#""rocker": {}"#);
+        program.write("kite.json", &text);
+        let ran = program.run(&sweep.replace("0.5..1", "0.8..1")).exits(0).shows(&["3 done"]);
+        assert!(!ran.stdout.contains("not as varied"), "{}", ran.stdout);
+    }
+
+    #[test]
     fn estimates_are_two_columns_where_they_are_asked_for() {
         let program = Program::with_scenes(&["free"]);
         let ask = "sweep free.json --vary bar1.phi=-2..2:5 --until 12 --every 1 --no-charts --json";

@@ -36,6 +36,8 @@ mod curves;
 #[cfg(all(feature = "digits", feature = "files"))]
 #[doc(hidden)]
 pub mod digits;
+#[cfg(feature = "files")]
+mod displaced;
 mod drawing;
 pub mod events;
 #[cfg(feature = "fit")]

@@ -1,5 +1,6 @@
 //! What a sweep amounted to, and its chart.
 
+use super::displaced::displaced;
 use super::page::{Page, counted, figure, magnitude};
 #[cfg(feature = "charts")]
 use crate::chart::{self, Cell, ChartError, FILE_RESOLUTION, Map, MapAxis, Picture, ProfileChart, plain};
@@ -46,7 +47,7 @@ pub fn object(sweep: &Sweep, totals: &Totals) -> Value {
         "steps": totals.steps,
         "energy": {"max_relative": totals.energy.0, "point": totals.energy.1},
         "constraints": {"position_max": totals.constraint[0], "velocity_max": totals.constraint[1]},
-        "notes": plan.notes,
+        "notes": super::displaced::notes(sweep, totals),
         "threads": totals.threads,
         "wall_s": totals.wall.as_secs_f64(),
     });
@@ -92,6 +93,7 @@ pub fn text(sweep: &Sweep, totals: &Totals) -> String {
         );
         page.entry(if number == 0 { "varied" } else { "" }, &range);
     }
+    displaced(sweep, totals).iter().for_each(|displaced| page.entry("start", &displaced.to_string()));
     if let Some(shard) = sweep.shard() {
         let range = sweep.range();
         let of = sweep.grid().count();
@@ -320,6 +322,7 @@ impl SweepChart {
             Some(end) => format!("not within {} s", figure(end)),
             None => "not before the end".to_owned(),
         };
+        caption.extend(displaced(sweep, totals).iter().map(|displaced| plain(&displaced.briefly())));
         Labels { title, caption, value: name, axes, is_log, is_flip, never }
     }
 

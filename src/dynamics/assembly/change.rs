@@ -28,6 +28,17 @@ impl std::fmt::Display for StartChange {
     }
 }
 
+impl StartChange {
+    /// Where the scene gives it: `start.bar1.phi`, `start.ball.origin[0]`.
+    pub fn path(&self) -> String {
+        let (quantity, place) = match self.quantity.split_once('.') {
+            Some((quantity, axis)) => (quantity, if axis == "x" { "[0]" } else { "[1]" }),
+            None => (self.quantity.as_str(), ""),
+        };
+        format!("start.{}.{quantity}{place}", self.body)
+    }
+}
+
 impl AssemblyProblem<'_> {
     /// What of the positions is not as given.
     pub(super) fn changes(&self, q: &[DoubleDouble], aims: &[GivenNumber]) -> Vec<StartChange> {

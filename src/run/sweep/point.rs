@@ -41,6 +41,8 @@ pub struct SweepPoint {
     pub index: u64,
     /// What was varied, in the units of the scene, slowest first.
     pub values: Vec<f64>,
+    /// By how much each of these is another at the start, as the constraints do not let it be as varied.
+    pub displaced: Vec<f64>,
     /// What became of it.
     pub status: Status,
     /// The time reached \[s\].
@@ -171,6 +173,7 @@ impl Sweep {
         let values = self.grid.values(index);
         let mut point = SweepPoint {
             index,
+            displaced: vec![0.0; values.len()],
             values,
             status: Status::Done,
             t: 0.0,
@@ -189,7 +192,16 @@ impl Sweep {
             return Err(Box::new(point));
         }
         match self.filled(&point.values) {
-            Ok((mechanism, plan, start, scale)) => Ok(Ready { point, mechanism, plan, start, scale }),
+            Ok((mechanism, plan, start, scale)) => {
+                for change in &mechanism.assembly.changes {
+                    let path = change.path();
+                    let varied = self.variables.iter().position(|variable| variable.path == path);
+                    if let Some(k) = varied {
+                        point.displaced[k] = change.used - change.given;
+                    }
+                }
+                Ok(Ready { point, mechanism, plan, start, scale })
+            }
             Err(reason) => {
                 point.status = Status::Refused(reason.lines().next().unwrap_or_default().to_owned());
                 Err(Box::new(point))

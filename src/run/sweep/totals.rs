@@ -24,6 +24,9 @@ pub struct Totals {
     pub judged: u64,
     /// See `judged`.
     pub doubtful: u64,
+    /// For each value that is varied the points that start with another one, as the constraints do not let
+    /// it be as varied, and by how much at most; empty where none does.
+    pub displaced: Vec<(u64, f64)>,
     /// Steps of all of them.
     pub steps: u64,
     /// Largest energy drift among those done, over the energy scale, and the point's number.
@@ -57,6 +60,14 @@ impl Totals {
         };
     }
 
+    fn displaced(&mut self, next: impl Iterator<Item = (u64, f64)>) {
+        for (k, (points, most)) in next.enumerate().filter(|(_, (points, _))| *points > 0) {
+            self.displaced.resize(self.displaced.len().max(k + 1), (0, 0.0));
+            self.displaced[k].0 += points;
+            self.displaced[k].1 = self.displaced[k].1.max(most);
+        }
+    }
+
     /// With those of the points that follow; times add up, and of threads the most counts.
     pub fn join(&mut self, next: &Self) {
         self.done += next.done;
@@ -66,6 +77,7 @@ impl Totals {
         self.flipped += next.flipped;
         self.judged += next.judged;
         self.doubtful += next.doubtful;
+        self.displaced(next.displaced.iter().copied());
         self.steps += next.steps;
         if next.energy.0 > self.energy.0 {
             self.energy = next.energy;
@@ -90,6 +102,7 @@ impl Totals {
             self.judged += u64::from(trust.error.is_some());
             self.doubtful += u64::from(trust.is_doubtful());
         }
+        self.displaced(point.displaced.iter().map(|by| (u64::from(*by != 0.0), by.abs())));
         self.steps += point.steps;
         if point.status == Status::Done {
             self.ended(Some([point.t; 2]));
