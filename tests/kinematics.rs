@@ -283,6 +283,33 @@ fn a_slider_crank_goes_as_far_as_crank_and_rod_reach() {
         let rod = (-lengths[0] / lengths[1] * at.drive.sin()).asin();
         assert!((at.phi[1] - rod).abs() < 1e-12, "{} {}", at.phi[1], rod);
     }
+    let block: Vec<[f64; 2]> =
+        turned.dead_centres.iter().filter(|at| at.name == slider).map(|at| [at.drive, at.value]).collect();
+    assert_eq!(block.len(), 2, "{:?}", turned.dead_centres);
+    for (found, expected) in block.iter().zip([[PI, lengths[0] - lengths[1]], [TAU, reach[1]]]) {
+        let expected = [expected[0], expected[1].abs()];
+        assert!((found[0] - expected[0]).abs() < 1e-9 && (found[1] - expected[1]).abs() < 1e-12, "{found:?}");
+    }
+    assert!(turned.dead_centres.iter().any(|at| at.name == slider && at.in_line == ["A"]));
+}
+
+/// The ram of a shaper turns back where its rocker does, and the pin in the slot where the crank lies along it.
+#[test]
+fn rams_and_pins_in_slots_turn_back_at_the_ends_of_their_ways() {
+    let found = over(&example("quick_return"), "motor", 360);
+    let drives = |name: &str| -> Vec<f64> {
+        found.dead_centres.iter().filter(|at| at.name == name).map(|at| at.drive).collect()
+    };
+    // Crank 0.1 m at the origin, rocker's hinge 0.25 m below: along the slot at 0.25 m above and below.
+    let slot: Vec<f64> =
+        found.dead_centres.iter().filter(|at| at.name == "slot").map(|at| at.value).collect();
+    assert_eq!(slot.len(), 2, "{:?}", found.dead_centres);
+    for value in [0.15, 0.35] {
+        assert!(slot.iter().any(|at| (at - value).abs() < 1e-9), "{slot:?}");
+    }
+    let (ram, rocker) = (drives("guide"), drives("rocker"));
+    assert_eq!((ram.len(), rocker.len()), (2, 2), "{:?}", found.dead_centres);
+    assert!(ram.iter().zip(&rocker).all(|(a, b)| (a - b).abs() < 0.3), "{ram:?} {rocker:?}");
 }
 
 #[test]

@@ -6,7 +6,7 @@
 //! G q' = -C_t,   G q'' = -(C_t)' - G' q'
 //!     multipliers, and with them forces, from the same solve
 //! limit:         q' without bound, 1/q'² -> 0 in proportion to what is left of the drive's range
-//! dead centre:   the rate of another body passes zero
+//! dead centre:   the rate of another body, or of a slider's travel, passes zero
 //! change point:  det G changes its sign: two ways of motion cross,
 //!     and the one that goes straight on is taken
 //! ```
@@ -18,6 +18,7 @@
 mod drive;
 mod extremes;
 mod transmission;
+mod travel;
 mod walk;
 
 pub(super) use drive::left_out;
@@ -29,6 +30,7 @@ use crate::scene::Scene;
 use drive::DrivenScene;
 use serde::Serialize;
 use std::sync::Arc;
+use travel::SliderTravel;
 use walk::{DriveWalk, IN_LINE, SolvedPosition};
 
 /// Relative width at which a searched time is taken for found.
@@ -86,9 +88,9 @@ pub struct Limit {
 pub struct DeadCentre {
     /// The drive's value \[rad or m\].
     pub drive: f64,
-    /// The body or coordinate.
+    /// The body, coordinate or slider.
     pub name: String,
-    /// Its angle \[rad\] or place \[m\] there: the end of its own range.
+    /// Its angle \[rad\], travel or place \[m\] there: the end of its own range.
     pub value: f64,
     /// Hinges at which two bodies stand in line there.
     pub in_line: Vec<String>,
@@ -235,6 +237,16 @@ impl Kinematics {
                 self.change_points.extend(walk.root([before, after], sign).map(|found| found.drive));
             }
         }
+        let is_moving = |fastest: f64| fastest > STILL * most * self.mechanism.units.length;
+        for travel in SliderTravel::of(&self.scene, &self.mechanism) {
+            self.dead_centres.extend(travel.dead_centres(all, walk, is_moving, IN_LINE));
+        }
+        self.dead_centres.sort_by(|a, b| a.drive.total_cmp(&b.drive));
+        self.extremes(all, walk);
+    }
+
+    /// Looks for the extremes of all columns.
+    fn extremes(&mut self, all: &[SolvedPosition], walk: &mut DriveWalk) {
         let outputs = self.mechanism.outputs.clone();
         let heads: Vec<(String, String)> =
             std::iter::once((self.name_of_force(), self.unit_of_force().to_owned()))

@@ -2,7 +2,7 @@
 
 use super::transmission::Transmission;
 use super::{FOUND, KinematicsError, Limit, Position};
-use crate::arithmetic::Scalar;
+use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, State, Time};
@@ -330,6 +330,17 @@ impl DriveWalk {
     /// Rate of a coordinate \[rad/s or m/s\].
     pub fn omega(&self, k: usize) -> f64 {
         self.state.y[self.alpha.len() + k]
+    }
+
+    /// Rates of all coordinates \[rad/s or m/s\].
+    pub fn rates(&self) -> &[f64] {
+        let n = self.alpha.len();
+        &self.state.y[n..2 * n]
+    }
+
+    /// Unit vectors of the bodies, and what floats.
+    pub fn unit_vectors(&self) -> &[Complex<f64>] {
+        &self.kernel.z
     }
 
     /// The sign of det G, as a number; none where G is not square.
