@@ -880,7 +880,7 @@ fn the_caption_speaks_of_marks_only_where_there_are_any() {
 #[test]
 fn labels_of_many_curves_are_those_of_the_largest() {
     let outputs = (0..60).map(|k| OutputSeries {
-        name: format!("curve {k}"),
+        name: format!("c {k}"),
         unit: "rad".to_owned(),
         time: times(3, 1.0),
         value: vec![0.0, 0.1 * f64::from(k), 0.001 * f64::from(k)],
@@ -889,14 +889,15 @@ fn labels_of_many_curves_are_those_of_the_largest() {
     let chart =
         OutputsChart { title: "many".to_owned(), outputs: outputs.collect(), ..OutputsChart::default() };
     let picture = outputs_of(&chart);
-    let labels: Vec<&TextBox> = picture.texts.iter().filter(|text| text.text.starts_with("curve")).collect();
+    let labels: Vec<&TextBox> = picture.texts.iter().filter(|text| text.text.starts_with("c ")).collect();
     let told = said(&picture);
     assert!(labels.len() > 8 && told.contains(&format!("and {} more", 60 - labels.len())), "{told:?}");
     for k in 60 - labels.len()..60 {
-        assert!(told.contains(&format!("curve {k}")), "{k} is among the largest: {told:?}");
+        assert!(told.contains(&format!("c {k}")), "{k} is among the largest: {told:?}");
     }
     for (k, one) in picture.texts.iter().enumerate() {
         assert!(picture.texts[..k].iter().all(|other| !one.overlaps(other)), "{:?}", one.text);
+        assert!(one.bounds()[2] <= f64::from(picture.width), "{:?} ends beyond the page", one.text);
     }
 }
 

@@ -66,6 +66,8 @@ impl Axis {
     /// A linear axis that ends where the data end, as time does.
     pub(crate) fn tight(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (from, to) = extremes(values.filter(|&v| usable(v))).unwrap_or((0.0, 1.0));
+        // Of a single time the axis shows how long it took to come there.
+        let from = if from == to && to > 0.0 { 0.0 } else { from };
         // A last sample just before a round time does not cost the axis its last label.
         let step = ticks::nice_step((to - from).max(1e-290) / 10.0);
         let (below, above) = ((from / step).floor() * step, (to / step).ceil() * step);
@@ -156,7 +158,7 @@ impl Axis {
 }
 
 fn apart(value: f64) -> (f64, f64) {
-    let half = (0.05 * value.abs()).max(1.0);
+    let half = if value.abs() < 1e-290 { 1.0 } else { 0.05 * value.abs() };
     (value - half, value + half)
 }
 
@@ -195,9 +197,12 @@ mod tests {
         assert_eq!(fit(&[f64::NAN, f64::INFINITY]), (0.0, 1.0));
         assert_eq!(fit(&[0.0, 0.0]), (-1.0, 1.0));
         assert_eq!(fit(&[100.0]), (95.0, 105.0));
+        assert_eq!(fit(&[-1e-6]), (-1.05e-6, -0.95e-6), "as far apart as fits its size");
         assert_eq!(fit(&[0.0, 10.0]), (0.0, 12.0), "nothing below zero");
         let (low, high) = fit(&[-1e300, 1e300]);
         assert!(low.is_finite() && high.is_finite() && low < -1e300);
+        let single = Axis::tight("", [1e-6].into_iter());
+        assert_eq!((single.from, single.to), (0.0, 1e-6));
         let decades = Axis::decades("", [0.0, -1.0, f64::NAN].into_iter());
         assert!(decades.to >= 10.0 * decades.from);
     }

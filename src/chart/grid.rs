@@ -14,9 +14,25 @@ const BETWEEN: f64 = 16.0;
 /// Usual distance of a panel from the left edge \[pt\].
 const LEFT: f64 = 58.0;
 
+/// Labels that every panel has room for.
+const MANY: usize = 4;
+
+/// What stands for labels there is no room for.
+pub(crate) fn more_labels(count: usize) -> String {
+    format!("and {count} more")
+}
+
 /// Room for labels at the ends of lines, at most a third of the page \[pt\].
 pub(crate) fn label_room<'a>(sheet: &Sheet, labels: impl Iterator<Item = &'a str>, markers: bool) -> f64 {
-    let widest = labels.map(|label| sheet.width(label, NOTE, false)).fold(0.0, f64::max);
+    let (mut count, mut widest) = (0, 0.0_f64);
+    for label in labels {
+        count += 1;
+        widest = widest.max(sheet.width(label, NOTE, false));
+    }
+    // Of many the last line may say how many more there are.
+    if count > MANY {
+        widest = widest.max(sheet.width(&more_labels(count), NOTE, false));
+    }
     if widest == 0.0 {
         20.0
     } else {

@@ -20,6 +20,8 @@ const GIF: f64 = 2.0;
 const APNG: f64 = 5.0;
 /// Length of the fading trail \[frames\].
 const TAIL: usize = 50;
+/// A speed that differs from 1 by less is told as none.
+const SAME_SPEED: f64 = 0.05;
 /// Few colours keep the file small.
 const SHADES: usize = 20;
 
@@ -155,17 +157,33 @@ fn animated(
         if let Some(&time) = chart.time.get(k) {
             let words = Lettering::new(CAPTION, GREY).at(Align::Right, TextLevel::Baseline);
             let past = if is_past { ", beyond trust" } else { "" };
-            sheet.words(
-                &format!("*t* = {} s{past}", decimal(time, 2)),
-                words,
-                [right - 5.0, bottom - 5.0],
-            )?;
+            let (clock, speed) = clock(chart, time);
+            sheet.words(&format!("{clock}{past}"), words, [right - 5.0, bottom - 5.0])?;
+            sheet.words(&speed, words, [right - 5.0, bottom - 5.0 - 1.25 * CAPTION])?;
         }
         Ok(sheet.pixels())
     };
     let (width, height) = sheet.dimensions();
     let bytes = encode([width, height], &mut draw)?;
     Ok(Animation { width, height, frames, bytes })
+}
+
+/// What a frame says of its time, with as many digits as tell it from the next, and of the speed of time where
+/// that is not its own.
+fn clock(chart: &MotionGif, time: f64) -> (String, String) {
+    let mut apart = 0.0;
+    if let [first, .., last] = chart.time[..] {
+        apart = (last - first) / (chart.time.len() - 1) as f64;
+    }
+    let decimals = if apart > 0.0 { (-apart.log10()).ceil().clamp(2.0, 12.0) } else { 2.0 };
+    let clock = format!("*t* = {} s", decimal(time, decimals as usize));
+    let speed = apart / (0.01 * f64::from(chart.delay.max(2)));
+    let is_own = apart <= 0.0 || (speed - 1.0).abs() <= SAME_SPEED;
+    if is_own {
+        return (clock, String::new());
+    }
+    let digits = (1.0 - speed.log10().floor()).clamp(0.0, 9.0);
+    (clock, format!("speed {} ×", decimal(speed, digits as usize)))
 }
 
 /// The part of a trail seen in frame `k`.
@@ -175,4 +193,23 @@ fn tail(trail: &[[f64; 2]], k: usize, frames: usize) -> &[[f64; 2]] {
     };
     let end = (place(k) + 1).min(trail.len());
     &trail[place(k.saturating_sub(TAIL)).min(end)..end]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_tell_their_time_from_the_next_and_how_fast_it_goes() {
+        let chart = |apart: f64| MotionGif {
+            time: (0..5).map(|k| apart * f64::from(k)).collect(),
+            delay: 4,
+            ..MotionGif::default()
+        };
+        let told = |apart: f64, time: f64| clock(&chart(apart), time);
+        assert_eq!(told(0.04, 0.4), ("*t* = 0.40 s".to_owned(), String::new()));
+        assert_eq!(told(0.0006, 0.0012), ("*t* = 0.0012 s".to_owned(), "speed 0.015 ×".to_owned()));
+        assert_eq!(told(0.4, 1.2).1, "speed 10 ×");
+        assert_eq!(clock(&MotionGif::default(), 1.0), ("*t* = 1.00 s".to_owned(), String::new()));
+    }
 }

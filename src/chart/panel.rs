@@ -2,6 +2,7 @@
 
 use super::ChartError;
 use super::axis::Axis;
+use super::grid::more_labels;
 use super::labels::{Occupied, spread};
 use super::lines::{Point, clip, envelope, is_dense, turns};
 use super::names::axis_lines;
@@ -360,7 +361,7 @@ impl<'a> Panel<'a> {
         let (top, mut bottom) = (self.bounds[1] + 2.0, self.bounds[3] - 2.0);
         let (ends, more) = ends.split_at(if ends.len() > most { most - 1 } else { ends.len() });
         if !more.is_empty() {
-            let words = format!("and {} more", more.len());
+            let words = more_labels(more.len());
             let lettering = note(GREY, Align::Left, TextLevel::Middle);
             self.sheet.words(&words, lettering, [self.bounds[2] + LEADER, bottom])?;
             bottom -= LEAST;

@@ -304,28 +304,55 @@ fn words_of(part: &str) -> Vec<String> {
     words
 }
 
+/// A word in pieces no wider than `room`; markup stays whole, and so do numbers with units.
+fn pieces(word: &str, room: f64, width: impl Fn(&str) -> f64) -> Vec<String> {
+    if word.contains(char::is_whitespace) || width(word) <= room {
+        return vec![word.to_owned()];
+    }
+    let mut pieces = vec![String::new()];
+    let (mut is_inside, mut is_escaped) = (false, false);
+    for letter in word.chars() {
+        let is_free = !is_inside && !is_escaped && letter != '}';
+        if let Some(piece) = pieces.last_mut() {
+            if !is_free || piece.is_empty() || width(&format!("{piece}{letter}")) <= room {
+                piece.push(letter);
+            } else {
+                pieces.push(letter.to_string());
+            }
+        }
+        is_inside = letter == '{' || is_inside && letter != '}';
+        is_escaped = matches!(letter, '\\' | '^' | '_') && !is_escaped;
+    }
+    pieces
+}
+
 /// Lines no wider than `room`: parts joined by middle dots, broken at a dot, or between words where one part
-/// is too long.
+/// is too long, or within a word that is.
 fn wrap(parts: &[String], room: f64, width: impl Fn(&str) -> f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     let mut line = String::new();
     for part in parts.iter().filter(|part| !part.trim().is_empty()) {
-        for (k, word) in words_of(part).iter().enumerate() {
-            let joint = match (line.is_empty(), k) {
-                (true, _) => "",
-                (false, 0) => "   ·   ",
-                (false, _) => " ",
+        let words = words_of(part);
+        let all = words.iter().enumerate().flat_map(|(k, word)| {
+            pieces(word, room, &width).into_iter().enumerate().map(move |(n, piece)| (k, n, piece))
+        });
+        for (k, n, piece) in all {
+            let joint = match (line.is_empty(), k, n) {
+                (true, ..) | (.., 1..) => "",
+                (false, 0, _) => "   ·   ",
+                (false, ..) => " ",
             };
+            let is_first = k == 0 && n == 0;
             // A part that fits into a line of its own is not torn.
-            let whole = if k == 0 { part } else { word };
+            let whole = if is_first { part } else { &piece };
             let fits = width(&format!("{line}{joint}{whole}")) <= room
-                || (k == 0 && width(part) > room && width(&format!("{line}{joint}{word}")) <= room);
+                || (is_first && width(part) > room && width(&format!("{line}{joint}{piece}")) <= room);
             if !fits && !line.is_empty() {
                 lines.push(std::mem::take(&mut line));
-                line.push_str(word);
+                line.push_str(&piece);
             } else {
                 line.push_str(joint);
-                line.push_str(word);
+                line.push_str(&piece);
             }
         }
     }
@@ -366,6 +393,7 @@ mod tests {
         assert_eq!(wrap(&parts, 60.0, width), ["one two   ·   three four"]);
         assert_eq!(wrap(&parts, 6.0, width), ["one", "two", "three", "four"]);
         assert!(wrap(&[], 6.0, width).is_empty());
+        assert_eq!(wrap(&["of a_long-name on".to_owned()], 6.0, width), ["of", "a_long", "-name", "on"]);
         let title = ["at most 2·10^{−14} m over 0.4 s".to_owned()];
         assert_eq!(
             wrap(&title, 30.0, width),

@@ -10,14 +10,20 @@ const MISSED: f64 = 0.07;
 const FINE: usize = 6;
 const DENSE: usize = 1500;
 
-/// How far the body that turns furthest turns from one sample to the next \[rad\].
+/// How far the coordinate that changes most changes from one sample to the next \[rad or m\].
 pub(super) fn furthest(a: &Sample, b: &Sample) -> f64 {
-    a.phi.iter().zip(&b.phi).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
+    turned(a, b, a.phi.len())
+}
+
+/// How far the body that turns furthest turns from one sample to the next \[rad\]; the first so many
+/// coordinates are `angles`.
+pub(super) fn turned(a: &Sample, b: &Sample, angles: usize) -> f64 {
+    a.phi.iter().zip(&b.phi).take(angles).map(|(a, b)| (b - a).abs()).fold(0.0, f64::max)
 }
 
 /// True where curves through the samples would mislead: a body turns too far from one to the next, or its
-/// rates there do not tell how far.
-pub(super) fn is_coarse(samples: &[&Sample]) -> bool {
+/// rates there do not tell how far it turns or moves.  The first so many coordinates are `angles`.
+pub(super) fn is_coarse(samples: &[&Sample], angles: usize) -> bool {
     let (mut missed, mut told) = (0.0, 0.0);
     for pair in samples.windows(2) {
         let (a, b) = (pair[0], pair[1]);
@@ -27,7 +33,8 @@ pub(super) fn is_coarse(samples: &[&Sample]) -> bool {
             told += (half * (a.omega[k].abs() + b.omega[k].abs())).powi(2);
         }
     }
-    missed > MISSED * MISSED * told || samples.windows(2).any(|pair| furthest(pair[0], pair[1]) > COARSE)
+    missed > MISSED * MISSED * told
+        || samples.windows(2).any(|pair| turned(pair[0], pair[1], angles) > COARSE)
 }
 
 pub(super) fn span(samples: &[&Sample]) -> f64 {
@@ -86,10 +93,12 @@ mod tests {
             let time = |k: u32| f64::from(k) * std::f64::consts::TAU / per_period;
             let samples: Vec<Sample> =
                 (0..100).map(|k| sample(time(k), 0.2 * time(k).sin(), 0.2 * time(k).cos())).collect();
-            is_coarse(&samples.iter().collect::<Vec<_>>())
+            is_coarse(&samples.iter().collect::<Vec<_>>(), 1)
         };
         assert!(coarse(3.3) && coarse(5.0) && !coarse(10.0) && !coarse(100.0));
-        assert!(!is_coarse(&[&sample(0.0, 0.0, 0.0), &sample(1.0, 0.0, 0.0)]), "at rest");
+        assert!(!is_coarse(&[&sample(0.0, 0.0, 0.0), &sample(1.0, 0.0, 0.0)], 1), "at rest");
+        let uniform = [&sample(0.0, 0.0, 5.0), &sample(1.0, 5.0, 5.0)];
+        assert!(is_coarse(&uniform, 1) && !is_coarse(&uniform, 0), "a place is not told by turns");
     }
 
     #[test]

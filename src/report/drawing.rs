@@ -46,7 +46,9 @@ impl MechanismDrawing<'_> {
     /// What the paths are of; none where there are none.
     pub fn title(&self) -> Option<String> {
         let names = self.names();
-        let kind = match (names.len(), self.points().next().is_some()) {
+        let are_places =
+            self.points().next().is_some() || self.leaves().into_iter().any(|body| self.is_centred(body));
+        let kind = match (names.len(), are_places) {
             (0, _) => return None,
             (1, true) => "Path",
             (_, true) => "Paths",
@@ -106,7 +108,7 @@ impl MechanismDrawing<'_> {
         });
         Pose {
             bars: (self.mechanism.own_bodies().iter().enumerate())
-                .map(|(k, body)| body.ends.map(|end| on(k, end)))
+                .map(|(k, _)| self.ends(k).map(|end| on(k, end)))
                 .collect(),
             hinges: self.mechanism.own_joints().map(at).collect(),
             springs: self.springs().map(|between| between.each_ref().map(place)).collect(),
@@ -178,7 +180,7 @@ impl MechanismDrawing<'_> {
         let is_end = |place: &Place, bar: Option<usize>| {
             let Some(bar) = bar else { return place.bar.is_none() };
             let ([x, y], [end_x, end_y]) = (place.point, self.far_end(bar).point);
-            place.bar == Some(bar) && (x - end_x).hypot(y - end_y) < 1e-9 * end_x.hypot(end_y)
+            place.bar == Some(bar) && (x - end_x).hypot(y - end_y) <= 1e-9 * end_x.hypot(end_y)
         };
         self.scene.hinges.iter().any(|hinge| {
             let [a, b] = &hinge.between;
@@ -186,8 +188,35 @@ impl MechanismDrawing<'_> {
         })
     }
 
-    /// The far end of a bar.
+    /// True of a body whose origin is its centre of mass, with nothing of the scene elsewhere on it: a ball, a
+    /// cart, a block.
+    fn is_centred(&self, bar: usize) -> bool {
+        let scene = self.scene;
+        let hinges = scene.hinges.iter().flat_map(|hinge| hinge.between);
+        let sliders = scene.sliders.iter().flat_map(|slider| [slider.point, slider.rail.place]);
+        let walls = scene.walls.iter().map(|wall| Place { bar: Some(wall.bar), point: wall.point });
+        let points = scene.points.iter().map(|point| point.place);
+        let mut places = hinges.chain(sliders).chain(walls).chain(points).chain(self.springs().flatten());
+        scene.bars[bar].centre == [0.0; 2]
+            && places.all(|place| place.bar != Some(bar) || place.point == [0.0; 2])
+    }
+
+    /// Both ends of a body as it is drawn, as the mechanism counts them: a bar from its origin on, and of one
+    /// that is nothing but its centre as much on either side \[m\].
+    pub fn ends(&self, body: usize) -> [Complex<f64>; 2] {
+        let [origin, end] = self.mechanism.bodies[body].ends;
+        if body >= self.scene.bars.len() || !self.is_centred(body) {
+            return [origin, end];
+        }
+        let half = (end - origin).times(0.5);
+        [origin - half, origin + half]
+    }
+
+    /// The far end of a bar, or the centre of a body that is nothing else.
     fn far_end(&self, bar: usize) -> Place {
+        if self.is_centred(bar) {
+            return Place { bar: Some(bar), point: [0.0; 2] };
+        }
         let [origin, end] = self.mechanism.bodies[bar].ends;
         Place { bar: Some(bar), point: [(end - origin).re, (end - origin).im] }
     }
@@ -279,6 +308,17 @@ mod tests {
         assert_eq!(traced("four_bar_motor"), ["coupler"], "where the rocker ends as well");
         assert_eq!(traced("pid"), ["arm"], "and no body that only carries an integral");
         assert_eq!(traced("branch"), ["bar2", "plate"]);
+    }
+
+    #[test]
+    fn bodies_that_are_nothing_but_their_centre_are_drawn_about_it() {
+        let scene = read_scene("examples/scenes/slider_crank_driven.json".as_ref(), &[]).expect("shipped");
+        let mechanism = Mechanism::new(&scene).expect("a mechanism");
+        let drawing = MechanismDrawing { scene: &scene, mechanism: &mechanism };
+        let lengths = |body: usize| drawing.ends(body).map(|end| end.re - mechanism.bodies[body].ends[0].re);
+        assert_eq!((lengths(0), lengths(2)), ([0.0, 0.15], [-0.025, 0.025]), "crank and block");
+        assert_eq!(drawing.title().as_deref(), Some("Path of block"));
+        assert_eq!(drawing.traced().last().map(|place| place.point), Some([0.0; 2]));
     }
 
     /// The angles with whatever further coordinates a mechanism has, at zero.

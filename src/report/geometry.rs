@@ -12,9 +12,9 @@ use serde_json::{Value, json};
 pub fn geometry(scene: &Scene, mechanism: &Mechanism) -> Value {
     let drawing = MechanismDrawing { scene, mechanism };
     let place = |place: &Place| at(place.bar, local(mechanism, place));
-    let bodies: Vec<Value> = (mechanism.own_bodies().iter())
-        .map(|body| {
-            let ends = body.ends.map(|end| [end.re - body.centre.re, end.im - body.centre.im]);
+    let bodies: Vec<Value> = (mechanism.own_bodies().iter().enumerate())
+        .map(|(k, body)| {
+            let ends = drawing.ends(k).map(|end| [end.re - body.centre.re, end.im - body.centre.im]);
             json!({"name": body.name, "ends": ends})
         })
         .collect();

@@ -173,7 +173,8 @@ impl<C: Real> Scene<C> {
 pub struct Bar<C = f64> {
     /// Name, unique among bars; never `ground`.
     pub name: String,
-    /// Length for drawings \[m\]: the body is drawn from its origin to (length, 0).
+    /// Length for drawings \[m\]: the body is drawn from its origin to (length, 0), or about its
+    /// origin where that is its centre of mass and nothing is elsewhere on it.
     pub length: C,
     /// Mass \[kg\], positive.
     pub mass: C,

@@ -13,7 +13,7 @@ use crate::chart::{
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::forest::BodyOrigin;
-use crate::report::curves::{furthest, is_coarse, smoothed, span};
+use crate::report::curves::{furthest, is_coarse, smoothed, span, turned};
 use crate::report::drawing::MechanismDrawing;
 use crate::report::page::{figure, rough};
 use crate::run::{Outcome, Sample};
@@ -62,10 +62,14 @@ impl Chart {
 }
 
 /// The charts a run has something to show in: none of angles and positions where nothing moves, none of
-/// constraints that are kept exactly, none of torques without motors.
+/// constraints that are kept exactly, none of torques without motors, and none against time of a single row.
 pub fn wanted(mechanism: &Mechanism, outcome: &Outcome) -> Vec<Chart> {
+    let trace = &outcome.trace;
+    let rows = if trace.window.is_some() { trace.part.len() } else { trace.whole.len() };
     let has = |chart: &Chart| match chart {
-        Chart::Mechanism | Chart::EnergyDrift => true,
+        Chart::Mechanism => true,
+        _ if rows < 2 => false,
+        Chart::EnergyDrift => true,
         Chart::Angles => moves(mechanism, outcome),
         Chart::ConstraintDrift => drifts(&[outcome]),
         Chart::TorquePower => !motors(mechanism, outcome).is_empty(),
@@ -96,9 +100,7 @@ fn moves(mechanism: &Mechanism, outcome: &Outcome) -> bool {
         values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
     };
     let own = 0..mechanism.own_bodies().len();
-    // Of a run that stopped at once nothing is known.
-    trace.whole.len() < 2
-        || own.chain(mechanism.bodies.len()..mechanism.coordinates()).any(|k| spread(k) > STILL)
+    own.chain(mechanism.bodies.len()..mechanism.coordinates()).any(|k| spread(k) > STILL)
 }
 
 /// Draws one chart.
@@ -153,23 +155,8 @@ const STILL: f64 = 1e-9;
 const GHOST: f64 = 0.4;
 /// Ghosts shown.
 const GHOSTS: usize = 5;
-
-/// The last of some samples, as far back as the fastest body turns by `PATH`.
-fn last_stretch<'a>(samples: impl DoubleEndedIterator<Item = &'a Sample>) -> Vec<&'a Sample> {
-    let mut turned = 0.0;
-    let mut path: Vec<&Sample> = Vec::new();
-    for sample in samples.rev() {
-        if let Some(after) = path.last() {
-            turned += furthest(sample, after);
-        }
-        if turned > PATH {
-            break;
-        }
-        path.push(sample);
-    }
-    path.reverse();
-    path
-}
+/// Samples from which on a path ends where a body has moved by as many metres, too.
+const MOVED: usize = 100;
 
 /// `last 3 s of 10 s`; `all 10 s` where both are the same to three digits.
 fn part_of(which: &str, part: f64, whole: f64) -> String {
@@ -218,7 +205,7 @@ impl Finished<'_> {
             return (trace.part.iter().collect(), Some(self.chosen_window()));
         }
         let whole: Vec<&Sample> = trace.whole.iter().collect();
-        if !is_coarse(&whole)
+        if !is_coarse(&whole, self.angle_count())
             && whole.windows(2).map(|pair| furthest(pair[0], pair[1])).sum::<f64>() <= CROWDED[0]
         {
             return (whole, None);
@@ -250,7 +237,7 @@ impl Finished<'_> {
             return (trace.part.iter().collect(), Some(self.chosen_window()));
         }
         let whole = self.outcome.last.t;
-        let last = last_stretch(trace.tail.iter());
+        let last = self.last_stretch(trace.tail.iter());
         let begin = last.first().map_or(0.0, |sample| sample.t);
         if let Some(horizon) = self.horizon(begin).0 {
             let trusted = self.before(horizon);
@@ -268,22 +255,45 @@ impl Finished<'_> {
         (last, Some(part_of("last", shown, whole)))
     }
 
+    /// How many of the coordinates are angles.
+    fn angle_count(&self) -> usize {
+        self.mechanism.bodies.len()
+    }
+
+    /// The last of some samples, as far back as the fastest body turns by `PATH`.
+    fn last_stretch<'a>(&self, samples: impl DoubleEndedIterator<Item = &'a Sample>) -> Vec<&'a Sample> {
+        let (mut by_angle, mut by_any) = (0.0, 0.0);
+        let mut path: Vec<&Sample> = Vec::new();
+        for sample in samples.rev() {
+            if let Some(after) = path.last() {
+                by_angle += turned(sample, after, self.angle_count());
+                by_any += furthest(sample, after);
+            }
+            if by_angle > PATH || by_any > PATH && path.len() >= MOVED {
+                break;
+            }
+            path.push(sample);
+        }
+        path.reverse();
+        path
+    }
+
     /// The last samples up to a time, of those that lie closest together there.
     fn before(&self, horizon: f64) -> Vec<&Sample> {
         let trace = &self.outcome.trace;
         let is_known = |sample: &&Sample| sample.t <= horizon;
         if trace.tail.front().is_some_and(|first| first.t < horizon) {
-            last_stretch(trace.tail.iter().filter(is_known))
+            self.last_stretch(trace.tail.iter().filter(is_known))
         } else if trace.head.last().is_some_and(|last| last.t >= horizon) {
-            last_stretch(trace.head.iter().filter(is_known))
+            self.last_stretch(trace.head.iter().filter(is_known))
         } else {
-            last_stretch(trace.whole.iter().filter(is_known))
+            self.last_stretch(trace.whole.iter().filter(is_known))
         }
     }
 
     fn mechanism_chart(&self) -> MechanismChart {
         let (path, more) = self.path();
-        let coarse = is_coarse(&path);
+        let coarse = is_coarse(&path, self.angle_count());
         let drawing = self.drawing();
         let traced = drawing.traced();
         let trails = if coarse {
@@ -317,6 +327,7 @@ impl Finished<'_> {
             .map(|horizon| smoothed(&path).partition_point(|(t, _)| *t <= horizon));
         let mut caption = self.caption(more);
         caption.extend(past);
+        caption.extend(coarse.then(|| "no path, as rows are too far apart for one".to_owned()));
         MechanismChart {
             title,
             caption,
@@ -330,7 +341,7 @@ impl Finished<'_> {
 
     fn angles(&self) -> Angles {
         let (window, more) = self.window();
-        let is_coarse = is_coarse(&window);
+        let is_coarse = is_coarse(&window, self.angle_count());
         let smooth = match is_coarse {
             true => window.iter().map(|sample| (sample.t, sample.phi.clone())).collect(),
             false => smoothed(&window),

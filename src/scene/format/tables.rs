@@ -191,7 +191,7 @@ pub(in crate::scene) static OUTRIGHT_BAR: KeyTable = KeyTable {
             FieldShape::Number(not_negative("m")),
             "0.6",
             "Length in drawings; if absent, twice the distance of the centre, or twice the radius of \
-                gyration where that is zero.",
+                gyration where that is zero.  A body with nothing but its centre of mass is drawn about it.",
         ),
     ],
 };
