@@ -221,3 +221,51 @@ fn charts_show_rows_alone_where_they_are_far_apart_and_motors_that_hold() {
     program.run("run held.json --until 0.5 -q").exits(0);
     assert!(program.files().iter().any(|file| file.ends_with("torque_power.png")));
 }
+
+/// Frames of an animation, and how long each stays \[1/100 s\].
+fn frames(path: &std::path::Path) -> Vec<u16> {
+    let file = std::fs::File::open(path).expect("an animation");
+    let mut decoder = gif::DecodeOptions::new().read_info(file).expect("a GIF");
+    std::iter::from_fn(|| decoder.read_next_frame().expect("a frame").map(|frame| frame.delay)).collect()
+}
+
+#[test]
+fn animations_have_rows_alone_where_they_are_far_apart_and_frames_enough_of_fast_motions() {
+    let program = Program::with_scenes(&["free", "andrews"]);
+    let of = |arguments: &str, folder: &str| {
+        program.run(&format!("run {arguments} --trust off --gif -q --out {folder}")).exits(0);
+        let file = program
+            .files()
+            .into_iter()
+            .find(|file| file.starts_with(folder) && file.ends_with("mechanism.gif"));
+        frames(&program.path(&file.expect("an animation")))
+    };
+    assert_eq!(of("free.json --until 10 --every 1", "a"), [100; 11]);
+    assert_eq!(of("free.json --until 12 --every 1 --window 0..10", "b"), [100; 11]);
+    let fast = of("andrews.json", "c");
+    assert!(fast.len() > 50 && fast.iter().all(|&delay| delay == 4), "{} frames", fast.len());
+}
+
+#[test]
+fn runs_of_a_single_row_have_no_charts_against_time() {
+    let program = Program::with_scenes(&["free"]);
+    program.run("run free.json --max-evaluations 1 --until 10 --every 10 -q");
+    let files = program.files();
+    assert!(files.iter().any(|file| file.ends_with("mechanism.png")), "{files:?}");
+    assert!(!files.iter().any(|file| file.ends_with("energy_drift.png")), "{files:?}");
+}
+
+#[test]
+fn pages_of_sweeps_without_numbers_have_no_colours_and_profiles_have_their_axis() {
+    let program = Program::with_scenes(&["free"]);
+    let page = |vary: &str, out: &str| {
+        let sweep = "sweep free.json --html --no-charts -q --until";
+        program.run(&format!("{sweep} {vary} --out {out}")).exits(0);
+        let file = program.files().into_iter().find(|file| file.starts_with(out) && file.ends_with("html"));
+        program.read(&file.expect("a page"))
+    };
+    let still = page("0.01 --vary bar1.phi=0..0.1:2 --vary bar2.phi=0..0.1:2", "a");
+    assert!(still.contains(r#""colours":null"#));
+    let narrow = page("2 --vary bar1.phi=3.0..3.1:3", "b");
+    assert!(narrow.contains(r#""log":false"#) && !narrow.contains(r#""log":true,"high_is_dark""#));
+}

@@ -72,6 +72,7 @@ pub use mechanism::{MechanismChart, mechanism};
 pub use motion::{Animation, MotionGif, motion_apng, motion_gif};
 pub use multipliers::{Multipliers, multipliers};
 pub use outputs::{OutputSeries, OutputsChart, outputs};
+pub(crate) use profile::spans_decades;
 pub use profile::{ProfileChart, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpiralPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};

@@ -51,11 +51,7 @@ pub fn profile(chart: &ProfileChart, px_per_pt: f64) -> Result<Picture, ChartErr
             .fold((high, low), |(from, to), &x| (x.min(from), x.max(to)));
     }
     let values = || chart.y.iter().copied();
-    let (least, most) = values()
-        .filter(|y| y.is_finite())
-        .fold((f64::INFINITY, 0.0_f64), |(low, high), y| (low.min(y), high.max(y)));
-    // Within a decade or so a linear axis shows as much and wastes less.
-    let y = if chart.log && most > 20.0 * least {
+    let y = if chart.log && spans_decades(&chart.y) {
         Axis::decades(&chart.y_name, values())
     } else {
         Axis::fit(&chart.y_name, values())
@@ -89,6 +85,14 @@ pub fn profile(chart: &ProfileChart, px_per_pt: f64) -> Result<Picture, ChartErr
         panel.empty("no data")?;
     }
     Ok(sheet.picture(&chart.title, &chart.caption))
+}
+
+/// Whether a logarithmic axis shows values better: within a decade or so a linear one shows as much and wastes
+/// less.
+pub(crate) fn spans_decades(values: &[f64]) -> bool {
+    let finite = values.iter().filter(|value| value.is_finite());
+    let (least, most) = finite.fold((f64::INFINITY, 0.0_f64), |(low, high), &y| (low.min(y), high.max(y)));
+    most > 20.0 * least
 }
 
 #[cfg(test)]

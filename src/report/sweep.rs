@@ -316,7 +316,8 @@ impl SweepChart {
                 |end| format!("{} s each", figure(end))
             )
         ));
-        let is_log = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
+        let is_wide = is_flip || names[self.column.unwrap_or_default()].contains("drift") || name == "steps";
+        let is_log = is_wide && (axes.len() == 2 || chart::spans_decades(&self.seen));
         let never = match end {
             _ if !is_flip => "no value".to_owned(),
             Some(end) => format!("not within {} s", figure(end)),

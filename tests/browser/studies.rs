@@ -159,3 +159,29 @@ fn points_that_turn_over_at_once_are_not_said_to_stay() {
     assert!(first.as_str().expect("words").starts_with("≤ "), "{first}");
     assert!(tab.complaints().is_empty());
 }
+
+/// Labels tell every tick from the next, whatever the range.
+#[test]
+fn ticks_have_labels_of_their_own() {
+    let Some(mut browser) = Browser::start() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = scene("free");
+    let arguments =
+        ["sweep", &scene, "--html", "--no-charts", "-q", "--until", "0.01", "--vary", "bar1.phi=0..0.1:3"];
+    let page = pages(&arguments, folder.path()).remove(0);
+    let mut tab = browser.tab(DESK);
+    tab.open(&page, "");
+    let words = |tab: &mut Tab<'_>, script: &str| tab.eval(script).as_str().expect("words").to_owned();
+    let ticks = |tab: &mut Tab<'_>, low: &str, high: &str| {
+        words(tab, &format!("tickWords(roundPlaces({low}, {high}, 5)).join()"))
+    };
+    assert_eq!(ticks(&mut tab, "0", "1e-6"), "0,2e-7,4e-7,6e-7,8e-7,1e-6");
+    assert_eq!(ticks(&mut tab, "0", "1e-30"), "0,2e-31,4e-31,6e-31,8e-31,1e-30");
+    assert_eq!(ticks(&mut tab, "-0.3", "0.4"), "-0.2,0,0.2,0.4");
+    assert_eq!(ticks(&mut tab, "2 - 1e-12", "2 + 1e-12"), "2,+5e-13,+1e-12,+1.5e-12,+2e-12");
+    assert_eq!(ticks(&mut tab, "1e6", "1e6 + 0.5"), "1000000,+0.1,+0.2,+0.3,+0.4,+0.5");
+    assert_eq!(words(&mut tab, "powerWords(decadeTicks(-0.44, -0.36)).join()"), "0.38,0.4,0.42");
+    // Where no bar turns over there is nothing to read off.
+    assert_eq!(words(&mut tab, "String(driftless.chart.names.isBlank)"), "true");
+    assert!(tab.complaints().is_empty());
+}

@@ -578,8 +578,8 @@ class Chart {
       legend: { live: true },
       scales: { x: { time: false, ...page.range }, y: { range: (_, low, high) => padded(low, high, isLog) } },
       axes: [
-        { ...axis, size: 32, values: (_, splits) => splits.map((t) => `${Number(t.toPrecision(6))} s`) },
-        { ...axis, size: 62, ...(isLog ? { incrs: [1, 2, 3, 5, 10, 20, 50, 100], values: (_, splits) => splits.map(tenTo) } : { values: (_, splits) => splits.map((y) => tick(y, splits)) }) },
+        { ...axis, size: 32, ...along, values: (_, splits) => tickWords(splits).map((t) => `${t} s`) },
+        { ...axis, size: (_, words) => page.upright(room(NARROW, words)), ...(isLog ? { incrs: [1, 2, 3, 5, 10, 20, 50, 100], values: (_, splits) => splits.map(tenTo) } : { ...upright, values: (_, splits) => tickWords(splits) }) },
       ],
       series: [
         { label: "t [s]", value: (_, t) => (t === null || t === undefined ? "–" : clock(t, page.main.every)) },
@@ -664,14 +664,38 @@ function padded(low, high, isLog) {
   return [low - air, high + air];
 }
 
-/** A number on an axis. */
-function tick(value, splits) {
-  const step = splits.length > 1 ? Math.abs(splits[1] - splits[0]) : 1;
-  const largest = Math.max(...splits.map(Math.abs));
-  if (largest !== 0 && (largest >= 1e5 || largest < 1e-3)) return value === 0 ? "0" : value.toExponential(Math.max(0, Math.ceil(Math.log10(largest / step) - 0.001)) > 1 ? 1 : 0);
-  let digits = 0;
-  while (digits < 8 && Math.abs(step * 10 ** digits - Math.round(step * 10 ** digits)) > 1e-6) digits += 1;
-  return value.toFixed(digits);
+/** Places of ticks between two ends: multiples of 1, 2 or 5 times a power of ten, about so many. */
+function roundPlaces(low, high, most) {
+  const rough = (high - low) / Math.max(2, Math.floor(most));
+  const size = Number(`1e${Math.floor(Math.log10(rough))}`);
+  const step = [1, 2, 5, 10].map((factor) => factor * size).find((step) => step >= rough * (1 - 1e-9));
+  if (!(step > 0)) return [];
+  const [first, last] = [Math.ceil(low / step - 1e-6), Math.floor(high / step + 1e-6)];
+  const places = Array.from({ length: Math.min(1000, Math.max(0, last - first + 1)) }, (_, k) => (first + k) * step);
+  return places.filter((place, k) => k === 0 || place !== places[k - 1]);
+}
+
+/** Ticks of an upright axis, or one along the page. */
+const upright = { splits: (plot, axis, low, high) => roundPlaces(low, high, plot.bbox.height / uPlot.pxRatio / 32) };
+const along = { splits: (plot, axis, low, high) => roundPlaces(low, high, plot.bbox.width / uPlot.pxRatio / 80) };
+
+/** Least width of the upright axes of charts over time. */
+const NARROW = 62;
+
+/** Room for the words at the ticks of an upright axis: at least so much. */
+const room = (least, words) => Math.max(least, 20 + 6.6 * Math.max(0, ...(words || []).map((text) => text.length)));
+
+/** Numbers at the ticks of an axis, each with the digits that tell it from the next; from the first one on where these are many. */
+function tickWords(places) {
+  const step = places.length > 1 ? Math.abs(places[1] - places[0]) : Math.abs(places[0]);
+  const largest = Math.max(...places.map(Math.abs));
+  if (!(largest > 0)) return places.map(() => "0");
+  const digits = Math.max(0, Math.ceil(Math.log10(largest / step) - 1e-6));
+  if (digits > 5) return places.map((place, k) => (k ? `+${Number((place - places[0]).toPrecision(2))}` : String(Number(place.toPrecision(7)))));
+  const isPlain = largest < 1e5 && largest >= 1e-3;
+  if (!isPlain) return places.map((place) => (place === 0 ? "0" : Number(place.toExponential(digits)).toExponential()));
+  const behind = Math.max(0, -Math.floor(Math.log10(step) + 1e-6));
+  return places.map((place) => (Math.abs(place) < 0.5 * step ? "0" : place.toFixed(Math.min(20, behind))));
 }
 
 // ---------------------------------------------------------------------------------------------- page
@@ -716,6 +740,7 @@ class Page {
     this.frames = 0;
     this.told = 0;
     this.charts = [];
+    this.axes = NARROW;
     /** What a link says beside the time. */
     this.place = "";
   }
@@ -857,6 +882,18 @@ class Page {
       this.schedule();
     });
     this.charts.push(chart);
+  }
+
+  /** The width of the upright axes of all charts, whose times lie above one another: the most that one of them takes. */
+  upright(width) {
+    if (width > this.axes) {
+      this.axes = width;
+      requestAnimationFrame(() => {
+        this.charts.forEach((chart) => chart.plot?.redraw(false, true));
+        this.schedule();
+      });
+    }
+    return this.axes;
   }
 
   /** Zooms all charts with one. */
@@ -1060,8 +1097,14 @@ function entitled({ scene, description }, caption) {
 
 // ---------------------------------------------------------------------------------------------- points
 
-/** A power of ten on a linear axis of decimal logarithms, or what lies between two. */
-const power = (log) => tenTo(log) || Number((10 ** log).toPrecision(2)).toExponential();
+/** Numbers at ticks of a linear axis of decimal logarithms: powers of ten, and what lies between two with the digits that tell it from the next. */
+function powerWords(logs) {
+  const plain = (number, digits) => (number >= 1e-3 && number < 1e5 ? String(Number(number.toPrecision(digits))) : Number(number.toPrecision(digits)).toExponential());
+  const isNarrow = 2 * logs.filter(Number.isInteger).length < logs.length && logs.every((log) => log >= -3 && log < 5);
+  const words = (digits) => logs.map((log) => (isNarrow ? "" : tenTo(log)) || plain(10 ** log, digits));
+  const digits = [2, 3, 4, 5, 6, 7, 8, 9].find((digits) => new Set(words(digits)).size === logs.length) || 9;
+  return words(digits);
+}
 
 /** Places of ticks on such an axis: powers of ten, twice and five times them where they are few, else round numbers. */
 function decadeTicks(low, high) {
@@ -1120,13 +1163,19 @@ class Scatter {
     if (this.plot) this.plot.destroy();
     const colours = palette();
     const axis = { stroke: colours.grey, grid: { stroke: colours.grid, width: 1 }, ticks: { stroke: colours.grid, width: 1 }, font: "11px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif", labelSize: 20 };
-    const scale = (isLog) => ({
-      ...(isLog && { splits: (_, axis, low, high) => decadeTicks(low, high) }),
-      values: (_, splits) => splits.map((value) => (isLog ? power(value) : tick(value, splits))),
+    const scale = (isLog, linear) => ({
+      ...(isLog ? { splits: (_, axis, low, high) => decadeTicks(low, high) } : linear),
+      values: (_, splits) => (isLog ? powerWords(splits) : tickWords(splits)),
     });
+    // Where no point has a number there is nothing to read off.
+    const blank = { splits: () => [], values: () => [] };
     const sorted = [...this.points].sort((a, b) => a.x - b.x);
     const [isLogX, isLogY] = this.names.logs;
-    const around = (low, high) => (low === null ? [0, 1] : [low - 0.05 * (high - low || 1), high + 0.05 * (high - low || 1)]);
+    const around = (low, high) => {
+      if (low === null) return [0, 1];
+      const air = 0.05 * (high - low || Math.abs(low) || 1);
+      return [low - air, high + air];
+    };
     this.plot = new uPlot({
       width: Math.max(220, this.element.clientWidth),
       height: this.names.height || Math.round(Math.min(460, Math.max(260, 0.62 * this.element.clientWidth))),
@@ -1134,8 +1183,8 @@ class Scatter {
       cursor: { drag: { x: true, y: true }, points: { show: false } },
       scales: { x: { time: false, range: (_, low, high) => around(low, high) }, y: { range: (_, low, high) => around(low, high) } },
       axes: [
-        { ...axis, size: 32, label: this.names.x, ...scale(isLogX) },
-        { ...axis, size: 56, label: this.names.y, ...scale(isLogY) },
+        { ...axis, size: 32, label: this.names.x, ...scale(isLogX, along) },
+        { ...axis, size: 56, label: this.names.y, ...(this.names.isBlank ? blank : { ...scale(isLogY, upright), size: (_, words) => room(56, words) }) },
       ],
       series: [{}, { paths: () => null, points: { show: false } }],
       hooks: { draw: [(plot) => this.draw(plot)] },
@@ -1387,8 +1436,8 @@ class FieldMap {
     const widest = (ticks) => ticks.reduce((width, [, text]) => Math.max(width, context.measureText(text).width), 0);
     const { axes, colours } = this.page.told;
     this.margin[0] = Math.ceil(widest(axes[1].ticks)) + 30;
-    this.room = Math.ceil(widest(colours.ticks));
-    this.margin[2] = 14 + 12 + 8 + this.room + 24;
+    this.room = Math.ceil(widest(colours?.ticks ?? []));
+    this.margin[2] = colours ? 14 + 12 + 8 + this.room + 24 : 14;
   }
 
   /** The points as a picture, a pixel each. */
@@ -1456,7 +1505,7 @@ class FieldMap {
     context.textAlign = "center";
     context.fillText(labelled(x), left + 0.5 * width, top + height + 36);
     this.upright(context, labelled(y), [12, top + 0.5 * height]);
-    this.scale(context, [left + width + 14, top, height], colours);
+    if (told.colours) this.scale(context, [left + width + 14, top, height], colours);
     for (const index of told.cells) this.ring(context, index, colours.paper, 2.6);
     this.ring(context, this.page.asked, "#ffffff", 7.5);
     this.ring(context, this.page.asked, "#d55e00", 6);
@@ -1549,7 +1598,8 @@ class SweepPage {
     this.low = known.reduce((a, b) => Math.min(a, b), Infinity);
     this.high = known.reduce((a, b) => Math.max(a, b), -Infinity);
     if (told.colours) [this.low, this.high] = [told.colours.from, told.colours.to];
-    if (!(this.high > this.low)) [this.low, this.high] = known.length ? [this.low, this.low + 1] : [0, 1];
+    if (!(this.high > this.low)) [this.low, this.high] = known.length ? [this.low, this.low + (0.1 * Math.abs(this.low) || 1)] : [0, 1];
+    this.isBlank = known.length === 0;
     this.page = new Page();
     byId("main").hidden = false;
     const home = byId("map");
@@ -1616,7 +1666,7 @@ class SweepPage {
       text: this.described(index),
       choose: () => this.choose(index),
     }));
-    return new Scatter(home, { title: this.told.title, x: labelled(axis), y: this.told.value, logs: [false, this.told.log], joined: false, height: 300, colours: { none: () => palette().grey, failed: () => "#d55e00" } }, points);
+    return new Scatter(home, { title: this.told.title, x: labelled(axis), y: this.told.value, logs: [false, this.told.log], joined: false, isBlank: this.isBlank, height: 300, colours: { none: () => palette().grey, failed: () => "#d55e00" } }, points);
   }
 
   /** The values of a point, and what came of it. */

@@ -42,7 +42,13 @@ pub fn swept(sweep: &Sweep, curve: &SweepChart, totals: &Totals, given: &Value) 
             axis["ticks"] = json!(scale.ticks);
         }
         let ends = ends.map(|end| logarithm(end, labels.is_log));
-        colours = json!({"name": bar.name, "ticks": bar.ticks, "from": ends[0], "to": ends[1]});
+        // Where no point has a number colours mean nothing.
+        let has_numbers = curve.values().iter().any(|value| value.is_finite());
+        colours = if has_numbers {
+            json!({"name": bar.name, "ticks": bar.ticks, "from": ends[0], "to": ends[1]})
+        } else {
+            Value::Null
+        };
     }
     let rows = (sweep.plan().until / EVERY).clamp(ROWS[0], ROWS[1]);
     let mut cells = Vec::new();
