@@ -168,8 +168,8 @@ fn animated(
     Ok(Animation { width, height, frames, bytes })
 }
 
-/// What a frame says of its time, with as many digits as tell it from the next, and of the speed of time where
-/// that is not its own.
+/// What a frame says of its time, with as many digits as tell it from the next, and of the speed of time
+/// where that is not its own.
 fn clock(chart: &MotionGif, time: f64) -> (String, String) {
     let mut apart = 0.0;
     if let [first, .., last] = chart.time[..] {

@@ -87,8 +87,8 @@ pub fn profile(chart: &ProfileChart, px_per_pt: f64) -> Result<Picture, ChartErr
     Ok(sheet.picture(&chart.title, &chart.caption))
 }
 
-/// Whether a logarithmic axis shows values better: within a decade or so a linear one shows as much and wastes
-/// less.
+/// Whether a logarithmic axis shows values better: within a decade or so a linear one shows as much and
+/// wastes less.
 pub(crate) fn spans_decades(values: &[f64]) -> bool {
     let finite = values.iter().filter(|value| value.is_finite());
     let (least, most) = finite.fold((f64::INFINITY, 0.0_f64), |(low, high), &y| (low.min(y), high.max(y)));

@@ -188,8 +188,8 @@ impl MechanismDrawing<'_> {
         })
     }
 
-    /// True of a body whose origin is its centre of mass, with nothing of the scene elsewhere on it: a ball, a
-    /// cart, a block.
+    /// True of a body whose origin is its centre of mass, with nothing of the scene elsewhere on it: a ball,
+    /// a cart, a block.
     fn is_centred(&self, bar: usize) -> bool {
         let scene = self.scene;
         let hinges = scene.hinges.iter().flat_map(|hinge| hinge.between);
