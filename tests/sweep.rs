@@ -901,7 +901,7 @@ mod command {
         let program = Program::with_scenes(&["kite"]);
         let words = "start.crank.phi is not as varied at the start of 3 of 3 points, but up to 0.4";
         let sweep = "sweep kite.json --vary crank.phi=0.5..1:3 --until 0.05 --every 0.01 --force";
-        let ran = program.run(&format!("{sweep} --html --chart-format svg")).exits(0);
+        let ran = program.run(&format!("{sweep} --html --map crank.phi --chart-format svg")).exits(0);
         let told = ran.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(told.contains(words), "{told}");
         let folder = "output/kite/sweep-start.crank.phi-taylor-1e-9-projection";
