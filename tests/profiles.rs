@@ -151,7 +151,7 @@ fn a_law_that_jumps_is_refused_where_it_does() {
     let outcome = run(&scene(&text), &adaptive(MethodId::Dp8, 1e-10));
     let stop = outcome.stop.expect("a stop");
     assert_eq!((stop.cause, stop.t), (Cause::Unsuited, 1.0), "{stop}");
-    assert!(stop.what.contains("leaves constraint M by 1.0e-1"), "{stop}");
+    assert!(stop.what.contains("leaves constraint M violated by "), "{stop}");
 }
 
 #[test]

@@ -197,6 +197,7 @@ impl Mechanism {
             mechanism = next;
         }
         mechanism.check_forces(scene, &start)?;
+        mechanism.check_aims(&start)?;
         mechanism.energy_scale = mechanism.scale_of_energy(&start);
         mechanism.scale_contacts(&start);
         mechanism.units = Units::new(&mechanism, scene, &start);

@@ -7,6 +7,7 @@ use super::event::{Action, Change, EventDetector, SwitchFunction};
 use super::latch;
 use super::monitor::Monitor;
 use super::running::Outcome;
+use crate::arithmetic::shown::about;
 use crate::dynamics::compile::Laws;
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::kernel::Kernel;
@@ -87,7 +88,10 @@ impl ContactDriver {
             method: outcome.plan.method.to_string(),
             t: contact_driver.motion().time.hi,
             step: 0.0,
-            what: format!("event `{event}` {what}"),
+            what: match flips {
+                Some(_) => format!("a formula of `{event}` changes its branch here, and {what}"),
+                None => format!("event `{event}` {what}"),
+            },
             hint: hint.into(),
         };
         let before = self.motion();
@@ -219,8 +223,9 @@ fn stays(free: &Mechanism, contact: usize, motion: &Motion) -> bool {
         && contact.gap_rate(motion.time, &phi, &z, &omega).abs() <= SATISFIED * speed
 }
 
-/// Violations of every constraint at both levels, over its unit and over the speeds of the motion.
-fn violations(mechanism: &Mechanism, motion: &Motion) -> Vec<[f64; 2]> {
+/// Violations of every constraint at both levels: over its unit and over the speeds of the motion, and as
+/// they are \[rad or m, and that per s\].
+fn violations(mechanism: &Mechanism, motion: &Motion) -> Vec<[[f64; 2]; 2]> {
     let [phi, omega] = motion.rounded();
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.linearise_at::<0>(mechanism, motion.time, &phi, &omega);
@@ -228,8 +233,8 @@ fn violations(mechanism: &Mechanism, motion: &Motion) -> Vec<[f64; 2]> {
     let step_size = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs() * time));
     let of = |(r, row): (usize, &ConstraintEquation)| {
         let unit = if row.is_in_radians() { 1.0 } else { size };
-        let rate = kernel.row_rate(r, &omega).abs() / unit * time;
-        [kernel.rows[r].position.abs() / unit, rate / step_size]
+        let [position, rate] = [kernel.rows[r].position.abs(), kernel.row_rate(r, &omega).abs()];
+        [[position / unit, rate / unit * time / step_size], [position, rate]]
     };
     mechanism.constraints.iter().enumerate().map(of).collect()
 }
@@ -241,14 +246,12 @@ fn broken([(earlier, before), (mechanism, after)]: [(&Mechanism, &Motion); 2]) -
     }
     let drifted = violations(earlier, before);
     let before = |name: &str| earlier.constraints.iter().position(|row| row.name == name);
-    mechanism.constraints.iter().zip(violations(mechanism, after)).find_map(|(row, [position, rate])| {
-        let known = before(&row.name).map_or([0.0; 2], |r| drifted[r]);
+    mechanism.constraints.iter().zip(violations(mechanism, after)).find_map(|(row, [relative, own])| {
+        let known = before(&row.name).map_or([0.0; 2], |r| drifted[r][0]);
         let [most, fastest] = known.map(|known| (DRIFTED * known).max(SATISFIED));
-        (position > most || rate > fastest).then(|| {
-            format!(
-                "leaves constraint {} by {position:.1e} at position and {rate:.1e} at velocity level",
-                row.name
-            )
+        (relative[0] > most || relative[1] > fastest).then(|| {
+            let ([position, rate], unit) = (own.map(about), row.unit());
+            format!("leaves constraint {} violated by {position} {unit} and {rate} {unit}/s", row.name)
         })
     })
 }

@@ -2,6 +2,8 @@
 
 use super::{Body, CompileError, DENSE_LIMIT, Mechanism};
 use crate::arithmetic::{Complex, Real};
+use crate::dynamics::Motion;
+use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation};
 use crate::dynamics::forest::{BodyOrigin, Forest};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::tree::Tree;
@@ -68,7 +70,32 @@ fn long_constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tr
     Tree { coordinates: n, angles: bodies.len(), coupling: Vec::new(), diagonal, weight, off_axis }
 }
 
+/// Postures that are tried besides the start: so much of a turn, or metres, from it.
+const SHIFTS: [f64; 3] = [0.0, 0.3, 1.1];
+/// Slope of a constraint that counts as none.
+const NO_SLOPE: f64 = 1e-12;
+
 impl Mechanism {
+    /// A motor whose law is the angle or the travel that it drives asks for nothing.
+    pub(super) fn check_aims(&self, start: &Motion) -> Result<(), CompileError> {
+        let [phi, omega] = start.rounded();
+        let mut z = vec![Complex::ZERO; phi.len()];
+        let mut depends = |row: &ConstraintEquation, shift: f64| {
+            let shifted = |(k, phi): (usize, &f64)| phi + shift * (1.0 + 0.62 * k as f64).fract().max(0.1);
+            let phi: Vec<f64> = phi.iter().enumerate().map(shifted).collect();
+            let mut jacobian = vec![0.0; phi.len()];
+            self.tree.unit_vectors::<f64, 0>(&phi, &mut z);
+            row.linearise(start.time, ConstraintArguments { phi: &phi, z: &z, omega: &omega }, &mut jacobian);
+            // What is not a number may depend on anything.
+            !jacobian.iter().all(|slope| slope.abs() <= NO_SLOPE)
+        };
+        let mut driven = self.constraints.iter().filter(|row| row.aim.is_some());
+        match driven.find(|row| !SHIFTS.iter().any(|&shift| depends(row, shift))) {
+            Some(row) => Err(CompileError::DrivesNothing(row.name.clone())),
+            None => Ok(()),
+        }
+    }
+
     /// The mass matrix at the start must be positive definite.
     pub(super) fn check_mass(&self, scene: &Scene) -> Result<(), CompileError> {
         let start = self.start(scene);

@@ -10,6 +10,12 @@ pub enum CompileError {
     /// Motors and locks give the same angle twice.
     #[error("`{0}` gives an angle that the other motors and locks give already")]
     Redundant(String),
+    /// The law of a motor is what it drives.
+    #[error(
+        "the law of motor `{0}` is the angle or the travel that it drives, which asks for nothing\nhint: \
+            give it by time or by other bodies, or leave the motor out"
+    )]
+    DrivesNothing(String),
     /// Too many rows that act on one another.
     #[error(
         "{0} constraint rows that act on one another through the bodies they hang on; at most about \
@@ -150,6 +156,7 @@ impl CompileError {
             Self::Redundant(row) | Self::Impossible { row, .. } | Self::ImpossibleRates { row, .. } => {
                 Some((CONSTRAINTS, row.split_once('.').map_or(row.as_str(), |(part, _)| part)))
             }
+            Self::DrivesNothing(motor) => Some((&["motors"], motor)),
             Self::Massless(bar) => Some((&["bars"], bar)),
             Self::SpringWithoutLength(spring) | Self::NotAlone { spring, .. } => Some((&["springs"], spring)),
             Self::NotFinite { force, .. } => Some((FORCES, force)),

@@ -6,6 +6,7 @@ use super::super::driver::MOST_TURNS;
 use super::super::methods::{MethodId, Stabilization};
 use super::super::plan::Plan;
 use super::super::sample::Sample;
+use crate::arithmetic::Scalar;
 use crate::arithmetic::shown::estimate;
 use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::stepping::{Cause, StepError};
@@ -13,11 +14,24 @@ use crate::stepping::{Cause, StepError};
 /// Share of the output interval by which a row may be beside its time.
 const BESIDE: f64 = 1e-6;
 
+/// Time before and after a stop, over the mechanism's unit, and how much larger than at both a formula is
+/// that grows without bound.
+const NEAR: f64 = 1e-3;
+const GROWN: f64 = 1e3;
+const NO_VALUE: &str = "it divides by zero, or takes a root, logarithm or power of a number that has none: \
+    change it, or end the run before by an event";
+
 /// Steps that shrink where surfaces jam, or near singular positions, have another cause than a stiff spring.
 pub(super) fn advised(stop: StepError, at: &mut ContactDriver) -> StepError {
     let shrinks = stop.cause == Cause::StepTooSmall;
     if (shrinks || stop.cause == Cause::NotFinite) && at.jams() {
         return StepError { cause: Cause::Friction, what: JAMS.into(), hint: HINT.into(), ..stop };
+    }
+    if (shrinks || stop.cause == Cause::NotFinite)
+        && let Some(part) = breaking_formula(at, stop.step)
+    {
+        let what = format!("the formula of `{part}` has no finite value here");
+        return StepError { what, hint: NO_VALUE.into(), ..stop };
     }
     if !shrinks || !at.has_closed_loops() {
         return stop;
@@ -28,6 +42,38 @@ pub(super) fn advised(stop: StepError, at: &mut ContactDriver) -> StepError {
         hint: format!("a singular position of the constraints may be near: {hint}, or another tolerance"),
         ..stop
     }
+}
+
+/// The part whose formula has no finite value where the run has stopped, or within a step of it, or grows
+/// without bound there.
+fn breaking_formula(at: &mut ContactDriver, step: f64) -> Option<String> {
+    let here = at.motion();
+    let mechanism = &at.whole;
+    let laws = mechanism.laws.as_ref()?;
+    let unit = mechanism.units.time;
+    let values = |seconds: f64| {
+        let mut motion = here.clone();
+        motion.time = motion.time + seconds;
+        for (phi, omega) in motion.phi.iter_mut().zip(&here.omega) {
+            *phi += omega.scale(seconds);
+        }
+        mechanism.seen(&motion, |at| {
+            let all = laws.formulas.values_by_part(at, &laws.parameters).into_iter();
+            all.map(|(name, value)| (name.to_owned(), value)).collect::<Vec<_>>()
+        })
+    };
+    let acts = |name: &String| !at.off.contains(name);
+    let steps = (-14..=-4).map(|decade| 10_f64.powi(decade) * unit).chain([step, 10.0 * step]);
+    let lost = std::iter::once(0.0).chain(steps).find_map(|seconds| {
+        values(seconds).into_iter().find(|(name, value)| acts(name) && !value.is_finite())
+    });
+    let grown = || {
+        let [before, now, after] = [-NEAR * unit, 0.0, NEAR * unit].map(values);
+        let largest = |k: usize| before[k].1.abs().max(after[k].1.abs());
+        let grows = |&k: &usize| acts(&now[k].0) && now[k].1.abs() > GROWN * largest(k);
+        (0..now.len()).find(grows).map(|k| now[k].0.clone())
+    };
+    lost.map(|(name, _)| name).or_else(grown)
 }
 
 /// Loops and sliders that nothing projects let go at singular positions, and the motion goes on smoothly on
