@@ -49,13 +49,14 @@ pub(crate) fn rough(x: f64) -> String {
 }
 
 fn decimal(x: f64, digits: i32) -> String {
-    let size = x.abs();
     if x == 0.0 {
         return "0".into();
     }
     if !x.is_finite() {
         return not_finite(x).into();
     }
+    // By its size as it is shown: 999999.7 to six digits is 1e6.
+    let size = format!("{x:.0$e}", digits as usize - 1).parse().unwrap_or(x).abs();
     if !(1e-4..1e6).contains(&size) {
         let text = format!("{x:.0$e}", digits as usize - 1);
         let Some((mantissa, exponent)) = text.split_once('e') else { return text };
@@ -102,6 +103,8 @@ mod tests {
             (1.234_567_8e-5, "1.23457e-5"),
             (123_456.7, "123457"),
             (1e6, "1e6"),
+            (999_999.7, "1e6"),
+            (99.999_99, "100"),
             (-1.5e-12, "-1.5e-12"),
             (f64::NAN, "not a number"),
             (f64::INFINITY, "infinite"),

@@ -2,7 +2,7 @@
 //! stdout.
 
 use super::output::print_object;
-use crate::arithmetic::shown::about;
+use crate::arithmetic::shown::{about, figure};
 use crate::dynamics::CompileError;
 use crate::dynamics::assembly::StartChange;
 use crate::run::files::quoted;
@@ -149,7 +149,7 @@ impl From<StepError> for Failure {
         };
         let StepError { method, t, step, what, hint, .. } = &error;
         let step = if *step > 0.0 { format!(" (step {} s)", about(*step)) } else { String::new() };
-        let message = format!("{method} stopped at t = {t} s{step}: {what}\nhint: {hint}");
+        let message = format!("{method} stopped at t = {} s{step}: {what}\nhint: {hint}", figure(*t));
         Self { details: json!(error), ..Self::new(exit, message) }
     }
 }

@@ -13,6 +13,7 @@ use super::interrupt::{self, CheckpointTimer};
 use super::output::{name_files, print, print_objects};
 use super::progress::RunProgress;
 use super::resume::{PendingWork, SavedWork};
+use crate::arithmetic::shown::figure;
 use crate::dynamics::Mechanism;
 use crate::report;
 use crate::run::async_writer::AsyncWriter;
@@ -138,7 +139,11 @@ pub fn resume(
         );
         return Err(Failure::new(Exit::Usage, text));
     }
-    flags.scene.remark(&format!("{}; from t = {} s on", report::setting(snapshot.plan()), snapshot.time()));
+    flags.scene.remark(&format!(
+        "{}; from t = {} s on",
+        report::setting(snapshot.plan()),
+        figure(snapshot.time())
+    ));
     let running =
         Running::resume(Arc::clone(&mechanism), &mechanism.start(&scene), *snapshot)?.timed(wall_clock);
     let table = Table::going_on(&mechanism, folder.take_up(TRAJECTORY, &cursor)?);
@@ -263,7 +268,7 @@ impl SimulateTask<'_> {
             if interrupt::is_asked() {
                 progress.finish();
                 return Err(Failure::interrupted(
-                    &format!("t = {} s of {} s", running.time(), running.plan().until),
+                    &format!("t = {} s of {} s", figure(running.reached()), figure(running.plan().until)),
                     folder.path(),
                 ));
             }

@@ -77,7 +77,7 @@ pub type Pause<'a> = dyn FnMut() -> bool + 'a;
 /// Where a driver is, with all that its next step depends on.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct DriverState {
-    state: State,
+    pub(super) state: State,
     statistics: Statistics,
     /// Where a dense method began its last step; without unknowns where it made none.
     pub(super) from: State,

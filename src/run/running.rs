@@ -214,6 +214,11 @@ impl Running {
         self.outcome.last.t
     }
 
+    /// The time up to which it has integrated, where a checkpoint goes on \[s\].
+    pub fn reached(&self) -> f64 {
+        self.contact_driver.driver.place().state.time.hi.max(self.time())
+    }
+
     /// Integrates on until it is over (true), or `pause`, asked after every step and every row, wants it to
     /// pause (false).
     ///

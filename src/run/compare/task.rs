@@ -96,7 +96,8 @@ impl CompareTask<'_> {
             self.is_over,
         );
         if let Some(stop) = &near.stop {
-            notes.push(format!("runs in doubles for the horizon stopped at t = {} s: {}", stop.t, stop.what));
+            let (t, what) = (crate::arithmetic::shown::figure(stop.t), &stop.what);
+            notes.push(format!("runs in doubles for the horizon stopped at t = {t} s: {what}"));
         }
         let mut measured = near.horizon.unwrap_or(if near.until > 0.0 { near.until } else { until });
         let lines = self.lines_of(|_, _| Vec::new(), &mut Vec::new(), until).len();

@@ -18,6 +18,7 @@
 use super::finer::neighbour;
 use super::measured::LAST_DIGIT;
 use super::{DistanceMetric, Trust};
+use crate::arithmetic::shown::figure;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
 use crate::run::contact::ContactDriver;
@@ -266,7 +267,7 @@ impl<'a, 'b> NeighbourRuns<'a, 'b> {
             }
         }
         self.inputs.evaluations += contact_driver.statistics().evaluations;
-        let why = stop.map(|stop| format!("at t = {} s: {}", stop.t, stop.what));
+        let why = stop.map(|stop| format!("at t = {} s: {}", figure(stop.t), stop.what));
         (motions, if is_paused { Some("interrupted".into()) } else { why })
     }
 

@@ -3,6 +3,7 @@
 use super::budget::Prices;
 use super::finer::{is_rounded, own_error};
 use super::tangent::{Path, TangentFlow};
+use crate::arithmetic::shown::figure;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
 use crate::run::contact::{ContactDriver, ContactDriverState, JumpLog};
@@ -223,7 +224,7 @@ impl ReferenceRun {
         };
         let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
         if !arrived.map_err(|stop| {
-            Some(format!("the reference solution stopped at t = {} s: {}", stop.t, stop.what))
+            Some(format!("the reference solution stopped at t = {} s: {}", figure(stop.t), stop.what))
         })? || *budget.spent > budget.limit
         {
             return Err(None);
