@@ -6,7 +6,7 @@ mod charts;
 #[cfg(feature = "charts")]
 pub use charts::{CompareChart, chart_data, draw};
 
-use super::page::{Page, figure, magnitude, rough};
+use super::page::{Page, counted, figure, magnitude, rough};
 use crate::dynamics::Mechanism;
 use crate::run::compare::{Advice, Comparison, Entry, Fate, LOST, RunMeasurement};
 use crate::run::{Drift, MethodId, Plan, Stabilization};
@@ -339,31 +339,57 @@ pub(super) fn sorted(comparison: &Comparison) -> Vec<(usize, &Entry)> {
     entries
 }
 
-/// What did not come to its end, and why.
+/// What did not come to its end, and why: settings of one method that ended for one cause in one line.
 fn failures(page: &mut Page, comparison: &Comparison, letters: bool) {
     let mut label = "not finished";
-    let mut last = None;
-    for (_, entry) in sorted(comparison) {
-        // All that are finer than one that took too long are one line.
-        let is_again =
-            last.replace((entry.name(), entry.fate.clone())) == Some((entry.name(), Fate::Late(0.0)));
+    let failed: Vec<&Entry> = (sorted(comparison).into_iter().map(|(_, entry)| entry))
+        .filter(|entry| entry.fate != Fate::Done)
+        .collect();
+    for group in failed.chunk_by(|a, b| is_alike(a, b)) {
+        let [entry, others @ ..] = group else { continue };
         let why = match &entry.fate {
             Fate::Done => continue,
-            Fate::Late(0.0) if is_again => continue,
             Fate::Stopped(stop) => {
-                format!("stopped ({}) at t = {} s: {}", stop.cause.word(), rough(stop.t), stop.what)
+                format!("stopped ({}) at t = {}: {}", stop.cause.word(), times(group), stop.what)
             }
             Fate::Refused(refusal) => format!("refused: {}", refusal.reason),
             Fate::Late(0.0) => "and finer ones left out: a coarser one took too long".into(),
-            Fate::Late(t) => format!("at t = {} s its share of the time was over", rough(*t)),
+            Fate::Late(_) => format!("at t = {} its share of the time was over", times(group)),
         };
         let kept = match (&entry.fate, entry.stabilization) {
             (Fate::Refused(_), Some(kind)) => format!(" with {kind}"),
             _ => String::new(),
         };
+        let more = match others.len() {
+            _ if entry.fate == Fate::Late(0.0) || !kept.is_empty() => String::new(),
+            0 => String::new(),
+            count => format!(" and {}", counted(count as u64, "other setting", "other settings")),
+        };
         page.entry(
             std::mem::take(&mut label),
-            &format!("{}{kept}: {why}", short(entry, letters && kept.is_empty())),
+            &format!("{}{kept}{more}: {why}", short(entry, letters && kept.is_empty())),
         );
     }
+}
+
+/// True for settings of one method that did not finish for one cause.
+fn is_alike(a: &Entry, b: &Entry) -> bool {
+    a.name() == b.name()
+        && match (&a.fate, &b.fate) {
+            (Fate::Stopped(a), Fate::Stopped(b)) => a.cause == b.cause,
+            (Fate::Late(a), Fate::Late(b)) => (*a == 0.0) == (*b == 0.0),
+            (a, b) => a == b,
+        }
+}
+
+/// The times at which settings ended: `3 s`, `0.5 to 3 s`.
+fn times(group: &[&Entry]) -> String {
+    let time = |entry: &&Entry| match &entry.fate {
+        Fate::Stopped(stop) => stop.t,
+        Fate::Late(t) => *t,
+        Fate::Done | Fate::Refused(_) => 0.0,
+    };
+    let times = group.iter().map(time);
+    let [first, last] = times.fold([f64::INFINITY, 0.0_f64], |[a, b], t| [a.min(t), b.max(t)]).map(rough);
+    if first == last { format!("{first} s") } else { format!("{first} to {last} s") }
 }

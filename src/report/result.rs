@@ -152,6 +152,22 @@ pub fn files(folder: &Path, names: &[Cow<'static, str>]) -> String {
     page.into_text()
 }
 
+/// Bodies and constraints that the page lists; the record has all.
+const LISTED: usize = 24;
+
+/// How many of so many are in the record alone.
+fn more(page: &mut Page, count: usize, [one, many]: [&str; 2]) {
+    if count > LISTED {
+        let others = counted((count - LISTED) as u64, &format!("more {one}"), &format!("more {many}"));
+        page.entry("", &format!("{others} in run.json"));
+    }
+}
+
+/// An energy lost \[J\], without what rounding leaves of nothing.
+pub(super) fn loss(lost: f64, scale: f64) -> String {
+    if lost.abs() <= 1e-12 * scale { "0".into() } else { figure(lost) }
+}
+
 /// The report as a page.
 pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     let Outcome { plan, statistics, drift, last, .. } = outcome;
@@ -172,7 +188,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         page.entry("stopped", &format!("at t = {} s: {}", figure(stop.t), stop.what));
     }
     page.entry("final state", &format!("t = {} s", figure(last.t)));
-    let rows: Vec<Vec<String>> = (mechanism.own_bodies().iter().enumerate())
+    let rows: Vec<Vec<String>> = (mechanism.own_bodies().iter().enumerate().take(LISTED))
         .map(|(k, body)| {
             let ([x, y], [vx, vy]) = (last.centre[k], last.velocity[k]);
             let numbers = [last.phi[k], last.omega[k], x, y, vx, vy];
@@ -180,6 +196,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         })
         .collect();
     page.table(&["body", "phi [rad]", "omega [rad/s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]"], &rows);
+    more(&mut page, mechanism.own_bodies().len(), ["body", "bodies"]);
     for (number, (name, k)) in mechanism.integrals().enumerate() {
         let label = if number == 0 { "integrals" } else { "" };
         page.entry(label, &format!("{name} = {}", figure(last.omega[k])));
@@ -197,7 +214,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         page.entry("", &format!("measured on {}", drift.kind));
     }
     for ((name, [position, velocity]), row) in
-        drift.constraints.iter().zip(&mechanism.with_all_parts().constraints)
+        drift.constraints.iter().zip(&mechanism.with_all_parts().constraints).take(LISTED)
     {
         let unit = row.unit();
         page.entry(
@@ -209,6 +226,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
             ),
         );
     }
+    more(&mut page, drift.constraints.len(), ["constraint", "constraints"]);
     if let Some(singular) = &drift.singular {
         let (smallest, constraint) = (magnitude(singular.smallest), &singular.constraint);
         page.entry(
@@ -223,7 +241,11 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     if !mechanism.contacts.is_empty() {
         page.entry(
             "impacts",
-            &format!("{}, {} J lost in them", outcome.impact_count, figure(outcome.impact_loss)),
+            &format!(
+                "{}, {} J lost in them",
+                outcome.impact_count,
+                loss(outcome.impact_loss, mechanism.energy_scale)
+            ),
         );
         if outcome.persistent_contact_count > 0 {
             let still = outcome

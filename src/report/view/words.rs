@@ -1,6 +1,7 @@
 //! What a run's record says, for people.
 
 use crate::report::page::{counted, figure, magnitude, rough};
+use crate::report::result::loss;
 use crate::report::trust::how_near;
 use crate::run::Sweep;
 use crate::scene::Scene;
@@ -133,10 +134,11 @@ pub(super) fn summary(record: &Value) -> Vec<[String; 2]> {
             format!("{name}: {} {unit} and {} {unit}/s at most", most("position_max"), most("velocity_max")),
         );
     }
+    let scale = number(&result["energy"]["scale"]).unwrap_or(0.0);
     let many = |key: &str, what: &str| {
         let count = result[key]["count"].as_u64().filter(|&count| count > 0)?;
         let lost = number(&result[key]["energy_lost_j"])
-            .map_or(String::new(), |lost| format!(", {} J lost in them", figure(lost)));
+            .map_or(String::new(), |lost| format!(", {} J lost in them", loss(lost, scale)));
         Some((what.to_owned(), format!("{count}{lost}")))
     };
     for (key, what) in [("impacts", "impacts"), ("holds", "stays on walls"), ("events", "events")] {
