@@ -225,8 +225,8 @@ impl Finished<'_> {
 
     /// `10 s to 12 s of 500 s`.
     fn chosen_window(&self) -> String {
-        let [from, to] = self.outcome.trace.window.unwrap_or_default();
-        format!("{} s to {} s of {} s", figure(from), figure(to), figure(self.outcome.last.t))
+        let ([from, to], end) = (self.outcome.trace.window.unwrap_or_default(), self.outcome.last.t);
+        format!("{} s to {} s of {} s", figure(from.max(0.0)), figure(to.min(end)), figure(end))
     }
 
     /// All samples of the window asked for, or the last ones, as far back as the fastest body turns by

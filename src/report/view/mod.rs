@@ -97,6 +97,9 @@ fn kept(
     span: [f64; 2],
     window: Option<[f64; 2]>,
 ) -> Result<KeptRows, ViewError> {
+    if let Some(window) = window.filter(|[from, to]| *from > span[0] || *to < 0.0) {
+        return Err(ViewError::Window { file: folder.join(TRAJECTORY), window, until: span[0] });
+    }
     let mut reader = TableReader::open(&folder.join(TRAJECTORY))?;
     fits(reader.names(), &table::header(mechanism), folder)?;
     reader.only(columns.iter().map(|column| column.source));
@@ -259,10 +262,27 @@ impl Viewed {
     }
 }
 
+fn of_several_scenes(runs: &[Viewed]) -> bool {
+    runs.iter().any(|run| run.scene.name != runs[0].scene.name)
+}
+
+/// The names of runs on a page: those of their folders, with the scene before where scenes differ.
+fn labels(runs: &[Viewed]) -> Vec<String> {
+    let with_scene = of_several_scenes(runs);
+    let label = |run: &Viewed| match with_scene {
+        true => format!("{}/{}", run.scene.name, run.label),
+        false => run.label.clone(),
+    };
+    runs.iter().map(label).collect()
+}
+
 /// A page of these runs: the first in full, the others beside it.
 pub fn page(runs: &[Viewed]) -> Document {
-    let names: Vec<&str> = runs.iter().map(|run| run.label.as_str()).collect();
+    let names = labels(runs);
     let mut data: Vec<Value> = runs.iter().map(Viewed::data).collect();
+    for (data, name) in data.iter_mut().zip(&names) {
+        data["label"] = json!(name);
+    }
     let mut tables: Vec<Vec<PackedColumn>> = runs.iter().map(Viewed::table).collect();
     let Some((first, others)) = runs.split_first() else { return Document::default() };
     for other in others {
@@ -274,7 +294,10 @@ pub fn page(runs: &[Viewed]) -> Document {
         }
     }
     Document {
-        title: format!("{}: {}", first.scene.name, names.join(", ")),
+        title: match of_several_scenes(runs) {
+            true => names.join(", "),
+            false => format!("{}: {}", first.scene.name, names.join(", ")),
+        },
         data: json!({"kind": "runs", "runs": data}),
         tables,
     }
