@@ -48,13 +48,13 @@ pub fn run(flags: &CompareFlags) -> Result<(), Failure> {
     );
     progress.finish();
     let comparison = comparison?;
-    keep(&scene, &mechanism, &comparison, &mut folder, flags)?;
+    keep(&scene, &mechanism, &comparison, &mut folder, flags).inspect_err(|_| folder.take_back())?;
     tell(&scene, &mechanism, &comparison, &folder, flags)?;
     if comparison.is_whole {
         return Ok(());
     }
     let message =
-        format!("interrupted; {} of what was measured is in {}", count(&comparison), quoted(folder.path()));
+        format!("interrupted; what was measured, {}, is in {}", count(&comparison), quoted(folder.path()));
     Err(Failure::new(Exit::Interrupted, message).told())
 }
 

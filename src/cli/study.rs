@@ -73,26 +73,14 @@ impl<'a> StudyFolder<'a> {
     /// Writes and prints the results of a study; every file that an earlier one `may` have left goes.
     ///
     /// # Errors
-    /// A file that cannot be written, or what is missing in the results.
+    /// A file that cannot be written, with which none is left, or what is missing in the results.
     pub fn publish(self, study: StudyFiles, may: &[&str]) -> Result<(), Failure> {
-        let StudyFiles { files: tables, record, mut object, text, failure, .. } = study;
         let mut folder = Folder::open(&self.path, self.flags.force)?;
         if self.flags.force {
             folder.clear(may)?;
         }
-        for (name, content) in &tables {
-            folder.write(*name, content)?;
-        }
-        #[cfg(feature = "charts")]
-        {
-            for (name, picture) in &study.pictures {
-                self.flags.charts.keep(&mut folder, name, picture, self.tell)?;
-            }
-            for (motion, (name, drawn)) in self.motion.iter().cycle().zip(&study.motions) {
-                motion.keep(&mut folder, name, drawn, self.tell)?;
-            }
-        }
-        folder.write(record, format!("{object:#}\n").as_bytes())?;
+        self.write(&study, &mut folder).inspect_err(|_| folder.take_back())?;
+        let StudyFiles { mut object, text, failure, .. } = study;
         name_files(&mut object, &folder);
         if self.tell.json {
             print_object(&object)?;
@@ -100,5 +88,21 @@ impl<'a> StudyFolder<'a> {
             print(&(text + &files(folder.path(), folder.names())))?;
         }
         failure.map_or(Ok(()), |failure| Err(if self.tell.json { failure.told() } else { failure }))
+    }
+
+    fn write(&self, study: &StudyFiles, folder: &mut Folder) -> Result<(), Failure> {
+        for (name, content) in &study.files {
+            folder.write(*name, content)?;
+        }
+        #[cfg(feature = "charts")]
+        {
+            for (name, picture) in &study.pictures {
+                self.flags.charts.keep(folder, name, picture, self.tell)?;
+            }
+            for (motion, (name, drawn)) in self.motion.iter().cycle().zip(&study.motions) {
+                motion.keep(folder, name, drawn, self.tell)?;
+            }
+        }
+        Ok(folder.write(study.record, format!("{:#}\n", study.object).as_bytes())?)
     }
 }

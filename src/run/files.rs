@@ -240,10 +240,19 @@ impl Folder {
         }
         let failed = |source| self.failed(&name, source);
         let mut file: NamedTempFile = builder.tempfile_in(&self.path).map_err(failed)?;
-        file.write_all(content).map_err(failed)?;
+        // The file itself: errors of the temporary one tell its name.
+        file.as_file_mut().write_all(content).map_err(failed)?;
         file.persist(self.path.join(&*name)).map_err(|error| failed(error.error))?;
         self.written.push(name);
         Ok(())
+    }
+
+    /// Removes what was written, of results that cannot be written whole.
+    pub fn take_back(&mut self) {
+        for name in std::mem::take(&mut self.written) {
+            // The failure that is being told weighs more than one in this.
+            let _ = remove(self.path.join(&*name));
+        }
     }
 
     /// Removes what an earlier run left under these names, charts in all their formats.
@@ -399,6 +408,15 @@ mod tests {
         let error = Folder::open(place.path(), false).expect_err("refused").to_string();
         assert!(error.contains("driftless resume") && error.contains("--force"), "{error}");
         assert!(Folder::open(place.path(), true).is_ok() && names(place.path()).is_empty());
+    }
+
+    #[test]
+    fn results_that_cannot_be_written_whole_are_taken_back() {
+        let place = tempfile::tempdir().expect("a folder");
+        let mut folder = Folder::open(place.path(), false).expect("opened");
+        folder.write("mode1.png", b"x").expect("written");
+        folder.take_back();
+        assert!(names(place.path()).is_empty() && folder.names().is_empty());
     }
 
     #[test]
