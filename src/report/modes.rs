@@ -191,12 +191,12 @@ pub fn charts(found: &Modes) -> Result<Charts, ChartError> {
                     .collect()
             })
             .collect();
-        let rate = if mode.eigenvalue[1] > 0.0 {
-            format!("{} Hz", figure(mode.eigenvalue[1] / TAU))
-        } else {
-            format!("{} 1/s", figure(mode.eigenvalue[0]))
+        let rate = match mode.eigenvalue {
+            [_, im] if im > 0.0 => format!("at {} Hz", figure(im / TAU)),
+            [0.0, _] => "without frequency or damping".to_owned(),
+            [re, _] => format!("at {} 1/s", figure(re)),
         };
-        let title = format!("Mode {} at {rate}", k + 1);
+        let title = format!("Mode {} {rate}", k + 1);
         let chart = MechanismChart {
             title: title.clone(),
             caption: vec![

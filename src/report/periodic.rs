@@ -77,7 +77,10 @@ pub fn text(found: &PeriodicMotions) -> String {
         let name = |k: usize| found.mechanism.coordinate_name(k);
         let places = one.phi.iter().zip(&one.omega).enumerate();
         let places: Vec<String> = places
-            .map(|(k, (phi, omega))| format!("{} {} at {}", name(k), rounded(*phi), rounded(*omega)))
+            .map(|(k, (phi, omega))| {
+                let unit = if k < found.mechanism.bodies.len() { "rad" } else { "m" };
+                format!("{} {} {unit} at {} {unit}/s", name(k), rounded(*phi), rounded(*omega))
+            })
             .collect();
         page.entry("", &format!("begins at {}", places.join(", ")));
         page.entry("", &format!("closes to {:.1e}", one.residual));

@@ -236,6 +236,8 @@ fn syntax_hint(json: &str, at: usize, error: &serde_json::Error) -> &'static str
         "decimals are written with a point, as 0.6"
     } else if rest.starts_with(['+', '.', '\'']) {
         "write 0.5, not .5 or +0.5, and put text in double quotes"
+    } else if rest.starts_with(['{', '[']) && error.to_string().starts_with("trailing characters") {
+        "the scene ends before it, and a file holds one scene"
     } else if rest.starts_with(['"', '{', '[']) && before.ends_with(',') {
         "a bracket or brace before it closes too early"
     } else if rest.starts_with(['"', '{', '[']) {

@@ -1,5 +1,6 @@
 //! What a scene says that is allowed, and yet is likely not meant: degrees, millimetres, points off a bar.
 
+use super::formula::Formula;
 use super::{Place, Scene, stays::places};
 use std::f64::consts::TAU;
 
@@ -20,7 +21,15 @@ impl Scene {
         let mut doubts = self.degrees();
         doubts.extend(self.millimetres());
         doubts.extend(self.points_off_bars());
+        doubts.extend(self.constant_events());
         doubts
+    }
+
+    /// Events whose function is a number.
+    fn constant_events(&self) -> Vec<String> {
+        let is_number = |when: &str| Formula::parse(when).is_ok_and(|when| when.names().next().is_none());
+        let events = self.events.iter().filter(|event| is_number(&event.when)).take(MOST);
+        events.map(|event| format!("event `{}` never happens: its `when` is a number", event.name)).collect()
     }
 
     /// Angles of more than a turn that are whole numbers, as degrees are.

@@ -279,6 +279,7 @@ pub(super) fn name(node: &Located) -> Option<&str> {
 pub(super) fn hint(wanted: &str, known: &[&str]) -> String {
     match nearest(wanted, known.iter().copied()) {
         Some(near) => format!("did you mean `{near}`?"),
+        None if known.is_empty() => "the scene has none".to_owned(),
         None => format!("there are: {}", super::read::listed(known)),
     }
 }

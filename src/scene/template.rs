@@ -373,7 +373,7 @@ mod tests {
             ("free", "bars.bar1.desity", "`density`"),
             ("free", "bars[2].length", "there are 2"),
             ("free", "gravity", "gravity[0]"),
-            ("free", "name", "must be a name"),
+            ("free", "name", "is not a single number"),
             ("free", "springs.spring.stiffness", "add it"),
             ("motor", "start.bar1.phi", "start"),
             ("free", "a..b", ""),

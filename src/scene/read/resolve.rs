@@ -202,8 +202,9 @@ impl InOrder<'_> {
         let dimension = formula.dimension(&dimensions).map_err(refused)?;
         let value = formula.value(&values);
         if !value.is_finite() {
-            let problem = format!("comes to {value}");
-            return Err(source.refusal(span, &path, &problem, &allowed, "look for a division by zero"));
+            let problem = if value.is_nan() { "has no value" } else { "is infinite" };
+            let hint = HINTS[usize::from(formula.names().next().is_none())];
+            return Err(source.refusal(span, &path, problem, &allowed, hint));
         }
         self.known[number] = Some((value, dimension));
         Ok(())
@@ -389,8 +390,10 @@ impl Resolver<'_> {
     }
 }
 
-const HINTS: [&str; 2] =
-    ["look at the parameters it is made of", "roots, logarithms, (-1)^1.5 and 0/0 have no value"];
+const HINTS: [&str; 2] = [
+    "look at the parameters it is made of",
+    "roots and logarithms of what is below zero, (-1)^1.5 and 0/0 have no value, and 1/0 is infinite",
+];
 
 /// True where a formula has no names but t and those of parameters.
 fn is_of_time(formula: &Formula, parameters: &[Valued]) -> bool {

@@ -123,7 +123,7 @@ fn example(walked: &str, field: &Field) -> (String, String) {
         FieldShape::List { of, .. } => {
             format!("go on with the name of one, then one of {}", of.first().unwrap_or(&&UNIFORM_BAR).keys())
         }
-        shape => format!("it {}", shape.allowed()),
+        _ => "`driftless schema` describes the numbers of a scene".to_owned(),
     };
     (format!("{walked} is not a single number"), hint)
 }
