@@ -32,7 +32,7 @@ pub struct MotionFlags {
     #[arg(long, help_heading = "Files")]
     pub gif: bool,
     /// Draw the motion as an animated PNG, 1050 by 1080 pixels in all colours, from which `ffmpeg -i
-    /// mechanism.apng -pix_fmt yuv420p mechanism.mp4` makes a film
+    /// FILE.apng -pix_fmt yuv420p FILE.mp4` makes a film
     #[arg(long, help_heading = "Files")]
     pub apng: bool,
 }

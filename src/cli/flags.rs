@@ -35,8 +35,7 @@ Exit codes: 0 done, 1 other failure, 2 usage, 3 scene refused, 4 integration sto
 
 /// Simulates planar mechanisms over long horizons, and tells how far they drift.
 #[derive(Debug, Parser)]
-#[command(name = "driftless", version, max_term_width = 100, after_help = EXIT_CODES,
-    disable_help_subcommand = true)]
+#[command(name = "driftless", version, max_term_width = 100, after_help = EXIT_CODES)]
 pub struct Flags {
     #[allow(missing_docs)]
     #[command(subcommand)]
@@ -137,8 +136,8 @@ pub struct PlanFlags {
     /// Output interval in seconds [default: the scene's]
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub every: Option<f64>,
-    /// How motors' angles are kept; several, joined by commas, are run one after another [default:
-    /// elimination, or projection with rattle]
+    /// How motors' angles are kept; `run` and `check` take several, joined by commas, one after another
+    /// [default: elimination, or projection with rattle]
     #[arg(long, value_name = "HOW", value_parser = stabilizations(), value_delimiter = ',')]
     pub stabilize: Vec<Stabilization>,
     /// Time constant of Baumgarte's term in seconds [default: five mean steps]
@@ -270,8 +269,8 @@ pub struct RunFlags {
         help_heading = "Files"
     )]
     pub chart: Vec<String>,
-    /// Show this part of the run in charts, animations and pages, in seconds [default: of charts all of it or
-    /// as much as can be told apart, of animations the beginning]
+    /// Show this part of the run in charts, animations and pages, in seconds; charts of drift show all of it
+    /// [default: of charts all of it or as much as can be told apart, of animations the beginning]
     #[cfg(feature = "charts")]
     #[arg(long, value_name = "FROM..TO", value_parser = window, allow_hyphen_values = true,
         help_heading = "Files")]

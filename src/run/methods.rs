@@ -123,7 +123,7 @@ const fn radau(stages: usize, name: &'static str) -> MethodInfo {
         name,
         2 * stages as u32 - 1,
         purpose,
-        "matrices: up to about a thousand coordinates",
+        "matrices: up to 2000 coordinates",
     )
 }
 

@@ -134,8 +134,8 @@ pub(in crate::scene) static SCENE: KeyTable = KeyTable {
             "inactive",
             FieldShape::Names,
             "[\"latch\"]",
-            "Springs, torsion springs, forces, torques and potentials that do not act until an event \
-                switches them on; none if absent.",
+            "Springs, torsion springs, forces, torques, potentials, hinges, motors, locks and walls that do \
+                not act until an event switches them on; none if absent.",
         ),
         optional(
             "start",
