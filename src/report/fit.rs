@@ -91,8 +91,18 @@ pub fn text(found: &Fit) -> String {
             &format!("columns that mean nothing in the scene: {}", found.ignored.join(", ")),
         );
     }
-    page.entry("correlations", "");
+    correlations(&mut page, found);
+    page.entry("options", "");
+    page.into_text() + &options(found) + "\n"
+}
+
+/// How much of the errors of several numbers is shared.
+fn correlations(page: &mut Page, found: &Fit) {
     let names: Vec<&str> = found.numbers.iter().map(|number| number.path.as_str()).collect();
+    if names.len() < 2 {
+        return;
+    }
+    page.entry("correlations", "");
     let rows: Vec<Vec<String>> = (0..names.len())
         .map(|i| {
             let entry = |j: usize| {
@@ -103,8 +113,6 @@ pub fn text(found: &Fit) -> String {
         })
         .collect();
     page.table(&[&[""], &names[..]].concat(), &rows);
-    page.entry("options", "");
-    page.into_text() + &options(found) + "\n"
 }
 
 /// A number to so many significant digits.

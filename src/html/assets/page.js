@@ -916,7 +916,7 @@ class Page {
       const list = make("dl");
       for (const [label, text] of run.summary) list.append(make("dt", { text: label }), make("dd", { text }));
       for (const note of run.notes || []) list.append(make("dt", { text: "note" }), make("dd", { text: note }));
-      home.append(list, copied(run.command));
+      home.append(list, ...(run.command ? [copied(run.command)] : []));
       if (!run.record) continue;
       const text = make("pre");
       const record = make("details", {}, make("summary", { text: "run.json" }), text);
@@ -1210,8 +1210,8 @@ class Scatter {
       ctx.lineTo(bbox.left + bbox.width, y);
       ctx.stroke();
       ctx.font = `${11 * ratio}px system-ui, sans-serif`;
-      ctx.textAlign = "right";
-      ctx.fillText(words, bbox.left + bbox.width - 6 * ratio, y - 4 * ratio);
+      [ctx.textAlign, ctx.textBaseline] = ["right", "bottom"];
+      ctx.fillText(words, bbox.left + bbox.width - 6 * ratio, y - 2 * ratio);
     }
     ctx.setLineDash([]);
     this.series.forEach((name, k) => {
@@ -1710,7 +1710,9 @@ class SweepPage {
     const k = told.cells.indexOf(cell);
     page.time = 0;
     page.place = `cell=${index + 1}&`;
-    page.present([opened({ ...told.runs[k], command: this.commandOf(cell) }, told.tables[k], this.bytes)]);
+    // The command of the point itself stands beside the map.
+    const command = cell === index ? "" : this.commandOf(cell);
+    page.present([opened({ ...told.runs[k], command }, told.tables[k], this.bytes)]);
     if (!plays) return;
     page.play(true);
     linked(`cell=${index + 1}`);
