@@ -39,6 +39,7 @@ mod growth;
 mod growth_events;
 mod inputs;
 mod joint_forces;
+mod messages;
 mod resume;
 mod stress;
 mod sweep;

@@ -97,6 +97,21 @@ fn request(method: MethodId, stabilize: Option<Stabilization>) -> Request {
 }
 
 #[test]
+fn a_pause_between_two_rows_is_at_the_time_of_the_state() {
+    let scene = shipped("free", &[]);
+    let request = Request { every: Some(1.0), ..request(MethodId::Dp8, None) };
+    let mut running = begun(&scene, &request).expect("begun");
+    let mut left = 5;
+    let mut pause = || {
+        left -= 1;
+        left == 0
+    };
+    assert!(!running.go(&mut |_| Ok(()), &mut pause).expect("samples are kept"));
+    assert_eq!(running.time(), 0.0);
+    assert!(running.reached() > 0.0 && running.reached() < 1.0, "{}", running.reached());
+}
+
+#[test]
 fn every_method_goes_on_bit_for_bit() {
     for info in METHODS {
         for (name, until) in [("free", 1.0), ("spring", 1.0), ("chain8", 0.3)] {
