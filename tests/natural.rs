@@ -1,6 +1,7 @@
 //! Natural coordinates of any mechanism against the angle form: accelerations, multipliers, hinge forces.
 
 use crate::common;
+use crate::natural_solve::accelerations;
 use crate::trees;
 
 use driftless::arithmetic::Complex;
@@ -166,7 +167,7 @@ fn natural(mechanism: &Mechanism, motion: &Motion) -> (Vec<C>, Vec<C>, Vec<C>, V
     let vectors: Vec<C> = state.y.as_chunks::<2>().0.iter().map(|x| C::new(x[0], x[1])).collect();
     let (z, rate) = vectors.split_at(mechanism.coordinates());
     let (z, rate) = (z.to_vec(), rate[..mechanism.coordinates()].to_vec());
-    let (acceleration, multiplier) = natural.accelerations(Time::default(), (&z, &vec![0; z.len()]), &rate);
+    let (acceleration, multiplier) = accelerations(&natural, Time::default(), (&z, &vec![0; z.len()]), &rate);
     (z, rate, acceleration, multiplier)
 }
 

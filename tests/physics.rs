@@ -85,6 +85,7 @@ mod metamorphic;
 mod modes;
 mod moving_walls;
 mod natural;
+mod natural_solve;
 mod outputs;
 mod periodic;
 mod profiles;

@@ -4,6 +4,7 @@
 use super::couplings::{beyond_a_corner, geared, integrated};
 use super::formulas::{run, scene};
 use crate::common::compile;
+use crate::natural_solve::accelerations;
 use driftless::arithmetic::Complex;
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::natural::Natural;
@@ -209,7 +210,7 @@ fn natural_coordinates_and_angles_tell_the_same_accelerations() {
             (z[x], rate[x]) = (Complex::new(whole[x], whole[x + 1]), Complex::new(omega[x], omega[x + 1]));
         }
         let turns: Vec<i64> = start.turns[..bodies].to_vec();
-        let (acceleration, multiplier) = natural.accelerations(Time::default(), (&z, &turns), &rate);
+        let (acceleration, multiplier) = accelerations(&natural, Time::default(), (&z, &turns), &rate);
         let most = kernel.load.iter().fold(1.0_f64, |most, x| most.max(x.abs()));
         for k in 0..bodies {
             near(z[k].cross(acceleration[k]), kernel.load[k], 1e-10 * most, "angular acceleration");

@@ -41,8 +41,7 @@ use super::constraint::{ConstraintArguments, ConstraintEquation, RowMeasure};
 use super::force::action::Applied;
 use super::law::Law;
 use super::quadratic::Quadratic;
-use super::{Form, Mechanism, Motion, State, Time, schur, tree};
-use crate::arithmetic::sum::larger;
+use super::{Form, Mechanism, Motion, State, Time};
 use crate::arithmetic::{Complex, DoubleDouble, Scalar};
 use std::sync::Arc;
 
@@ -73,15 +72,6 @@ pub enum NaturalError {
     /// Too many bodies for full matrices.
     #[error("{0} bodies; the natural form takes at most {NATURAL_LIMIT}")]
     TooMany(usize),
-}
-
-/// How far a state is from its constraints.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ConstraintResidual {
-    /// Largest of the |z_k|² - 1 and of the C of all rows \[1, rad, m\].
-    pub position: f64,
-    /// Largest rate of these \[1/s, rad/s, m/s\].
-    pub velocity: f64,
 }
 
 /// A constant torque.
@@ -228,59 +218,6 @@ impl Natural {
         }
     }
 
-    /// z'' \[1/s², m/s²\] and the multipliers \[N·m, N\] of all rows, in the order of the mechanism's, at
-    /// elements `z` with whole turns of the bodies and rates `rate` \[1/s, m/s\].
-    pub fn accelerations(
-        &self,
-        t: Time,
-        (z, turns): (&[Complex<f64>], &[i64]),
-        rate: &[Complex<f64>],
-    ) -> (Vec<Complex<f64>>, Vec<f64>) {
-        let (n, bodies, rows) = (z.len(), self.mechanism.bodies.len(), self.rows());
-        let mut force = vec![Complex::ZERO; n];
-        self.force(z, &mut force);
-        let mut gradients = vec![vec![Complex::ZERO; n]; rows];
-        let mut multiplier = vec![0.0; rows];
-        for k in 0..bodies {
-            gradients[k][k] = z[k];
-            multiplier[k] = rate[k].norm_squared();
-        }
-        for (r, guide) in self.guides.iter().enumerate() {
-            let demand = guide.demand::<f64>(t);
-            guide.gradient(&demand, z, &mut gradients[bodies + r]);
-            multiplier[bodies + r] = guide.convective(&demand, z, rate);
-        }
-        self.couple(t, (z, turns), rate, (&mut gradients[bodies..], &mut multiplier[bodies..]));
-        let free = self.reduced.spread(&force);
-        let minv_jt: Vec<Vec<Complex<f64>>> =
-            gradients.iter().map(|gradient| self.reduced.spread(gradient)).collect();
-        let mut matrix = vec![0.0; rows * rows];
-        for p in 0..rows {
-            for q in p..rows {
-                matrix[p * rows + q] = dot(&gradients[p], &minv_jt[q]);
-            }
-            multiplier[p] += dot(&gradients[p], &free);
-        }
-        let mut pivot = vec![0.0; rows];
-        let mut scales = Vec::with_capacity(rows);
-        self.scales(&mut scales);
-        schur::factor::<f64, 0>(rows, &mut matrix, &mut pivot, &scales);
-        tree::solve::<f64, 0>(rows, &matrix, &pivot, &mut multiplier);
-        let mut acceleration = free;
-        for p in 0..rows {
-            for k in 0..n {
-                acceleration[k] -= minv_jt[p][k].times(multiplier[p]);
-                force[k] -= gradients[p][k].times(multiplier[p]);
-            }
-        }
-        let mut all = vec![0.0; self.mechanism.constraints.len()];
-        for (guide, multiplier) in self.guides.iter().zip(&multiplier[bodies..]) {
-            all[guide.row] = *multiplier;
-        }
-        self.reduced.multipliers(&force, &mut all);
-        (acceleration, all)
-    }
-
     /// Writes what pivots of S are measured against, row by row in the loop: Σ |g_k|² (D⁻¹)_kk.
     pub fn scales(&self, scales: &mut Vec<f64>) {
         let free = &self.reduced.free;
@@ -291,29 +228,6 @@ impl Natural {
         for coupling in &self.couplings {
             guides[coupling.guide] += coupling.angles().iter().map(|&k| free[k]).sum::<f64>();
         }
-    }
-
-    /// How far a state is from its constraints, in double-double.
-    pub fn defect(&self, state: &State) -> ConstraintResidual {
-        let (z, rate) = self.vectors(state);
-        let mut defect = ConstraintResidual::default();
-        let mut see = |position: DoubleDouble, velocity: DoubleDouble| {
-            defect.position = larger(position.hi.abs(), defect.position);
-            defect.velocity = larger(velocity.hi.abs(), defect.velocity);
-        };
-        for (z, rate) in z.iter().zip(&rate).take(self.mechanism.bodies.len()) {
-            see(z.norm_squared() + -1.0, z.dot(*rate).ldexp(2.0));
-        }
-        for linear in &self.reduced.rows {
-            see(linear.place.value(&z), reduced::slip(&linear.place, &rate));
-        }
-        let coupled = self.coupled_residuals(state, &z, &rate);
-        for (guide, [position, velocity]) in self.guides.iter().zip(coupled) {
-            let demand = guide.demand::<DoubleDouble>(state.time);
-            let slip = guide.slip(&demand, &z, &rate) + guide.drive(&demand, &z);
-            see(guide.value(&demand, &z) + position, slip + velocity);
-        }
-        defect
     }
 
     /// z and z' of a state.
@@ -440,9 +354,4 @@ fn angle(z: Complex<DoubleDouble>) -> DoubleDouble {
     let near = DoubleDouble::of(libm::atan2(z.im.hi + 0.0, z.re.hi));
     // The rest is about 1e-16, so its sine is the rest itself.
     near + Complex::unit(near).cross(z)
-}
-
-/// Real part of Σ conj(a_k) b_k.
-fn dot(a: &[Complex<f64>], b: &[Complex<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum()
 }

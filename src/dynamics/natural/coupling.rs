@@ -8,10 +8,9 @@
 //! All derivatives are those of [`Aim`], in angles.  Of the rows |z| = 1, which are kept beside it, this one
 //! has the freedom to take any part along z: with none the multiplier is that of the form in angles.
 
-use super::Natural;
 use crate::arithmetic::{Complex, DoubleDouble, Real, Scalar};
 use crate::dynamics::constraint::{Aim, ConstraintArguments, Linearised};
-use crate::dynamics::{Mechanism, State, Time};
+use crate::dynamics::{Mechanism, Time};
 use std::sync::Arc;
 
 /// A guide and the formula that is taken off it.
@@ -129,50 +128,5 @@ impl<T: Real> CouplingTerms<T> {
     pub fn slip(&self, coupling: usize, x: &[Complex<T>]) -> T {
         let gradient = &self.gradients[coupling * x.len()..(coupling + 1) * x.len()];
         gradient.iter().zip(x).fold(T::ZERO, |sum, (gradient, &x)| sum + gradient.dot(x))
-    }
-}
-
-impl Natural {
-    /// Adds gradients and convective terms of the formulas to those of the guides (guides × n, guides).
-    pub(super) fn couple(
-        &self,
-        t: Time,
-        (z, turns): (&[Complex<f64>], &[i64]),
-        rate: &[Complex<f64>],
-        (gradients, convective): (&mut [Vec<Complex<f64>>], &mut [f64]),
-    ) {
-        if self.couplings.is_empty() {
-            return;
-        }
-        let (mut whole, mut coupled) = (NearestTurns::default(), CouplingTerms::default());
-        let pairs: Vec<_> = z.iter().map(|&z| Complex::of(z)).collect();
-        whole.set(&pairs, turns);
-        coupled.evaluate(&self.couplings, (t, &whole), z, rate);
-        for (number, coupling) in self.couplings.iter().enumerate() {
-            let parts = &coupled.gradients[number * z.len()..];
-            gradients[coupling.guide].iter_mut().zip(parts).for_each(|(gradient, &part)| *gradient += part);
-            convective[coupling.guide] += coupled.rows[number].convective;
-        }
-    }
-
-    /// What the formulas add to C and C' of every guide at a state with these elements and rates.
-    pub(super) fn coupled_residuals(
-        &self,
-        state: &State,
-        z: &[Complex<DoubleDouble>],
-        rate: &[Complex<DoubleDouble>],
-    ) -> Vec<[DoubleDouble; 2]> {
-        let mut residuals = vec![[DoubleDouble::ZERO; 2]; self.guides.len()];
-        if self.couplings.is_empty() {
-            return residuals;
-        }
-        let (mut whole, mut coupled) = (NearestTurns::default(), CouplingTerms::default());
-        whole.set(z, &state.turns);
-        coupled.evaluate(&self.couplings, (state.time, &whole), z, &[]);
-        for (number, coupling) in self.couplings.iter().enumerate() {
-            let row = &coupled.rows[number];
-            residuals[coupling.guide] = [row.position, coupled.slip(number, rate) + row.drive];
-        }
-        residuals
     }
 }

@@ -38,8 +38,6 @@ pub struct Demand<T> {
     pub travel: T,
     /// theta' or s' \[rad/s, m/s\].
     pub rate: T,
-    /// theta'' or s'' \[rad/s², m/s²\].
-    pub acceleration: T,
 }
 
 impl Demand<DoubleDouble> {
@@ -50,7 +48,6 @@ impl Demand<DoubleDouble> {
             unit: Complex::new(self.unit.re.hi, self.unit.im.hi),
             travel: self.travel.hi,
             rate: self.rate.hi,
-            acceleration: self.acceleration.hi,
         }
     }
 }
@@ -74,17 +71,9 @@ impl Guide {
         match &self.measure {
             RowMeasure::Angle { .. } => {
                 let phase = law.at::<T>(t);
-                Demand {
-                    unit: phase.unit,
-                    travel: T::ZERO,
-                    rate: phase.rate,
-                    acceleration: phase.acceleration,
-                }
+                Demand { unit: phase.unit, travel: T::ZERO, rate: phase.rate }
             }
-            RowMeasure::Place(_) => {
-                let (rate, acceleration) = law.rates::<T>(t);
-                Demand { travel: law.value(t), rate, acceleration, ..still }
-            }
+            RowMeasure::Place(_) => Demand { travel: law.value(t), rate: law.rates::<T>(t).0, ..still },
         }
     }
 
@@ -164,22 +153,6 @@ impl Guide {
                 gradient[*base] -= (demand.unit.conj() * z[*body]).left();
             }
             RowMeasure::Place(place) => place.gradients(z, |k, part| gradient[k] += part),
-        }
-    }
-
-    /// C'' at zero z'' \[rad/s² or m/s²\].
-    pub fn convective(&self, demand: &Demand<f64>, z: &[Complex<f64>], rate: &[Complex<f64>]) -> f64 {
-        let cross = 2.0 * self.square(demand, rate);
-        match &self.measure {
-            // u' = i theta' u and u'' = (i theta'' - theta'²) u, conjugated.
-            RowMeasure::Angle { .. } => {
-                let first = Complex::new(0.0, -demand.rate);
-                let second = Complex::new(-demand.rate * demand.rate, -demand.acceleration);
-                cross
-                    + (first * self.turned(demand, z, rate)).times(2.0).im
-                    + (second * self.mismatch(demand, z)).im
-            }
-            RowMeasure::Place(_) => cross - demand.acceleration,
         }
     }
 }

@@ -147,12 +147,6 @@ impl ReducedMatrices {
         })
     }
 
-    /// W x.
-    pub fn spread(&self, x: &[Complex<f64>]) -> Vec<Complex<f64>> {
-        let rows = self.inverse.chunks(self.elements);
-        rows.map(|row| row.iter().zip(x).fold(Complex::ZERO, |sum, (w, &x)| sum + times(w, x))).collect()
-    }
-
     /// Puts elements back onto the linear rows; `change` is scratch space (n).
     pub fn project_back(&self, z: &mut [Complex<DoubleDouble>], change: &mut [Complex<f64>]) {
         self.put(z, change, |place, z| place.value(z));
@@ -183,18 +177,10 @@ impl ReducedMatrices {
             *x = Complex::new(x.re + -change.re, x.im + -change.im);
         }
     }
-
-    /// Writes the multipliers of the linear rows at what is left of the forces, F - g mu, into their places
-    /// among all rows.
-    pub fn multipliers(&self, rest: &[Complex<f64>], all: &mut [f64]) {
-        for (row, back) in self.rows.iter().zip(self.back.chunks(self.elements)) {
-            all[row.row] = back.iter().zip(rest).map(|(back, rest)| back.dot(*rest)).sum();
-        }
-    }
 }
 
 /// Rate of a linear row.
-pub fn slip(place: &Quadratic, rate: &[Complex<DoubleDouble>]) -> DoubleDouble {
+fn slip(place: &Quadratic, rate: &[Complex<DoubleDouble>]) -> DoubleDouble {
     place.linear.iter().fold(DoubleDouble::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(rate[k]))
 }
 
