@@ -76,7 +76,7 @@ pub(crate) use profile::spans_decades;
 pub use profile::{ProfileChart, profile};
 pub use sketch::{HingeSketch, MotorPose, Pose, Sketch, SliderPose, SpiralPose, SpringSketch, WallSketch};
 pub use text::{TextBox, plain, unmarked};
-pub use torque_power::{MotorSeries, TorquePower, force_power, torque_power};
+pub use torque_power::{MotorSeries, TorquePower, torque_power};
 pub use work_precision::{Cost, WorkPrecision, WorkSeries, work_precision};
 
 use std::path::PathBuf;

@@ -48,12 +48,6 @@ pub struct MotionGif {
 /// A finished animation.
 #[derive(Clone, Debug)]
 pub struct Animation {
-    /// Width \[px\].
-    pub width: u32,
-    /// Height \[px\].
-    pub height: u32,
-    /// Number of frames.
-    pub frames: usize,
     /// The file.
     pub bytes: Vec<u8>,
 }
@@ -164,8 +158,7 @@ fn animated(
         Ok(sheet.pixels())
     };
     let (width, height) = sheet.dimensions();
-    let bytes = encode([width, height], &mut draw)?;
-    Ok(Animation { width, height, frames, bytes })
+    Ok(Animation { bytes: encode([width, height], &mut draw)? })
 }
 
 /// What a frame says of its time, with as many digits as tell it from the next, and of the speed of time

@@ -20,8 +20,7 @@ pub struct MotorSeries {
     pub name: String,
     /// Times \[s\], ascending.
     pub time: Vec<f64>,
-    /// Torque on the driven bar at these times \[N·m\], or force on the point of the driven slider \[N\]: see
-    /// [`force_power`].
+    /// Torque on the driven bar at these times \[N·m\], or force on the point of the driven slider \[N\].
     pub torque: Vec<f64>,
     /// Power fed in at these times \[W\].
     pub power: Vec<f64>,
@@ -41,6 +40,8 @@ pub struct TorquePower {
     pub caption: Vec<String>,
     /// The motors.
     pub motors: Vec<MotorSeries>,
+    /// Those of them, by number, that push a slider: what stands for their torques are forces \[N\].
+    pub sliders: Vec<usize>,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
 }
@@ -48,20 +49,13 @@ pub struct TorquePower {
 /// What a third panel adds to the height of the page \[pt\].
 const HIGHER: f64 = 110.0;
 
-/// Draws both curves of each motor with a ring and a figure at each largest magnitude.
+/// Draws both curves of each motor with a ring and a figure at each largest magnitude; forces are in a panel
+/// between torques and powers.
 ///
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, ChartError> {
-    force_power(chart, &[], px_per_pt)
-}
-
-/// The same where some motors, by number, push a slider: what stands for their torques are forces \[N\], in a
-/// panel between torques and powers.
-///
-/// # Errors
-/// As [`torque_power`].
-pub fn force_power(chart: &TorquePower, sliders: &[usize], px_per_pt: f64) -> Result<Picture, ChartError> {
+    let sliders = &chart.sliders;
     let is_kept =
         |force: Option<bool>, motor: usize| force.is_none_or(|force| sliders.contains(&motor) == force);
     let data = |values: fn(&MotorSeries) -> &Vec<f64>, force: Option<bool>| -> Vec<Vec<Point>> {

@@ -119,10 +119,7 @@ pub fn draw(
         Chart::Angles => chart::angles(&run.angles(), FILE_RESOLUTION),
         Chart::EnergyDrift => chart::energy_drift(&run.energy_drift(), FILE_RESOLUTION),
         Chart::ConstraintDrift => chart::constraint_drift(&run.constraint_drift(), FILE_RESOLUTION),
-        Chart::TorquePower => {
-            let (chart, sliders) = run.torque_power();
-            chart::force_power(&chart, &sliders, FILE_RESOLUTION)
-        }
+        Chart::TorquePower => chart::torque_power(&run.torque_power(), FILE_RESOLUTION),
         Chart::Outputs => chart::outputs(&run.outputs(), FILE_RESOLUTION),
     }
 }

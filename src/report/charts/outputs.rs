@@ -6,8 +6,8 @@ use crate::report::drawing::names_of;
 use crate::report::page::figure;
 
 impl Finished<'_> {
-    /// The motors, and which of them push sliders.
-    pub fn torque_power(&self) -> (TorquePower, Vec<usize>) {
+    /// The motors.
+    pub fn torque_power(&self) -> TorquePower {
         let (window, more) = self.window();
         let (driven, rows) =
             (super::motors(self.mechanism, self.outcome), &self.mechanism.with_all_parts().constraints);
@@ -29,15 +29,13 @@ impl Finished<'_> {
             all if all == motors.len() => "Force",
             _ => "Torque, force",
         };
-        (
-            TorquePower {
-                title: format!("{what} and power of {}", names.join(", ")),
-                caption,
-                motors,
-                horizon,
-            },
+        TorquePower {
+            title: format!("{what} and power of {}", names.join(", ")),
+            caption,
+            motors,
             sliders,
-        )
+            horizon,
+        }
     }
 
     /// The outputs over the whole run.
