@@ -305,7 +305,7 @@ fn trees_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
 /// The same trees with other masses, lengths, stiffnesses, laws and gravity for every trajectory.
 #[test]
 fn trees_with_numbers_of_their_own_agree_with_double_double_whoever_is_beside_them() {
-    for scene in trees().iter().filter(|scene| Batch::takes_own_numbers(&compile(scene))) {
+    for scene in trees().iter().filter(|scene| Batch::takes_alike(&compile(scene))) {
         let all: Vec<_> = (0..11)
             .map(|i| {
                 let mut scene = scene.clone();

@@ -75,7 +75,7 @@ fn scenes() -> Vec<(String, All, f64)> {
 #[test]
 fn gears_and_cams_agree_with_double_double_whoever_is_beside_them() {
     for (name, all, until) in scenes() {
-        assert!(all.iter().all(|(mechanism, _)| Batch::takes_own_numbers(mechanism)), "{name}");
+        assert!(all.iter().all(|(mechanism, _)| Batch::takes_alike(mechanism)), "{name}");
         agree_with_double_double(&name, &all, until);
     }
 }

@@ -176,7 +176,7 @@ fn loops_of_one_mechanism_agree_with_double_double_whoever_is_beside_them() {
 fn loops_with_numbers_of_their_own_agree_with_double_double_whoever_is_beside_them() {
     for scene in &NUMBERS {
         let all = variants(scene);
-        assert!(all.iter().all(|(mechanism, _)| Batch::takes_own_numbers(mechanism)));
+        assert!(all.iter().all(|(mechanism, _)| Batch::takes_alike(mechanism)));
         agree_with_double_double(scene.0, &all, scene.2);
     }
     let mixed = [variants(&NUMBERS[1]), starts(SCENES[1]), variants(&NUMBERS[4])].concat();
@@ -204,7 +204,7 @@ fn motors_beside_torsion_springs_agree_with_double_double() {
     };
     let all: Vec<_> = (0..11).map(at).collect();
     assert!(all.iter().all(|(mechanism, _)| mechanism.has_multipliers() && !mechanism.has_closed_loops()));
-    assert!(all.iter().all(|(mechanism, _)| Batch::takes_own_numbers(mechanism)));
+    assert!(all.iter().all(|(mechanism, _)| Batch::takes_alike(mechanism)));
     agree_with_double_double("motor and torsion spring", &all, 1.0);
 }
 

@@ -58,8 +58,8 @@ pub fn resumed(source: &DigitsSource) -> Box<dyn LongRun> {
     for (from, saved) in saved.iter().enumerate() {
         let mut other = begun(source, 30);
         assert!(other.resume(saved));
-        for expected in rows.iter().skip(from) {
-            let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
+        for (number, expected) in (0..).zip(&rows).skip(from) {
+            let found = other.row(number, &mut || false).expect("a row").expect("there");
             assert_eq!(format!("{found:?}"), format!("{expected:?}"));
         }
         assert_eq!(format!("{:?}", other.save()), format!("{:?}", whole.save()));
@@ -312,8 +312,8 @@ fn a_run_goes_on_to_the_last_bit() {
         let saved = paused.save();
         let mut other = begun(&source, 30);
         assert!(other.resume(&saved) && !begun(&source, 31).resume(&saved));
-        for expected in &whole[4..] {
-            let found = other.row(expected.number, &mut || false).expect("a row").expect("there");
+        for (number, expected) in (4..).zip(&whole[4..]) {
+            let found = other.row(number, &mut || false).expect("a row").expect("there");
             assert_eq!(format!("{found:?}"), format!("{expected:?}"), "{name}");
         }
     }

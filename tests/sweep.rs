@@ -163,7 +163,7 @@ fn points_of_floating_bodies_are_in_lanes() {
     ] {
         let vary = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
         let plan = Sweep::new(&template, vary, &request).expect("a sweep");
-        assert!(Batch::takes_own_numbers(plan.mechanism()));
+        assert!(Batch::takes_alike(plan.mechanism()));
         for point in points(&plan, 1) {
             let alone = template.filled(plan.variables(), &point.values).expect("a scene");
             let outcome = simulate(&alone, &request, &mut |_| Ok(())).expect("a run");

@@ -24,7 +24,7 @@ pub fn by_taylor(until: f64, rtol: f64) -> Request {
 pub fn planned(template: &Template, vary: &[&str], request: &Request) -> Sweep {
     let vary: Vec<Vary> = vary.iter().map(|vary| vary.parse().expect("a range")).collect();
     let plan = Sweep::new(template, vary, request).expect("a sweep");
-    assert!(Batch::takes_own_numbers(plan.mechanism()));
+    assert!(Batch::takes_alike(plan.mechanism()));
     plan
 }
 

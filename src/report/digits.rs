@@ -2,7 +2,6 @@
 
 use super::page::{Page, counted, figure, magnitude};
 use crate::arithmetic::Real;
-use crate::arithmetic::digits::NumberLayout;
 use crate::dynamics::Mechanism;
 use crate::run::digits::{DigitsPair, DigitsSource, Forecast, LongEvent, LongHold, LongTurn, ShownRow, Wide};
 use crate::run::drift;
@@ -59,7 +58,7 @@ impl RowLayout {
 
 /// Numbers as decimal text.
 fn decimal(number: &Wide, digits: usize) -> String {
-    number.to_decimal(digits, NumberLayout::Free)
+    number.to_decimal(digits)
 }
 
 /// All events as a table, with their numbers to as many digits as runs agree to.

@@ -20,7 +20,6 @@ pub struct Table<W: Write> {
     buffer: Vec<u8>,
     /// Numbers of a row.
     width: usize,
-    row: Vec<f64>,
     shown: Shown,
 }
 
@@ -128,14 +127,14 @@ impl<W: Write> Table<W> {
         let mut titles = csv::Writer::from_writer(Vec::with_capacity(BUFFER + BUFFER / 4));
         titles.write_record(&header)?;
         let buffer = titles.into_inner().map_err(|error| error.into_error())?;
-        Ok(Self { writer, buffer, width: header.len(), row: Vec::new(), shown })
+        Ok(Self { writer, buffer, width: header.len(), shown })
     }
 
     /// Goes on with a table whose header and first rows were written before.
     pub fn going_on(mechanism: &Mechanism, writer: W) -> Self {
         let shown = Shown::new(mechanism);
         let width = width(mechanism, &shown);
-        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4), width, row: Vec::new(), shown }
+        Self { writer, buffer: Vec::with_capacity(BUFFER + BUFFER / 4), width, shown }
     }
 
     /// What it shows of each constraint's force.
@@ -159,12 +158,9 @@ impl<W: Write> Table<W> {
     /// # Errors
     /// What the writer says.
     pub fn write(&mut self, sample: &Sample) -> io::Result<()> {
-        let mut row = std::mem::take(&mut self.row);
+        let mut row = Vec::with_capacity(self.width);
         self.shown.append(sample, &mut row);
-        let written = self.lines(&row);
-        row.clear();
-        self.row = row;
-        written
+        self.lines(&row)
     }
 
     /// Writes rows of [`columns`], one after the other.

@@ -139,12 +139,6 @@ impl Gauss {
         })
     }
 
-    /// The method of this name, `gauss4` to `gauss16`; `None` for any other, or where [`Gauss::new`] says so.
-    pub fn named(name: &str, step: f64) -> Option<Self> {
-        let place = NAMES.iter().position(|&known| known == name)?;
-        Self::new(place + 2, step)
-    }
-
     /// The same without the evaluations that carry what doubles leave out: half the time, and the random walk
     /// of plain doubles.
     pub fn plain(self) -> Self {

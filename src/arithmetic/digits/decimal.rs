@@ -21,15 +21,6 @@ pub fn decimal_places(limbs: usize) -> usize {
     (64.0 * (limbs - 1) as f64 / BITS) as usize
 }
 
-/// How a number is laid out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NumberLayout {
-    /// Zeros at the end are left out; exponents below 1e-4 and from 1e16 on, as doubles are written.
-    Free,
-    /// All digits are there.
-    Full,
-}
-
 impl<const W: usize> Digits<W> {
     /// Reads a decimal number, `-0.6` or `1.5e-3`, to as many digits as there is room for; `None` where it is
     /// none.
@@ -66,8 +57,9 @@ impl<const W: usize> Digits<W> {
         Some(if is_negative { -value } else { value })
     }
 
-    /// To so many significant digits, rounded to nearest.
-    pub fn to_decimal(&self, places: usize, layout: NumberLayout) -> String {
+    /// To so many significant digits, rounded to nearest; zeros at the end are left out, and there are
+    /// exponents below 1e-4 and from 1e16 on, as doubles are written.
+    pub fn to_decimal(&self, places: usize) -> String {
         match self.kind {
             DigitsKind::NotFinite => return "NaN".to_owned(),
             DigitsKind::Zero => return "0.0".to_owned(),
@@ -86,9 +78,7 @@ impl<const W: usize> Digits<W> {
         }
         power += digits.len() as i64 - places as i64;
         digits.truncate(places);
-        if layout == NumberLayout::Free {
-            digits.truncate(digits.trim_end_matches('0').len().max(1));
-        }
+        digits.truncate(digits.trim_end_matches('0').len().max(1));
         let sign = if self.is_negative() { "-" } else { "" };
         format!("{sign}{}", laid_out(&digits, power))
     }

@@ -23,7 +23,7 @@ use super::{Real, Scalar};
 use std::cmp::Ordering;
 
 pub use self::convolution::sum_of_products;
-pub use self::decimal::{NumberLayout, decimal_places, limbs_for};
+pub use self::decimal::{decimal_places, limbs_for};
 pub use self::elementary::pi;
 pub use self::factor::{Factor, TimeScale};
 

@@ -2,14 +2,14 @@
 
 use super::convolution::{product, sum_of_products, times_whole};
 use super::quotient::{quotient, square_root};
-use super::{Digits, DigitsKind, NumberLayout, TWO_64, decimal_places, elementary};
+use super::{Digits, DigitsKind, TWO_64, decimal_places, elementary};
 use crate::arithmetic::{DoubleDouble, Over, Real, Scalar};
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub, SubAssign};
 
 impl<const W: usize> std::fmt::Debug for Digits<W> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter) -> std::fmt::Result {
-        formatter.write_str(&self.to_decimal(decimal_places(self.limbs()), NumberLayout::Free))
+        formatter.write_str(&self.to_decimal(decimal_places(self.limbs())))
     }
 }
 

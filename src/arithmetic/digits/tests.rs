@@ -130,11 +130,11 @@ proptest! {
     #[test]
     fn decimals_read_back(a in number(), places in 1..120_usize) {
         let a = a.shortened(8);
-        let text = a.to_decimal(140, NumberLayout::Free);
+        let text = a.to_decimal(140);
         let back = Number::from_decimal(&text).expect("a number");
         prop_assert!(((back - a).log2() - a.log2()) < -430.0 || back == a, "{text}");
         // Rounding once more changes half a unit of the last place at most.
-        let short = Number::from_decimal(&a.to_decimal(places, NumberLayout::Full)).expect("a number");
+        let short = Number::from_decimal(&a.to_decimal(places)).expect("a number");
         let apart = (short - a).log2() - a.log2();
         prop_assert!(short == a || apart < -3.32 * (places as f64 - 1.0), "{places} {apart}");
     }
@@ -214,9 +214,9 @@ fn published_constants_have_a_hundred_digits() {
 fn more_limbs_change_nothing_but_the_last_digits() {
     let long = Digits::<MOST>::whole(3).sqrt().sin_cos().0;
     let short = Digits::<16>::whole(3).sqrt().sin_cos().0;
-    let text = long.to_decimal(2000, NumberLayout::Full);
-    assert_eq!(text.len(), 2002);
-    assert_eq!(text[..280], short.to_decimal(278, NumberLayout::Full)[..280]);
+    let text = long.to_decimal(2000);
+    assert!((1992..=2002).contains(&text.len()), "{text}");
+    assert_eq!(text[..280], short.to_decimal(278));
     let angle = long.atan2((Digits::ONE - long * long).sqrt());
     let exact = elementary::pi::<MOST>() - Digits::<MOST>::whole(3).sqrt();
     assert!((angle - exact).log2() < -7000.0, "{}", (angle - exact).log2());
@@ -228,10 +228,10 @@ fn layouts_are_those_of_doubles() {
         ["0.6", "-12.25", "1e-5", "1.5e300", "1e16", "123456.0", "0.0001", "9999999999999998.0", "-2.5e-7"]
     {
         let number = Number::from_decimal(text).expect("a number");
-        assert_eq!(number.to_decimal(30, NumberLayout::Free), text);
+        assert_eq!(number.to_decimal(30), text);
     }
-    assert_eq!(Number::from_decimal("0.9996").expect("a number").to_decimal(3, NumberLayout::Full), "1.00");
-    assert_eq!(Number::ZERO.to_decimal(9, NumberLayout::Full), "0.0");
+    assert_eq!(Number::from_decimal("0.9996").expect("a number").to_decimal(3), "1.0");
+    assert_eq!(Number::ZERO.to_decimal(9), "0.0");
     for bad in ["", "-", "1..2", "0x1", "1e", "e5", ".5", "nan", "1 2"] {
         assert!(Number::from_decimal(bad).is_none(), "{bad}");
     }

@@ -104,9 +104,8 @@ pub trait LongRun: Send {
     /// The run stops.
     fn row(&mut self, number: u64, pause: &mut dyn FnMut() -> bool) -> Result<Option<ShownRow>, StepError>;
 
-    /// The row of the last state before a stop, under this number; `None` where that is not beyond the last
-    /// row.
-    fn stopped(&mut self, number: u64) -> Option<ShownRow>;
+    /// The row of the last state before a stop; `None` where that is not beyond the last row.
+    fn stopped(&mut self) -> Option<ShownRow>;
 
     /// Everything it needs to go on, to the last bit.
     fn save(&self) -> SavedDigits;
@@ -116,9 +115,6 @@ pub trait LongRun: Send {
 
     /// Steps made and impacts passed.
     fn counts(&self) -> [u64; 2];
-
-    /// Time at the end of the last step \[s\].
-    fn time(&self) -> f64;
 
     /// The horizon \[s\], or the time of the event that has ended the run.
     fn last_time(&self) -> f64;
@@ -245,7 +241,7 @@ impl<const W: usize> Runner<W> {
 
 impl<const W: usize> Runner<W> {
     /// The row of a moment.
-    fn shown(&mut self, number: u64, t: Digits<W>, posture: &DigitsCoordinates<W>) -> ShownRow {
+    fn shown(&mut self, t: Digits<W>, posture: &DigitsCoordinates<W>) -> ShownRow {
         let mechanism = &self.motion.mechanism;
         let z = mechanism.elements(&posture.phi);
         let [kinetic, potential] = mechanism.energy(&posture.phi, &posture.omega, &z);
@@ -261,7 +257,7 @@ impl<const W: usize> Runner<W> {
         let residual = [0, 1].map(|level| left.iter().fold(0.0, |most, left| larger(left[level], most)));
         let residuals = left.into_iter().take(mechanism.structure.standing_rows()).collect();
         let friction = self.motion.has_friction().then(|| posture.lost.resized());
-        ShownRow { number, t: t.resized(), bodies, energy, friction, drift, residual, residuals }
+        ShownRow { t: t.resized(), bodies, energy, friction, drift, residual, residuals }
     }
 }
 
@@ -285,10 +281,10 @@ impl<const W: usize> LongRun for Runner<W> {
         }
         self.seen = t;
         let posture = self.motion.at(t);
-        Ok(Some(self.shown(number, t, &posture)))
+        Ok(Some(self.shown(t, &posture)))
     }
 
-    fn stopped(&mut self, number: u64) -> Option<ShownRow> {
+    fn stopped(&mut self) -> Option<ShownRow> {
         let (t, posture) = (self.motion.state().t, self.motion.state_posture());
         let is_finite = posture.phi.iter().chain(&posture.omega).all(|x| x.is_finite());
         // A row that is beside it by rounding has it.
@@ -297,7 +293,7 @@ impl<const W: usize> LongRun for Runner<W> {
             return None;
         }
         self.seen = t;
-        Some(self.shown(number, t, &posture))
+        Some(self.shown(t, &posture))
     }
 
     fn save(&self) -> SavedDigits {
@@ -310,10 +306,6 @@ impl<const W: usize> LongRun for Runner<W> {
 
     fn counts(&self) -> [u64; 2] {
         [self.motion.state().steps, self.motion.state().impacts]
-    }
-
-    fn time(&self) -> f64 {
-        self.motion.state().t.value()
     }
 
     fn last_time(&self) -> f64 {

@@ -243,7 +243,7 @@ impl Gathered {
                 Ok(Some(row)) => rows.push(row),
                 Ok(None) => return Self { rows, is_through: false, stop },
                 Err(error) => {
-                    rows.extend(run.stopped(number));
+                    rows.extend(run.stopped());
                     stop = Some(error);
                     break;
                 }

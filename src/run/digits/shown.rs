@@ -6,8 +6,6 @@ use crate::arithmetic::Real;
 /// What there is to know at an output time.
 #[derive(Clone, Debug)]
 pub struct ShownRow {
-    /// Its number, from 0.
-    pub number: u64,
     /// Time \[s\].
     pub t: Wide,
     /// Of every body: angle \[rad\], not wrapped, and rate \[rad/s\], position of the centre of mass \[m\]

@@ -189,7 +189,8 @@ impl Batch {
     }
 
     /// True for what it can integrate as well, those trajectories beside each other whose mechanisms are
-    /// equal or [differ in their numbers](Batch::takes_own_numbers): trees of up to 12 bodies, hinged off
+    /// equal or differ in nothing but their numbers, have the same ones zero and the same redundant
+    /// constraints, and equal numbers in laws of motors by formulas: trees of up to 12 bodies, hinged off
     /// their axes or floating, torsion springs, applied forces, motors on angles, springs beside them, walls,
     /// all by smooth formulas or without, and no friction; and the same with closed loops, sliders, gears and
     /// cams, their states in the form of [`Multiplier`](crate::dynamics::multiplier::Multiplier).
@@ -200,14 +201,6 @@ impl Batch {
     /// The same with events that end the motion, which [`BatchObserver::ahead`] looks for.
     pub(crate) fn takes_alike_with_stops(mechanism: &Mechanism) -> bool {
         goes_on(mechanism) && trees::fits(mechanism)
-    }
-
-    /// True for those of the latter whose trajectories may have numbers of their own: all of them, with
-    /// closed loops or without.  Beside each other are mechanisms that differ in nothing but their numbers,
-    /// have the same ones zero and the same redundant constraints; numbers in laws of motors by formulas are
-    /// equal.
-    pub fn takes_own_numbers(mechanism: &Mechanism) -> bool {
-        Self::takes_alike(mechanism)
     }
 
     /// Integrates all trajectories to `until`; `watch` is shown every step with the trajectory's index and

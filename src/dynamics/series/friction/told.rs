@@ -8,8 +8,6 @@ use crate::dynamics::friction::Normal;
 /// A place that slides, as series from the start of the step on.
 #[derive(Clone, Copy, Debug)]
 pub struct Slides<'a, T> {
-    /// tau \[N·m/s^m, N/s^m\].
-    pub force: &'a [T],
     /// The relative velocity.
     pub speed: &'a [T],
     /// The size of the normal force, negative from where that passes zero \[N/s^m\].
@@ -28,12 +26,7 @@ impl<T: SeriesNumber> Series<T> {
     /// The places that slide, in their order.
     pub fn slides(&self) -> impl Iterator<Item = Slides<'_, T>> {
         let places = self.friction.iter().flat_map(|friction| &friction.places);
-        places.map(|place| Slides {
-            force: &place.force,
-            speed: &place.speed,
-            size: &place.size,
-            normal: place.friction.normal,
-        })
+        places.map(|place| Slides { speed: &place.speed, size: &place.size, normal: place.friction.normal })
     }
 
     /// Powers of the normal forces of the places that stick, in their order, of numbers of many digits.
