@@ -8,6 +8,8 @@ mod branches;
 mod detector;
 mod search;
 
+#[cfg(feature = "digits")]
+pub(super) use detector::KEPT;
 pub(super) use detector::{EventDetector, EventMemory, SwitchFunction};
 
 use crate::dynamics::Motion;

@@ -366,10 +366,8 @@ mod tests {
 
     /// The motion after it as the impact code has it, and what it claims.
     fn struck(mechanism: &Mechanism, before: &Motion) -> (Motion, Claim) {
-        let plain = |numbers: &[DoubleDouble]| numbers.iter().map(|x| x.hi).collect::<Vec<_>>();
-        let impact = mechanism
-            .impact_at(0, before.time, &plain(&before.phi), &plain(&before.omega))
-            .expect("a rebound");
+        let [phi, omega] = before.rounded();
+        let impact = mechanism.impact_at(0, before.time, &phi, &omega).expect("a rebound");
         let omega = impact.omega.iter().map(|&omega| DoubleDouble::from(omega)).collect();
         let after = Motion { omega, work: before.work + impact.motor_work, ..before.clone() };
         (

@@ -20,7 +20,7 @@ const WIDEST: usize = 96;
 pub struct SceneError(Box<Refusal>);
 
 /// What a scene was refused for; serializes to an object with these fields.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Refusal {
     /// The file, as it was named.
     pub file: String,
@@ -96,16 +96,10 @@ impl SceneError {
     pub(super) fn whole_file(file: &str, problem: &str, allowed: &str, hint: &str) -> Self {
         Self::from(Refusal {
             file: file.to_owned(),
-            set: None,
-            line: None,
-            column: None,
-            path: String::new(),
-            value: None,
             problem: problem.to_owned(),
             allowed: allowed.to_owned(),
             hint: hint.to_owned(),
-            excerpt: None,
-            io: false,
+            ..Refusal::default()
         })
     }
 }

@@ -104,15 +104,11 @@ impl Texts {
         let mut refusal = Refusal {
             file: self.file.clone(),
             set: text.set.clone(),
-            line: None,
-            column: None,
             path: path.to_owned(),
-            value: None,
             problem: problem.to_owned(),
             allowed: allowed.to_owned(),
             hint: hint.to_owned(),
-            excerpt: None,
-            io: false,
+            ..Refusal::default()
         };
         if text.set.is_none() {
             let (line, column) = position(&text.json, span.start as usize);

@@ -185,14 +185,8 @@ fn is_in_doubles(mechanism: &Mechanism) -> bool {
 
 /// Accelerations of all coordinates at a motion.
 fn acceleration(mechanism: &Mechanism, kernel: &mut Kernel<f64>, motion: &Motion) -> Vec<f64> {
-    let plain = |x: &[Time]| x.iter().map(|x| x.hi).collect::<Vec<f64>>();
-    kernel.accelerate::<0>(
-        mechanism,
-        motion.time,
-        &plain(&motion.phi),
-        &plain(&motion.omega),
-        Bias::default(),
-    );
+    let [phi, omega] = motion.rounded();
+    kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
     kernel.load.clone()
 }
 

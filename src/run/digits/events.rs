@@ -13,6 +13,7 @@ use super::wall::{in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
 use crate::dynamics::compile::exact::{ExactEvent, ExactMechanism};
+use crate::run::event::KEPT;
 use crate::scene::Direction;
 use crate::stepping::search::{Curve, PowerSeries, root, sign};
 
@@ -20,8 +21,6 @@ use crate::stepping::search::{Curve, PowerSeries, root, sign};
 const NO_VALUE: f64 = 1e-12;
 /// Part of the digits in which a function that is kept at zero is zero.
 const SURE: f64 = 0.75;
-/// Events kept.
-const KEPT: usize = 100_000;
 
 /// An event that has happened.
 #[derive(Clone, Debug)]

@@ -23,12 +23,11 @@ use crate::dynamics::friction::paradox::{HINT, Paradox};
 use crate::dynamics::friction::{self, FrictionMode, FrictionMoment, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
+use crate::run::event::KEPT;
 use crate::stepping::{Cause, StepError};
 
 /// Part of the digits in which velocities, accelerations and forces are told from rounding.
 pub(super) const SURE: f64 = 0.75;
-/// Transitions that are kept.
-const KEPT: usize = 100_000;
 /// What places do, as transitions count it.
 const WORDS: [&str; 3] = ["apart", "sticks", "slides"];
 

@@ -30,6 +30,7 @@ use crate::dynamics::friction::simultaneous::Shocks;
 use crate::dynamics::friction::{CompiledFriction, FrictionMode, Normal, Transition};
 use crate::dynamics::kernel::dot;
 use crate::dynamics::series::Series;
+use crate::run::event::KEPT;
 use crate::stepping::search::TOUCH;
 use crate::stepping::{Cause, StepError};
 
@@ -40,8 +41,6 @@ const SURE: f64 = 0.75;
 const ABOVE: f64 = 12.0;
 /// Powers of the rates that accelerations of gaps are taken from.
 const POWERS: usize = 2;
-/// Holds that are kept with their times.
-const KEPT: usize = 100_000;
 
 /// A time a point stayed on its wall.
 #[derive(Clone, Debug)]

@@ -19,8 +19,8 @@ const RESOLVED: f64 = 1e-11;
 const SHARE: f64 = 0.1;
 /// Share of a step within which the event that began it does not happen again.
 pub(super) const SAME: f64 = 1e-9;
-/// Events kept; more are counted.
-const KEPT: usize = 100_000;
+/// Records of a kind kept: events, of which more are counted, and in many digits holds and transitions too.
+pub const KEPT: usize = 100_000;
 
 /// What a detector remembers between steps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
