@@ -26,7 +26,7 @@ use crate::scene::{Place, Scene};
 use constants::constants;
 pub(super) use constants::dense_constants;
 pub use error::CompileError;
-pub(super) use error::quoted;
+pub(crate) use error::quoted;
 pub(super) use parts::along_wall;
 pub(super) use parts::travel_along;
 use parts::{actions, follows, give_aims, given_angles, joints, kept_angles};
@@ -171,9 +171,11 @@ impl Mechanism {
     /// Compiles a scene with forces from outside.
     ///
     /// # Errors
-    /// Those of [`Mechanism::new`], and forces on bodies that are not there.
+    /// Those of [`Mechanism::new`], forces on bodies that are not there, and forces that share a name with
+    /// one another or with a part of the scene.
     pub fn with_forces(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
         let unassembled = Self::unassembled(scene, forces)?;
+        unassembled.check_names()?;
         let mut acting = unassembled.clone();
         if acting.release(|name| scene.is_inactive(name)) {
             acting.partition =

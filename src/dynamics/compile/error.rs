@@ -125,6 +125,15 @@ pub enum CompileError {
     /// A force acts on a body the mechanism does not have.
     #[error("force `{0}` is one of another mechanism: it names a body that is not there")]
     ForeignForce(String),
+    /// A force shares its name with another one or with a part of the scene.
+    #[error(
+        "force `{0}` has the name of another force or of a part of the scene\nhint: give it a name of its \
+            own; events switch parts by name"
+    )]
+    NameTaken(String),
+    /// An event asks for a body the mechanism does not have.
+    #[error("event `{0}` is one of another mechanism: it names a body that is not there")]
+    ForeignEvent(String),
     /// No bar has the name asked for.
     #[error("no bar is called `{0}`")]
     NoSuchBar(String),
@@ -167,7 +176,7 @@ impl CompileError {
 }
 
 /// Names in backticks, with commas and an `and`.
-pub(in crate::dynamics) fn quoted(names: &[String]) -> String {
+pub(crate) fn quoted(names: &[String]) -> String {
     let all: Vec<String> = names.iter().map(|name| format!("`{name}`")).collect();
     match all.split_last() {
         Some((last, before)) if !before.is_empty() => format!("{} and {last}", before.join(", ")),

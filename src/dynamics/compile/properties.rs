@@ -155,6 +155,13 @@ impl Mechanism {
             || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
     }
 
+    /// The forces that are no parts of the scene, whether they act or not.
+    pub fn forces_from_outside(&self) -> &[UserForce] {
+        let whole = self.with_all_parts();
+        let own = whole.laws.as_ref().map_or(0, |laws| laws.formulas.force_count());
+        &whole.forces[own..]
+    }
+
     /// True where anything but gravity and rows acts.
     pub fn is_forced(&self) -> bool {
         !(self.springs.is_empty()

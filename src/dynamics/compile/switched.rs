@@ -34,14 +34,9 @@ impl Mechanism {
     /// # Errors
     /// A name that none of them has.
     pub fn without(&self, parts: &[String]) -> Result<Self, String> {
-        let names = (self.springs.iter().map(|part| &part.name))
-            .chain(self.torsions.iter().map(|part| &part.name))
-            .chain(self.actions.iter().map(|part| &part.name))
-            .chain(self.forces.iter().map(|part| &part.name))
-            .chain(self.joints.iter().filter(|joint| joint.outer.is_none()).map(|joint| &joint.name))
-            .chain(self.contacts.iter().map(|contact| &contact.row.name))
-            .chain(self.switched_angles().map(|r| &self.constraints[r].name));
-        let names: Vec<&String> = names.collect();
+        let closed = self.joints.iter().filter(|joint| joint.outer.is_none()).map(|joint| &joint.name);
+        let angles = self.switched_angles().map(|r| &self.constraints[r].name);
+        let names: Vec<&String> = self.acting_names().chain(closed).chain(angles).collect();
         if let Some(unknown) = parts.iter().find(|part| !names.contains(part)) {
             return Err(unknown.clone());
         }
@@ -57,6 +52,27 @@ impl Mechanism {
         }
         mechanism.release(|name| parts.contains(name));
         Ok(mechanism)
+    }
+
+    /// Names of springs, torsion springs, applied forces, torques and walls.
+    fn acting_names(&self) -> impl Iterator<Item = &String> {
+        (self.springs.iter().map(|part| &part.name))
+            .chain(self.torsions.iter().map(|part| &part.name))
+            .chain(self.actions.iter().map(|part| &part.name))
+            .chain(self.forces.iter().map(|part| &part.name))
+            .chain(self.contacts.iter().map(|contact| &contact.row.name))
+    }
+
+    /// Parts are switched by name: a force from outside that shares one is refused.
+    pub(super) fn check_names(&self) -> Result<(), CompileError> {
+        let joints = self.joints.iter().map(|joint| &joint.name);
+        let rows = self.constraints.iter().map(|row| &row.name);
+        let held: Vec<&String> = joints.chain(rows).collect();
+        let is_taken = |name: &String| {
+            held.contains(&name) || self.acting_names().filter(|other| *other == name).count() > 1
+        };
+        let taken = self.forces_from_outside().iter().find(|force| is_taken(&force.name));
+        taken.map_or(Ok(()), |force| Err(CompileError::NameTaken(force.name.clone())))
     }
 
     /// The mechanism without the events of its scene, as it is before any of them.

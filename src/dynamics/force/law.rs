@@ -67,6 +67,11 @@ pub(super) struct LawOnBranches<'a, C> {
 }
 
 impl<C: Decimal> Formulas<C> {
+    /// How many forces it records.
+    pub fn force_count(&self) -> usize {
+        self.laws.len()
+    }
+
     /// Records its laws on the branches that `modes` say.
     ///
     /// # Errors

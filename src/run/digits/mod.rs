@@ -198,6 +198,11 @@ struct Runner<const W: usize> {
 
 impl<const W: usize> Runner<W> {
     fn new(source: &DigitsSource, precision: Precision) -> Result<Self, LongError> {
+        if let Some(force) = source.mechanism.forces_from_outside().first() {
+            let what = format!("force {} in many digits", force.name);
+            let reason = "it is no part of the scene, and is recorded in doubles";
+            return Err(refusal(&what, reason, "write it as a formula of the scene").into());
+        }
         check_forces_of_joints(&source.mechanism)?;
         let (scene, times) = source.template.exact::<Digits<W>>(&source.typed)?;
         let time = |text: &Option<String>, other: Digits<W>| {
