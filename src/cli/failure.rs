@@ -170,7 +170,7 @@ impl From<CheckpointError> for Failure {
 impl From<ResumeError> for Failure {
     fn from(error: ResumeError) -> Self {
         match error {
-            ResumeError::Misfit => Self::new(Exit::Scene, error.to_string()),
+            ResumeError::Misfit | ResumeError::OtherEvents(_) => Self::new(Exit::Scene, error.to_string()),
             ResumeError::Step(stop) => stop.into(),
         }
     }

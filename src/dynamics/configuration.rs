@@ -1,9 +1,14 @@
 //! Where a mechanism is at a moment, as user-defined forces and events see it.
 
 use super::constraint::Site;
+use super::point::Point;
 use super::{CompileError, Mechanism, Motion};
 use crate::arithmetic::scratch::with_copies;
 use crate::arithmetic::{Complex, Over, Real, Scalar};
+use std::cell::Cell;
+
+/// What the ground is called.
+const GROUND: &str = "ground";
 
 /// Time, angles, rates and points of a mechanism at one moment, over any scalar: plain numbers where an event
 /// function is evaluated, symbols where a [`Force`](super::force::Force) is recorded.
@@ -122,7 +127,69 @@ impl<S: Scalar + Over<C>, C: Real> ConfigurationSource<S, C> for Values<'_, S> {
     }
 }
 
+/// A configuration that notes where a body is asked for that is not there.
+struct Checked<'a> {
+    at: &'a Configuration<'a, f64>,
+    bodies: usize,
+    coordinates: usize,
+    is_foreign: Cell<bool>,
+}
+
+impl Checked<'_> {
+    /// What is found where the body is there; else the other.
+    fn of<R>(&self, is_there: bool, find: impl FnOnce(&dyn ConfigurationSource<f64>) -> R, other: R) -> R {
+        self.is_foreign.set(self.is_foreign.get() || !is_there);
+        if is_there { find(self.at.0) } else { other }
+    }
+
+    fn has(&self, site: &Site) -> bool {
+        let Point { terms, shifts, .. } = &site.point;
+        terms.iter().all(|term| term.0 < self.bodies)
+            && shifts.iter().all(|shift| shift.0 + 1 < self.coordinates)
+    }
+}
+
+impl ConfigurationSource<f64> for Checked<'_> {
+    fn time(&self) -> f64 {
+        self.at.time()
+    }
+
+    fn angle(&self, body: usize) -> f64 {
+        self.of(body < self.bodies, |at| at.angle(body), 0.0)
+    }
+
+    fn rate(&self, body: usize) -> f64 {
+        self.of(body < self.bodies, |at| at.rate(body), 0.0)
+    }
+
+    fn direction(&self, body: usize) -> Complex<f64> {
+        self.of(body < self.bodies, |at| at.direction(body), Complex::ZERO)
+    }
+
+    fn position(&self, site: &Site) -> Complex<f64> {
+        self.of(self.has(site), |at| at.position(site), Complex::ZERO)
+    }
+
+    fn velocity(&self, site: &Site) -> Complex<f64> {
+        self.of(self.has(site), |at| at.velocity(site), Complex::ZERO)
+    }
+
+    fn constant(&self, value: f64) -> f64 {
+        value
+    }
+}
+
 impl Mechanism {
+    /// True where a function asks at a motion for a body that is not there.
+    pub(crate) fn is_foreign(&self, motion: &Motion, value: impl FnOnce(&Configuration<f64>) -> f64) -> bool {
+        self.seen(motion, |at| {
+            let (bodies, coordinates) = (self.bodies.len(), self.coordinates());
+            let checked = Checked { at, bodies, coordinates, is_foreign: Cell::new(false) };
+            value(&Configuration::new(&checked));
+            checked.is_foreign.get()
+        })
+    }
+
     /// Calls `then` with the configuration of a motion.
     pub(crate) fn seen<R>(&self, motion: &Motion, then: impl FnOnce(&Configuration<f64>) -> R) -> R {
         let n = motion.phi.len();
@@ -149,11 +216,15 @@ impl Mechanism {
             .ok_or_else(|| CompileError::NoSuchBar(name.into()))
     }
 
-    /// The point `[x, y]` \[m\] of the bar of this name, in the bar's frame: from its origin, x along it.
+    /// The point `[x, y]` \[m\] of the bar of this name, in the bar's frame: from its origin, x along it; of
+    /// `ground`, the point of the ground there, as [`Site::ground`].
     ///
     /// # Errors
     /// No bar has this name.
     pub fn site(&self, bar: &str, [x, y]: [f64; 2]) -> Result<Site, CompileError> {
+        if bar == GROUND {
+            return Ok(Site::ground([x, y]));
+        }
         let body = self.body(bar)?;
         let point = self.forest.walk(body, Complex::new(x, y) + self.bodies[body].ends[0]);
         Ok(Site { body: Some(body), point })

@@ -56,6 +56,7 @@ pub mod elimination;
 pub mod energy;
 #[doc(hidden)]
 pub mod envelope;
+mod fingerprint;
 #[doc(hidden)]
 pub mod force;
 #[doc(hidden)]

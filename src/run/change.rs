@@ -37,6 +37,16 @@ impl ContactDriver {
         monitor: Option<&mut dyn Monitor>,
     ) -> Result<(), StepError> {
         let Some(events) = &mut self.events else { return Ok(()) };
+        if let Some(name) = events.take_undefined() {
+            return Err(StepError {
+                cause: Cause::NotFinite,
+                method: outcome.plan.method.to_string(),
+                t: self.motion().time.hi,
+                step: 0.0,
+                what: format!("the function of event `{name}` is not a number in the step that ends here"),
+                hint: "let its value be a number wherever the motion may come to".into(),
+            });
+        }
         let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
         if let Some(function) = events.friction_function(event) {
             return self.friction_event(function, outcome);

@@ -12,8 +12,8 @@ mod search;
 pub(super) use detector::KEPT;
 pub(super) use detector::{EventDetector, EventMemory, SwitchFunction};
 
-use crate::dynamics::Motion;
 use crate::dynamics::configuration::Configuration;
+use crate::dynamics::{Mechanism, Motion};
 pub use crate::scene::Direction;
 use serde::{Deserialize, Serialize};
 
@@ -127,4 +127,33 @@ pub struct EventRecord {
     pub phi: Vec<f64>,
     /// Rates \[rad/s, m/s\].
     pub omega: Vec<f64>,
+}
+
+/// What tells an event from outside from others: its name, its direction, and its value at a moment, to the
+/// bit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct EventMark {
+    pub name: String,
+    direction: u8,
+    value: u64,
+}
+
+/// Those of some events at a motion.
+pub(super) fn marks(mechanism: &Mechanism, motion: &Motion, events: &[Box<dyn Event>]) -> Vec<EventMark> {
+    let marks = events.iter().map(|event| EventMark {
+        name: event.name().into(),
+        direction: event.direction() as u8,
+        value: mechanism.seen(motion, |at| event.value(at)).to_bits(),
+    });
+    marks.collect()
+}
+
+/// The name of the first of some events that asks at a motion for a body the mechanism does not have.
+pub(crate) fn foreign_event<'a>(
+    mechanism: &Mechanism,
+    motion: &Motion,
+    events: &'a [Box<dyn Event>],
+) -> Option<&'a str> {
+    let mut events = events.iter();
+    events.find(|event| mechanism.is_foreign(motion, |at| event.value(at))).map(|event| event.name())
 }

@@ -8,13 +8,14 @@ mod stops;
 
 pub use self::outcome::{Outcome, RunError};
 pub use self::prepared::Run;
+use self::snapshot::moment;
 pub use self::snapshot::{ResumeError, Snapshot};
-use self::stops::{advised, came_apart, drift_stop, missed, not_finite, uncounted};
+use self::stops::{advised, came_apart, drift_stop, foreign, missed, not_finite, not_given, uncounted};
 use super::clock::{Clock, still};
 use super::contact::ContactDriver;
 use super::drift::{Drift, Limits};
 use super::driver::Pause;
-use super::event::{Event, EventDetector};
+use super::event::{Event, EventDetector, EventMark, foreign_event, marks};
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
 use super::inside::{Observer, ObserverAdapter, StepsOf};
@@ -101,8 +102,13 @@ pub struct Running {
     /// What keeps it from leaving its start.
     resting: Option<StepError>,
     is_over: bool,
-    /// The start, until the first sample has been compared with it.
-    begun: Option<Motion>,
+    /// The mechanism and the motion it began with.
+    compiled: Arc<Mechanism>,
+    start: Motion,
+    /// True until the first sample has been compared with the start.
+    is_at_start: bool,
+    /// The events from outside that the run before a snapshot looked for, until they are given again.
+    awaited: Vec<EventMark>,
     clock: Clock,
 }
 
@@ -112,14 +118,15 @@ impl Running {
         let Run { mechanism, plan, limits, driver, turns, ensemble, error_estimator, events, clock, begun } =
             run;
         let mut outcome = Outcome::begun(&mechanism, plan);
-        let mut contact_driver = ContactDriver::new(mechanism, driver);
-        if !events.is_empty() {
+        let foreign = foreign_event(&mechanism, &begun, &events).map(|event| foreign(&outcome.plan, event));
+        let mut contact_driver = ContactDriver::new(Arc::clone(&mechanism), driver);
+        if !events.is_empty() && foreign.is_none() {
             contact_driver.events = Some(EventDetector::new(Arc::clone(contact_driver.whole()), events));
         }
         contact_driver.extremes = ExtremesDetector::new(contact_driver.holding());
         contact_driver.flips = ensemble.map(|_| FlipDetector::default());
         // The reference of the energy is what impacts at the start leave.
-        let resting = contact_driver.meet(&mut outcome).err();
+        let resting = contact_driver.meet(&mut outcome).err().or(foreign);
         Self {
             limits,
             contact_driver,
@@ -130,7 +137,10 @@ impl Running {
             row: 0,
             resting,
             is_over: false,
-            begun: Some(begun),
+            compiled: mechanism,
+            start: begun,
+            is_at_start: true,
+            awaited: Vec::new(),
             clock: still,
         }
         .timed(clock)
@@ -145,11 +155,11 @@ impl Running {
         start: &Motion,
         snapshot: Snapshot,
     ) -> Result<Self, ResumeError> {
-        if !snapshot.fits(&mechanism) {
+        if !snapshot.fits(&mechanism, start) {
             return Err(ResumeError::Misfit);
         }
-        let Snapshot { limits, contact_state, mut outcome, row, resting, horizon, error_estimator } =
-            snapshot;
+        let Snapshot { limits, contact_state, mut outcome, row, resting, horizon, .. } = snapshot;
+        let (error_estimator, awaited) = (snapshot.error_estimator, snapshot.events);
         outcome.drift.kind = Drift::new(&mechanism, outcome.plan.until).kind;
         let error_estimator = match error_estimator {
             Some(kept) => Some(
@@ -160,9 +170,8 @@ impl Running {
         };
         let turns = Turns::new(&mechanism, &outcome.plan, start);
         let contact_driver =
-            ContactDriver::resume(mechanism, &outcome.plan, start, contact_state, horizon.into())?
+            ContactDriver::resume(mechanism.clone(), &outcome.plan, start, contact_state, horizon.into())?
                 .ok_or(ResumeError::Misfit)?;
-        let begun = (row == 0).then(|| start.clone());
         Ok(Self {
             limits,
             contact_driver,
@@ -173,7 +182,10 @@ impl Running {
             row,
             resting,
             is_over: false,
-            begun,
+            compiled: mechanism,
+            start: start.clone(),
+            is_at_start: row == 0,
+            awaited,
             clock: still,
         })
     }
@@ -195,11 +207,26 @@ impl Running {
         self
     }
 
-    /// Goes on looking for the events that the run before the snapshot looked for.
+    /// Goes on looking for the events that the run before the snapshot looked for; without them such a run
+    /// stops where it is.
     ///
     /// # Errors
-    /// They are others.
+    /// They are others: by their number, names or directions, or by the values of their functions at the last
+    /// output time.
     pub fn with_events(mut self, events: Vec<Box<dyn Event>>) -> Result<Self, ResumeError> {
+        let other = |what: String| Err(ResumeError::OtherEvents(what));
+        let moment = moment(&self.outcome.last).unwrap_or_else(|| self.start.clone());
+        if let Some(event) = foreign_event(&self.compiled, &moment, &events) {
+            return other(format!("event `{event}` names a body that is not there"));
+        }
+        let awaited = std::mem::take(&mut self.awaited);
+        let given = marks(&self.compiled, &moment, &events);
+        if awaited.len() != given.len() {
+            return other(format!("it has {}, and {} are given", awaited.len(), given.len()));
+        }
+        if let Some((before, _)) = awaited.iter().zip(&given).find(|(before, given)| before != given) {
+            return other(format!("event `{}` was another one", before.name));
+        }
         let detector = EventDetector::new(Arc::clone(self.contact_driver.whole()), events);
         if self.contact_driver.watch_for(detector) { Ok(self) } else { Err(ResumeError::Misfit) }
     }
@@ -270,7 +297,10 @@ impl Running {
         mut steps: Option<&mut ObserverAdapter>,
         pause: &mut Pause,
     ) -> Result<bool, RunError> {
-        let Self { limits, contact_driver, outcome, ensemble, error_estimator, turns, begun, .. } = self;
+        if !self.awaited.is_empty() && !self.is_over {
+            self.resting = Some(not_given(&self.outcome, &self.awaited));
+        }
+        let Self { limits, contact_driver, outcome, ensemble, error_estimator, turns, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
                 Some(stop) => Err(stop),
@@ -297,7 +327,8 @@ impl Running {
             let stopped = stopped.map_err(|stop| advised(stop, contact_driver));
             let (has_closed_loops, steps_made) =
                 (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
-            let moved = begun.take().and_then(|begun| contact_driver.begun_elsewhere(&begun, outcome));
+            let is_first = std::mem::take(&mut self.is_at_start);
+            let moved = if is_first { contact_driver.begun_elsewhere(&self.start, outcome) } else { None };
             let present = Arc::clone(&contact_driver.mechanism);
             let sample = contact_driver.sample();
             // A stop before any progress leaves the state of the row before.
@@ -354,6 +385,14 @@ impl Running {
         resting.is_none()
             && (1..=outcome.plan.rows)
                 .all(|row| contact_driver.go(outcome.plan.time(row), outcome, pause) == Ok(true))
+    }
+
+    /// What tells its events from outside from others, at this motion.
+    fn marks(&self, moment: &Motion) -> Vec<EventMark> {
+        match &self.contact_driver.events {
+            Some(events) if self.awaited.is_empty() => marks(&self.compiled, moment, events.outside()),
+            _ => self.awaited.clone(),
+        }
     }
 
     /// The motion at the last output time, to the last digit.

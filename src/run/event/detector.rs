@@ -1,5 +1,6 @@
 //! The events of a run: which functions there are, what they belong to, and what is done at their zeros.
 
+mod named;
 mod shortened;
 
 use super::search::{NO_VALUE, Passage};
@@ -72,6 +73,8 @@ pub(in crate::run) struct EventDetector {
     closers: Vec<(usize, Vec<String>)>,
     /// What the last coefficients of an interpolant may be over its largest value.
     pub(super) resolved: f64,
+    /// The event from outside whose function was not a number in the last step.
+    pub(super) undefined: Option<usize>,
     /// Events since somebody last took them.
     found: Vec<EventRecord>,
     count: u64,
@@ -103,8 +106,18 @@ impl EventDetector {
         let friction = FrictionWatch::new(&mechanism);
         let (memory, found, closers) = (EventMemory::default(), Vec::new(), Vec::new());
         let resolved = RESOLVED;
-        let mut detector =
-            Self { events, laws, mechanism, friction, memory, closers, resolved, found, count: 0 };
+        let mut detector = Self {
+            events,
+            laws,
+            mechanism,
+            friction,
+            memory,
+            closers,
+            resolved,
+            undefined: None,
+            found,
+            count: 0,
+        };
         detector.closers = detector.closing();
         detector.memory.sides = vec![0; detector.functions()];
         detector.memory.largest = vec![0.0; detector.functions()];
@@ -200,11 +213,6 @@ impl EventDetector {
             Owner::Condition(_, number) => SwitchFunction::Condition(number),
             _ => SwitchFunction::Other,
         }
-    }
-
-    /// True for an event that is not the scene's own.
-    pub fn is_from_outside(&self, event: usize) -> bool {
-        matches!(self.owner(event), Owner::Outside(_))
     }
 
     /// Goes on with the laws of a mechanism on their present branches.
@@ -354,12 +362,6 @@ impl EventDetector {
         values.any(|(event, (value, largest))| value.abs() <= share * largest && !still.contains(&event))
     }
 
-    /// The value of the function of the event of this name.
-    pub fn value_of(&self, name: &str, motion: &Motion) -> Option<f64> {
-        let event = (0..self.functions()).find(|&event| self.name(event) == name)?;
-        self.values(motion).get(event).copied()
-    }
-
     /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.functions());
@@ -391,6 +393,9 @@ impl StepWatcher for EventDetector {
         }
         let (mut passages, before) = (Vec::new(), (self.memory.sides.clone(), self.memory.still.clone()));
         self.passages(inside, begin, span, 0, &mut passages);
+        if self.undefined.is_some() {
+            return Some(end);
+        }
         self.memory.woken.clear();
         // In the order of their times for each function.
         let all = passages.clone();

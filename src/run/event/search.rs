@@ -119,6 +119,12 @@ impl EventDetector {
             if self.memory.resting.contains(&event) {
                 continue;
             }
+            if let Owner::Outside(number) = self.owner(event)
+                && values[event].iter().any(|value| value.is_nan())
+            {
+                self.undefined.get_or_insert(number);
+                continue;
+            }
             let is_resolved = are_resolved[event];
             let part = StepPart { begin, span, curve, values: &values[event], places, is_resolved, is_last };
             let mode = match self.owner(event) {

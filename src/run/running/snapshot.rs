@@ -3,14 +3,19 @@
 use super::super::contact::{ContactDriver, ContactDriverState};
 use super::super::custom::Custom;
 use super::super::drift::Limits;
+use super::super::event::EventMark;
 use super::super::plan::{MORE_IS_ALLOWED, Plan};
 use super::super::sample::Sample;
 use super::super::trust::{ErrorEstimator, SavedEstimator};
 use super::{Outcome, Running};
-use crate::dynamics::Mechanism;
+use crate::arithmetic::DoubleDouble;
+use crate::dynamics::{Mechanism, Motion};
 use crate::stepping::StepError;
 
 /// All that the rest of a run depends on, beside its mechanism: what a checkpoint holds.
+///
+/// Some of its numbers may be infinite, or not numbers, where the error is estimated: a format that keeps
+/// these is needed, as postcard.  JSON has none, and what `serde_json` writes of them is not read back.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Snapshot {
     pub(super) limits: Limits,
@@ -21,6 +26,10 @@ pub struct Snapshot {
     /// The horizon on the way to which the station was reached \[s\].
     pub(super) horizon: f64,
     pub(super) error_estimator: Option<SavedEstimator>,
+    /// That of its mechanism at the last output time.
+    pub(super) fingerprint: u64,
+    /// Its events from outside there.
+    pub(super) events: Vec<EventMark>,
 }
 
 /// Why a run cannot go on from a snapshot.
@@ -29,15 +38,34 @@ pub enum ResumeError {
     /// It is one of another mechanism, or not sound.
     #[error("the snapshot does not fit the scene")]
     Misfit,
+    /// It looked for other events from outside.
+    #[error("the snapshot does not fit its events: {0}")]
+    OtherEvents(String),
     /// The method cannot begin there.
     #[error("{0}")]
     Step(#[from] StepError),
 }
 
+/// The motion of a sample, as far as the sample has it; `None` before the first.
+pub(super) fn moment(sample: &Sample) -> Option<Motion> {
+    let doubled = |all: &[f64]| all.iter().copied().map(DoubleDouble::from).collect();
+    (!sample.phi.is_empty()).then(|| Motion {
+        time: sample.t.into(),
+        phi: doubled(&sample.phi),
+        turns: vec![0; sample.phi.len()],
+        omega: doubled(&sample.omega),
+        ..Motion::default()
+    })
+}
+
 impl Running {
     /// All that the rest of the run depends on.
     pub fn snapshot(&self) -> Snapshot {
+        let moment = moment(&self.outcome.last).unwrap_or_else(|| self.start.clone());
+        let (fingerprint, events) = (self.compiled.fingerprint(&moment), self.marks(&moment));
         Snapshot {
+            fingerprint,
+            events,
             limits: self.limits,
             contact_state: self.contact_driver.contact_state(),
             outcome: self.outcome.clone(),
@@ -90,7 +118,7 @@ impl Snapshot {
     }
 
     /// Whether its parts go together, and with a mechanism.
-    pub(super) fn fits(&self, mechanism: &Mechanism) -> bool {
+    pub(super) fn fits(&self, mechanism: &Mechanism, start: &Motion) -> bool {
         let Outcome { plan, last, drift, trace, holds, .. } = &self.outcome;
         let (n, bars, rows) = (mechanism.coordinates(), mechanism.bodies.len(), mechanism.constraints.len());
         let sizes = |sample: &Sample| {
@@ -102,10 +130,12 @@ impl Snapshot {
         plan.is_sound()
             && self.row <= plan.rows
             && self.horizon <= plan.until
-            && (self.row == 0 || whole(last))
+            && ((self.row == 0 && last.phi.is_empty()) || whole(last))
             && trace.samples().all(sizes)
             && drift.fits(mechanism)
             && self.error_estimator.as_ref().is_none_or(SavedEstimator::is_sound)
             && ContactDriver::names_holds(&self.contact_state) <= holds.len()
+            && start.phi.len() == n
+            && mechanism.fingerprint(&moment(last).unwrap_or_else(|| start.clone())) == self.fingerprint
     }
 }

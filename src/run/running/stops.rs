@@ -3,11 +3,15 @@
 use super::super::contact::ContactDriver;
 use super::super::drift::Drift;
 use super::super::driver::MOST_TURNS;
+use super::super::event::EventMark;
 use super::super::methods::{MethodId, Stabilization};
 use super::super::plan::Plan;
 use super::super::sample::Sample;
+use super::Outcome;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::shown::estimate;
+use crate::dynamics::CompileError;
+use crate::dynamics::compile::quoted;
 use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::stepping::{Cause, StepError};
 
@@ -101,6 +105,32 @@ pub(super) fn came_apart(plan: &Plan, drift: &Drift, sample: &Sample) -> Option<
         },
         hint: "--method dp8 or taylor with --stabilize projection, or a tighter tolerance".into(),
     })
+}
+
+/// An event from outside asks for a body that is not there.
+pub(super) fn foreign(plan: &Plan, event: &str) -> StepError {
+    StepError {
+        cause: Cause::Unsuited,
+        method: plan.method.to_string(),
+        t: 0.0,
+        step: plan.step.unwrap_or(0.0),
+        what: CompileError::ForeignEvent(event.into()).to_string(),
+        hint: "take bodies and points from the mechanism of this run".into(),
+    }
+}
+
+/// The events from outside that a run looked for are not there where it goes on.
+pub(super) fn not_given(outcome: &Outcome, events: &[EventMark]) -> StepError {
+    let names: Vec<String> = events.iter().map(|event| event.name.clone()).collect();
+    let [does, was] = if names.len() == 1 { ["event", "is"] } else { ["events", "are"] };
+    StepError {
+        cause: Cause::Unsuited,
+        method: outcome.plan.method.to_string(),
+        t: outcome.last.t,
+        step: outcome.plan.step.unwrap_or(0.0),
+        what: format!("{does} {} {was} from outside the scene, and not given again", quoted(&names)),
+        hint: "give them to `Running::with_events`".into(),
+    }
 }
 
 /// A method that says it is at an output time and is not, beyond a part of the interval that no row shows:

@@ -1,0 +1,27 @@
+//! Events from outside, and those that are asked for by name.
+
+use super::{Event, EventDetector, Owner};
+use crate::dynamics::Motion;
+
+impl EventDetector {
+    /// The events from outside.
+    pub fn outside(&self) -> &[Box<dyn Event>] {
+        &self.events
+    }
+
+    /// True for an event that is not the scene's own.
+    pub fn is_from_outside(&self, event: usize) -> bool {
+        matches!(self.owner(event), Owner::Outside(_))
+    }
+
+    /// The name of the event from outside whose function was not a number in the last step.
+    pub fn take_undefined(&mut self) -> Option<String> {
+        self.undefined.take().map(|number| self.events[number].name().into())
+    }
+
+    /// The value of the function of the event of this name.
+    pub fn value_of(&self, name: &str, motion: &Motion) -> Option<f64> {
+        let event = (0..self.functions()).find(|&event| self.name(event) == name)?;
+        self.values(motion).get(event).copied()
+    }
+}
