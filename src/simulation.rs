@@ -3,12 +3,13 @@
 use crate::Error;
 use crate::dynamics::constraint::Site;
 use crate::dynamics::force::{Force, UserForce};
-use crate::dynamics::{Mechanism, Motion};
+use crate::dynamics::{CompileError, Mechanism, Motion};
+use crate::run::event::foreign_event;
 use crate::run::trajectory::{Recorder, Trajectory};
 use crate::run::trust::Level;
 use crate::run::{
-    Custom, Event, Limits, MethodId, Observer, Outcome, Plan, Request, Run, Running, Sample, Stabilization,
-    integrate,
+    Custom, Event, Limits, MethodId, Observer, Outcome, Plan, Request, RequestRefusal, Run, Running, Sample,
+    Stabilization, integrate,
 };
 use crate::scene::Scene;
 use std::sync::Arc;
@@ -96,7 +97,7 @@ impl Simulation {
         Ok(self.mechanism.body(bar)?)
     }
 
-    /// The point `[x, y]` \[m\] of a bar, in its frame.
+    /// The point `[x, y]` \[m\] of a bar, in its frame, or of `ground`.
     ///
     /// # Errors
     /// No bar has this name.
@@ -107,7 +108,8 @@ impl Simulation {
     /// Adds a force.
     ///
     /// # Errors
-    /// A potential that depends on time or rates, or a body that is not there.
+    /// A potential that depends on time or rates, a body that is not there, or a name that another force or a
+    /// part of the scene has.
     pub fn force(mut self, force: &impl Force) -> Result<Self, Error> {
         self.forces.push(UserForce::record(force)?);
         self.mechanism = Arc::new(Mechanism::with_forces(&self.scene, self.forces.clone())?);
@@ -148,7 +150,7 @@ impl Simulation {
         self
     }
 
-    /// An integrator from outside the crate, by what makes it.
+    /// An integrator from outside the crate, by what makes it, in place of a method and its step.
     #[must_use]
     pub fn integrator(mut self, integrator: Custom) -> Self {
         self.integrator = Some(integrator);
@@ -200,11 +202,15 @@ impl Simulation {
     /// The run as it would be carried out.
     ///
     /// # Errors
-    /// A request that makes no sense for the scene, or a method that cannot begin there.
+    /// A request that makes no sense for the scene, an event of another mechanism, or a method that cannot
+    /// begin there.
     pub fn prepare(self) -> Result<Run, Error> {
+        if self.integrator.is_some() {
+            check_integrator(&self.request)?;
+        }
         // An adaptive method stands for what is not known of the integrator.
         let stand_in = Request {
-            method: self.request.method.or(self.integrator.as_ref().map(|_| MethodId::Dp8)),
+            method: if self.integrator.is_some() { Some(MethodId::Dp8) } else { self.request.method },
             ..self.request
         };
         let mut plan = Plan::new(&self.scene, &self.mechanism, &stand_in)?;
@@ -212,6 +218,9 @@ impl Simulation {
             plan = plan.integrated_by(integrator);
         }
         let start = self.mechanism.start(&self.scene);
+        if let Some(event) = foreign_event(&self.mechanism, &start, &self.events) {
+            return Err(CompileError::ForeignEvent(event.into()).into());
+        }
         let run = Run::new(Arc::clone(&self.mechanism), plan, self.limits, &start)?;
         Ok(run.trusted(self.level, &start).with_events(self.events))
     }
@@ -254,4 +263,19 @@ impl Simulation {
     ) -> Result<Outcome, Error> {
         Ok(integrate(self.prepare()?, &mut observer)?)
     }
+}
+
+/// An integrator from outside is the method, and has a step of its own.
+fn check_integrator(request: &Request) -> Result<(), RequestRefusal> {
+    let (what, reason) = match (request.method, request.step) {
+        (Some(method), _) => (format!("method {method}"), "it would replace the one from outside"),
+        (_, Some(step)) => (format!("a step of {step} s"), "the integrator from outside has its own"),
+        _ => return Ok(()),
+    };
+    Err(RequestRefusal {
+        what: format!("{what} with `Simulation::integrator`"),
+        reason: reason.into(),
+        alternative: "leave one of the two out".into(),
+        is_usage: true,
+    })
 }

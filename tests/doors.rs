@@ -405,13 +405,13 @@ fn runs_may_go_to_other_threads() {
 }
 
 /// The classical method of Runge (1895) and Kutta (1901): four stages, order 4.
-struct Rk4 {
+pub struct Rk4 {
     step: f64,
     stages: [Vec<f64>; 5],
 }
 
 impl Rk4 {
-    fn boxed(step: f64) -> Box<dyn Integrator<dyn Problem> + Send> {
+    pub fn boxed(step: f64) -> Box<dyn Integrator<dyn Problem> + Send> {
         Box::new(Self { step, stages: Default::default() })
     }
 }

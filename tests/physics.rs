@@ -52,6 +52,8 @@ mod friction;
 mod friction_impacts;
 mod friction_reversals;
 mod friction_shared;
+#[cfg(feature = "digits")]
+mod from_outside;
 mod gauss;
 mod identities;
 mod impact;

@@ -2,7 +2,8 @@
 
 use super::build::Problem;
 use crate::dynamics::{State, Time};
-use crate::stepping::{Integrator, Statistics, StepError, shortened};
+use crate::stepping::{Cause, Integrator, Statistics, StepError, shortened};
+use std::cmp::Ordering;
 use std::fmt;
 use std::sync::Arc;
 
@@ -122,7 +123,19 @@ impl Integrator<dyn Problem> for Outside {
         until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        self.inner.step(problem, state, until, statistics)
+        let begin = state.time;
+        let event = self.inner.step(problem, state, until, statistics)?;
+        if event.is_none() && (state.time - begin).hi.partial_cmp(&0.0) != Some(Ordering::Greater) {
+            return Err(StepError {
+                cause: Cause::StepTooSmall,
+                method: self.name().into(),
+                t: begin.hi,
+                step: 0.0,
+                what: "its step has not moved the time on".into(),
+                hint: "every call of `Integrator::step` is to end later than it begins".into(),
+            });
+        }
+        Ok(event)
     }
 
     fn is_at(&self, state: &State, until: Time) -> bool {

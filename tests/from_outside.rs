@@ -1,0 +1,245 @@
+//! What programs hand in from outside the crate: what does not fit is refused, and named.
+
+use crate::doors::Rk4;
+use crate::many_digits::{shipped, source};
+use driftless::arithmetic::Scalar;
+use driftless::dynamics::OdeSystem;
+use driftless::run::digits::{Precision, long_run};
+use driftless::run::{Action, Direction, Event, ResumeError};
+use driftless::stepping::Cause;
+use driftless::{
+    Configuration, Custom, Force, Integrator, Loads, MethodId, Motion, Running, Scene, Simulation, Site,
+    Snapshot, State, Statistics, StepError, Time,
+};
+use std::sync::Arc;
+
+/// Drag on a point, by a factor, with a name.
+struct Drag(&'static str, Site, f64);
+
+impl Force for Drag {
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn apply<S: Scalar>(&self, at: &Configuration<S>, loads: &mut Loads<S>) {
+        let [vx, vy] = at.velocity(&self.1);
+        loads.force(&self.1, [vx.scale(-self.2), vy.scale(-self.2)]);
+    }
+}
+
+/// An event function with a name, which is recorded.
+struct Passes<V>(&'static str, V);
+
+impl<V: Fn(&Configuration<f64>) -> f64 + Send + Sync> Event for Passes<V> {
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn value(&self, at: &Configuration<f64>) -> f64 {
+        self.1(at)
+    }
+
+    fn direction(&self) -> Direction {
+        Direction::Rising
+    }
+
+    fn action(&mut self, _at: &Configuration<f64>, _motion: &Motion) -> Action {
+        Action::Record
+    }
+}
+
+fn scene(name: &str) -> Scene {
+    driftless::read_scene(format!("examples/scenes/{name}.json").as_ref(), &[]).expect("a scene")
+}
+
+fn with_drag(scene: &Scene, name: &'static str, bar: &str, factor: f64) -> Simulation {
+    let simulation = Simulation::new(scene).expect("equations").until(2.0).every(0.5);
+    let site = simulation.site(bar, [0.6, 0.0]).expect("a bar");
+    simulation.force(&Drag(name, site, factor)).expect("a force")
+}
+
+#[test]
+fn many_digits_refuse_forces_that_are_no_parts_of_the_scene() {
+    let mut source = source(&shipped("free"), &[], "1", "1/2");
+    assert!(long_run(&source, Precision::new(30, false)).is_ok());
+    source.mechanism = Arc::clone(with_drag(&source.scene, "drag", "bar2", 0.1).mechanism());
+    let refused = long_run(&source, Precision::new(30, false)).err().expect("a refusal");
+    assert!(refused.to_string().contains("force drag in many digits"), "{refused}");
+}
+
+#[test]
+fn a_force_that_shares_a_name_is_refused() {
+    for (scene, bar, name) in [
+        ("latch", "bar", "latch"),
+        ("spring", "bar2", "spring"),
+        ("motor", "bar2", "motor"),
+        ("free", "bar2", "B"),
+    ] {
+        let scene = self::scene(scene);
+        let simulation = Simulation::new(&scene).expect("equations");
+        let site = simulation.site(bar, [0.6, 0.0]).expect("a bar");
+        let refused = simulation.force(&Drag(name, site, 0.1)).err().expect("a refusal");
+        assert!(refused.to_string().contains(&format!("force `{name}` has the name of")), "{refused}");
+    }
+    let simulation = with_drag(&scene("free"), "drag", "bar2", 0.1);
+    let site = simulation.site("bar1", [0.6, 0.0]).expect("a bar");
+    let refused = simulation.force(&Drag("drag", site, 0.1)).err().expect("a refusal");
+    assert!(refused.to_string().contains("another force"), "{refused}");
+}
+
+fn paused(simulation: Simulation, after: u64) -> Snapshot {
+    let mut running = Running::new(simulation.prepare().expect("a run"));
+    let mut asked = 0;
+    let is_over = running.go(&mut |_| Ok(()), &mut || {
+        asked += 1;
+        asked == after
+    });
+    assert!(!is_over.expect("samples"));
+    running.snapshot()
+}
+
+#[test]
+fn a_run_goes_on_with_its_own_mechanism_alone() {
+    let scene = scene("free");
+    let dragged = |factor: f64| with_drag(&scene, "drag", "bar2", factor).method(MethodId::Taylor);
+    let resumed = |simulation: &Simulation, after: u64| {
+        let snapshot = paused(dragged(0.1), after);
+        Running::resume(Arc::clone(simulation.mechanism()), &simulation.start(), snapshot)
+    };
+    let whole = dragged(0.1).run().expect("a run");
+    let mut heavier = scene.clone();
+    heavier.bars[1].mass *= 1.0 + 1e-14;
+    for after in [1, 9] {
+        let mut same = resumed(&dragged(0.1), after).expect("the same");
+        assert!(same.go(&mut |_| Ok(()), &mut || false).expect("samples"));
+        assert_eq!(same.finish().last, whole.last);
+        let none = Simulation::new(&scene).expect("equations");
+        for other in [none, dragged(0.2), with_drag(&heavier, "drag", "bar2", 0.1)] {
+            assert_eq!(resumed(&other, after).err(), Some(ResumeError::Misfit), "after {after}");
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_with_its_own_events_alone() {
+    let scene = scene("free");
+    let simulation = || Simulation::new(&scene).expect("equations").until(2.0).every(0.5);
+    let event = |name: &'static str, height: f64| {
+        let tip = simulation().site("bar2", [0.6, 0.0]).expect("a bar");
+        Passes(name, move |at: &Configuration<f64>| at.position(&tip)[1] - height)
+    };
+    let whole = simulation().event(event("level", -0.4)).run().expect("a run");
+    assert!(whole.event_count > 0);
+    let resumed = || {
+        let snapshot = paused(simulation().event(event("level", -0.4)), 9);
+        Running::resume(Arc::clone(simulation().mechanism()), &simulation().start(), snapshot)
+            .expect("it fits")
+    };
+    let mut same = resumed().with_events(vec![Box::new(event("level", -0.4))]).expect("the same");
+    assert!(same.go(&mut |_| Ok(()), &mut || false).expect("samples"));
+    assert_eq!(same.finish().events, whole.events);
+    let mut without = resumed();
+    assert!(without.go(&mut |_| Ok(()), &mut || false).expect("samples"));
+    let stop = without.finish().stop.expect("a stop");
+    assert!(
+        stop.to_string().contains("event `level` is from outside the scene, and not given again"),
+        "{stop}"
+    );
+    for other in [vec![], vec![event("x", -0.4)], vec![event("level", 0.1)]] {
+        let other = other.into_iter().map(|event| Box::new(event) as Box<dyn Event>).collect();
+        let refused = resumed().with_events(other).err().expect("a refusal");
+        assert!(matches!(refused, ResumeError::OtherEvents(_)), "{refused}");
+    }
+    // A run without any takes none.
+    let snapshot = paused(simulation(), 9);
+    let plain = Running::resume(Arc::clone(simulation().mechanism()), &simulation().start(), snapshot);
+    assert!(plain.expect("it fits").with_events(vec![Box::new(event("level", -0.4))]).is_err());
+}
+
+#[test]
+fn an_event_function_that_is_not_a_number_stops_the_run_by_its_name() {
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Dopri5] {
+        let root = Passes("root", |at: &Configuration<f64>| (0.7 - at.time()).sqrt() - 0.1);
+        let simulation = Simulation::new(&scene("free")).expect("equations").until(2.0).every(0.5);
+        let outcome = simulation.method(method).event(root).run().expect("a run");
+        let stop = outcome.stop.expect("a stop");
+        assert_eq!(stop.cause, Cause::NotFinite, "{stop}");
+        assert!(stop.what.contains("event `root` is not a number"), "{stop}");
+        assert!((0.5..=2.0).contains(&outcome.last.t), "{method}: {}", outcome.last.t);
+    }
+}
+
+#[test]
+fn an_event_of_another_mechanism_is_refused() {
+    let foreign = Simulation::new(&scene("branch")).expect("equations");
+    let last = scene("branch").bars.last().expect("a bar").name.clone();
+    let site = foreign.site(&last, [0.1, 0.0]).expect("a bar");
+    let free = || Simulation::new(&scene("free")).expect("equations").until(1.0);
+    let of_place = Passes("place", move |at: &Configuration<f64>| at.position(&site)[1]);
+    let of_angle = Passes("angle", |at: &Configuration<f64>| at.angle(2));
+    for refused in [free().event(of_place).run().err(), free().event(of_angle).run().err()] {
+        let refused = refused.expect("a refusal").to_string();
+        assert!(refused.contains("one of another mechanism"), "{refused}");
+    }
+    let of_rate: Box<dyn Event> = Box::new(Passes("rate", |at: &Configuration<f64>| at.rate(9)));
+    let run = free().prepare().expect("a run").with_events(vec![of_rate]);
+    let mut running = Running::new(run);
+    assert!(running.go(&mut |_| Ok(()), &mut || false).expect("samples"));
+    assert!(running.finish().stop.expect("a stop").what.contains("event `rate` is one of another mechanism"));
+}
+
+/// Makes steps of no length.
+struct Stuck;
+
+impl<P: OdeSystem + ?Sized> Integrator<P> for Stuck {
+    fn name(&self) -> &'static str {
+        "stuck"
+    }
+
+    fn order(&self) -> u32 {
+        1
+    }
+
+    fn begin(&mut self, _: &mut P, _: &mut State, _: Time) -> Result<(), StepError> {
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        _: &mut P,
+        _: &mut State,
+        _: Time,
+        statistics: &mut Statistics,
+    ) -> Result<Option<usize>, StepError> {
+        statistics.steps += 1;
+        Ok(None)
+    }
+}
+
+#[test]
+fn an_integrator_that_does_not_move_the_time_on_stops() {
+    let simulation = Simulation::new(&scene("free")).expect("equations").until(1.0);
+    let outcome = simulation.integrator(Custom::new("stuck", || Box::new(Stuck))).run().expect("a run");
+    let stop = outcome.stop.expect("a stop");
+    assert!(stop.method == "stuck" && stop.what.contains("has not moved the time on"), "{stop}");
+}
+
+#[test]
+fn an_integrator_from_outside_takes_neither_a_method_nor_a_step_beside_it() {
+    let custom = || Custom::new("rk4", || Rk4::boxed(1e-3));
+    let simulation = || Simulation::new(&scene("free")).expect("equations").until(0.1).integrator(custom());
+    for (asked, named) in [
+        (simulation().method(MethodId::Gauss(4)), "method gauss8"),
+        (simulation().step(0.5), "a step of 0.5 s"),
+    ] {
+        let refused = asked.run().err().expect("a refusal").to_string();
+        assert!(refused.contains(&format!("{named} with `Simulation::integrator`")), "{refused}");
+    }
+    assert_eq!(simulation().run().expect("a run").stop, None);
+}
+
+#[test]
+fn the_ground_is_a_body_for_sites() {
+    let simulation = Simulation::new(&scene("free")).expect("equations");
+    assert_eq!(simulation.site("ground", [0.3, -0.2]).expect("the ground"), Site::ground([0.3, -0.2]));
+}
