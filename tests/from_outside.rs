@@ -100,7 +100,9 @@ fn paused(simulation: Simulation, after: u64) -> Snapshot {
 
 #[test]
 fn a_run_goes_on_with_its_own_mechanism_alone() {
-    let scene = scene("free");
+    let mut scene = scene("free");
+    // Drag shows where points move.
+    scene.start[1].omega = 1.0;
     let dragged = |factor: f64| with_drag(&scene, "drag", "bar2", factor).method(MethodId::Taylor);
     let resumed = |simulation: &Simulation, after: u64| {
         let snapshot = paused(dragged(0.1), after);

@@ -105,8 +105,6 @@ pub struct Running {
     /// The mechanism and the motion it began with.
     compiled: Arc<Mechanism>,
     start: Motion,
-    /// True until the first sample has been compared with the start.
-    is_at_start: bool,
     /// The events from outside that the run before a snapshot looked for, until they are given again.
     awaited: Vec<EventMark>,
     clock: Clock,
@@ -139,7 +137,6 @@ impl Running {
             is_over: false,
             compiled: mechanism,
             start: begun,
-            is_at_start: true,
             awaited: Vec::new(),
             clock: still,
         }
@@ -184,7 +181,6 @@ impl Running {
             is_over: false,
             compiled: mechanism,
             start: start.clone(),
-            is_at_start: row == 0,
             awaited,
             clock: still,
         })
@@ -297,9 +293,7 @@ impl Running {
         mut steps: Option<&mut ObserverAdapter>,
         pause: &mut Pause,
     ) -> Result<bool, RunError> {
-        if !self.awaited.is_empty() && !self.is_over {
-            self.resting = Some(not_given(&self.outcome, &self.awaited));
-        }
+        self.ask_for_events();
         let Self { limits, contact_driver, outcome, ensemble, error_estimator, turns, .. } = self;
         while !self.is_over {
             let stopped = match self.resting.take() {
@@ -327,7 +321,7 @@ impl Running {
             let stopped = stopped.map_err(|stop| advised(stop, contact_driver));
             let (has_closed_loops, steps_made) =
                 (contact_driver.has_closed_loops(), contact_driver.statistics().steps);
-            let is_first = std::mem::take(&mut self.is_at_start);
+            let is_first = self.row == 0;
             let moved = if is_first { contact_driver.begun_elsewhere(&self.start, outcome) } else { None };
             let present = Arc::clone(&contact_driver.mechanism);
             let sample = contact_driver.sample();
@@ -385,6 +379,13 @@ impl Running {
         resting.is_none()
             && (1..=outcome.plan.rows)
                 .all(|row| contact_driver.go(outcome.plan.time(row), outcome, pause) == Ok(true))
+    }
+
+    /// Stops at the next step where events from outside were not given again.
+    fn ask_for_events(&mut self) {
+        if !self.awaited.is_empty() && !self.is_over {
+            self.resting = Some(not_given(&self.outcome, &self.awaited));
+        }
     }
 
     /// What tells its events from outside from others, at this motion.
