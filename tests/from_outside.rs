@@ -234,7 +234,7 @@ fn an_integrator_from_outside_takes_neither_a_method_nor_a_step_beside_it() {
         (simulation().method(MethodId::Gauss(4)), "method gauss8"),
         (simulation().step(0.5), "a step of 0.5 s"),
     ] {
-        let refused = asked.run().err().expect("a refusal").to_string();
+        let refused = asked.run().expect_err("a refusal").to_string();
         assert!(refused.contains(&format!("{named} with `Simulation::integrator`")), "{refused}");
     }
     assert_eq!(simulation().run().expect("a run").stop, None);

@@ -83,7 +83,7 @@ pub fn mode_from_words<const W: usize>(
     }
 }
 
-/// How long bounces last that are left out \[s\], and how the state changes, the mean of all where they differ.
+/// How long bounces last that are left out \[s\], and how the state changes, on the mean where they differ.
 type Flight<const W: usize> = (Digits<W>, MotionRates<Digits<W>>);
 
 /// What a motion between bounces that are left out has that one on the wall has not: normal forces of other
