@@ -219,7 +219,9 @@ impl<const W: usize> DigitsMotion<W> {
         };
         let LongState { t, u, rate, .. } = &mut self.state;
         keeper.project(&mechanism, *t, u, rate)?;
-        let rates = self.residuals_and_rates().into_iter().map(|[_, rate]| rate.abs()).enumerate();
+        // The rows of what sticks, which may slide now, come last.
+        let rows = mechanism.structure.constraints.len();
+        let rates = self.residuals_and_rates().into_iter().take(rows).map(|[_, rate]| rate.abs()).enumerate();
         let Some((worst, left)) = rates.max_by(|(_, a), (_, b)| a.log2().total_cmp(&b.log2())) else {
             return Ok(());
         };
