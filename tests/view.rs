@@ -269,3 +269,13 @@ fn pages_of_sweeps_without_numbers_have_no_colours_and_profiles_have_their_axis(
     let narrow = page("2 --vary bar1.phi=3.0..3.1:3", "b");
     assert!(narrow.contains(r#""log":false"#) && !narrow.contains(r#""log":true,"high_is_dark""#));
 }
+
+/// The horizon of `motor` lies between the first and the last rows that are kept one by one.
+#[test]
+fn the_path_shown_of_a_run_is_one_that_can_be_trusted_and_drawn() {
+    let program = Program::with_scenes(&["motor"]);
+    program.run("run motor.json -q --chart-format svg").exits(0);
+    let file = program.files().into_iter().find(|file| file.ends_with("mechanism.svg")).expect("a chart");
+    let chart = program.read(&file);
+    assert!(chart.contains("Path of the end of bar2") && chart.contains("s of 500 s, trusted"), "{chart}");
+}

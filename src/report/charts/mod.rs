@@ -238,6 +238,15 @@ impl Finished<'_> {
         let begin = last.first().map_or(0.0, |sample| sample.t);
         if let Some(horizon) = self.horizon(begin).0 {
             let trusted = self.before(horizon);
+            let near = self.last_stretch(trace.head.iter().filter(|sample| sample.t < horizon));
+            // Rows that are too far apart have no path, and those of the beginning may have one.
+            if is_coarse(&trusted, self.angle_count()) && !is_coarse(&near, self.angle_count()) {
+                let (span, end) = (rough(span(&near)), near.last().map_or(0.0, |last| last.t));
+                return (
+                    near,
+                    Some(format!("{span} s up to {} s of {} s, trusted", rough(end), figure(whole))),
+                );
+            }
             let span = rough(span(&trusted));
             return (
                 trusted,
