@@ -56,9 +56,9 @@ fn decimal(x: f64, digits: i32) -> String {
         return not_finite(x).into();
     }
     // By its size as it is shown: 999999.7 to six digits is 1e6.
-    let size = format!("{x:.0$e}", digits as usize - 1).parse().unwrap_or(x).abs();
+    let text = format!("{x:.0$e}", digits as usize - 1);
+    let size = text.parse().unwrap_or(x).abs();
     if !(1e-4..1e6).contains(&size) {
-        let text = format!("{x:.0$e}", digits as usize - 1);
         let Some((mantissa, exponent)) = text.split_once('e') else { return text };
         return format!("{}e{exponent}", without_zeros(mantissa));
     }

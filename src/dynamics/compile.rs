@@ -28,7 +28,7 @@ pub(super) use constants::dense_constants;
 pub use error::CompileError;
 pub(crate) use error::quoted;
 pub(super) use parts::along_wall;
-pub(super) use parts::travel_along;
+pub(crate) use parts::travel_along;
 use parts::{actions, follows, give_aims, given_angles, joints, kept_angles};
 use std::sync::Arc;
 pub(crate) use turns::WholeTurns;

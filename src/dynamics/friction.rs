@@ -315,8 +315,10 @@ pub(super) fn forces<T: Real>(
             }
             let (size, along) = size(normal, force);
             change[j] = coefficient * size - tau[j];
-            let parts = coefficient.value() * size.value();
-            goes_on |= change[j].value().abs() > UNSETTLED * (parts.abs() + tau[j].value().abs());
+            if round == ROUNDS {
+                let parts = (coefficient * size).value().abs() + tau[j].value().abs();
+                goes_on |= change[j].value().abs() > UNSETTLED * parts;
+            }
             for k in 0..f {
                 matrix[j * f + k] = -coefficient * along.dot(response(j, k));
             }
@@ -335,11 +337,11 @@ pub(super) fn forces<T: Real>(
                 break;
             }
         }
+        last = moved;
         let is_linear = || sliding.iter().all(|(normal, _)| matches!(normal, Normal::Contact(_)));
-        if round == ROUNDS && goes_on && regularity.abs() > JAMMED && !is_linear() {
+        if goes_on && regularity.abs() > JAMMED && !is_linear() {
             return NO_FORCES;
         }
-        last = moved;
     }
     regularity
 }

@@ -392,6 +392,12 @@ pub struct Motion {
 }
 
 impl Motion {
+    /// That of coordinates \[rad, m\] and rates \[rad/s, m/s\] in plain doubles at a time \[s\].
+    pub(crate) fn of_doubles(t: f64, numbers: [&[f64]; 2]) -> Self {
+        let [phi, omega] = numbers.map(|all| all.iter().copied().map(DoubleDouble::from).collect::<Vec<_>>());
+        Self { time: t.into(), turns: vec![0; phi.len()], phi, omega, ..Self::default() }
+    }
+
     /// Room for so many coordinates.
     pub fn resize(&mut self, coordinates: usize) {
         self.phi.resize(coordinates, DoubleDouble::ZERO);

@@ -112,7 +112,7 @@ impl FastMode {
                 estimate(self.decay)
             ));
         }
-        let swing = format!(
+        let oscillates = format!(
             "{name} oscillates at {rate} rad/s, {} periods until t = {} s",
             estimate(self.periods),
             plain(until)
@@ -120,12 +120,16 @@ impl FastMode {
         Some(match method {
             MethodId::Radau(_) if share > EXCITED => {
                 format!(
-                    "{swing}; {method} takes its energy away, {} of the scale, wherever its steps are \
+                    "{oscillates}; {method} takes its energy away, {} of the scale, wherever its steps are \
                         longer than a period",
                     order(share)
                 )
             }
-            _ => format!("{swing}, about {}; energy in it {} of the scale", steps(self.steps), order(share)),
+            _ => format!(
+                "{oscillates}, about {}; energy in it {} of the scale",
+                steps(self.steps),
+                order(share)
+            ),
         })
     }
 }

@@ -218,31 +218,55 @@ impl Kinematics {
         let fastest = |k: usize| all.iter().map(|one| one.position.omega[k].abs()).fold(0.0, f64::max);
         let most = shown.iter().map(|&k| fastest(k)).fold(0.0, f64::max);
         let moving: Vec<usize> = shown.into_iter().filter(|&k| fastest(k) > STILL * most).collect();
-        for [before, after] in all.windows(2).filter_map(|pair| <&[SolvedPosition; 2]>::try_from(pair).ok()) {
-            for &k in &moving {
-                let rates = [before, after].map(|one| one.position.omega[k]);
-                if (rates[0] * rates[1] < 0.0 || rates[1] == 0.0)
-                    && let Some(found) = walk.root([before, after], |walk| walk.omega(k))
-                {
-                    self.dead_centres.push(DeadCentre {
-                        drive: found.drive,
-                        name: self.name(k),
-                        value: found.phi[k],
-                        in_line: walk.in_line(IN_LINE),
-                    });
-                }
+        for k in moving {
+            let rates: Vec<f64> = all.iter().map(|one| one.position.omega[k]).collect();
+            let value = |_: &DriveWalk, found: &Position| found.phi[k];
+            self.turn_back(&self.name(k), (all, &rates), walk, (|walk: &DriveWalk| walk.omega(k), value));
+        }
+        for travel in SliderTravel::of(&self.scene, &self.mechanism) {
+            let rates = travel.rates(all, walk);
+            let fastest = rates.iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
+            if fastest <= STILL * most * self.mechanism.units.length {
+                continue;
             }
+            // At a position that is a dead centre the rate is zero to rounding, with either sign.
+            let plain = |rate: f64| if rate.abs() <= STILL * fastest { 0.0 } else { rate };
+            let rates: Vec<f64> = rates.into_iter().map(plain).collect();
+            let rate = |walk: &DriveWalk| plain(travel.rate(walk));
+            let value = |walk: &DriveWalk, _: &Position| travel.value(walk);
+            self.turn_back(&travel.name, (all, &rates), walk, (rate, value));
+        }
+        self.dead_centres.sort_by(|a, b| a.drive.total_cmp(&b.drive));
+        for [before, after] in all.windows(2).filter_map(|pair| <&[SolvedPosition; 2]>::try_from(pair).ok()) {
             if before.orientation.zip(after.orientation).is_some_and(|(before, after)| before * after < 0.0) {
                 let sign = |walk: &DriveWalk| walk.orientation().unwrap_or(0.0);
                 self.change_points.extend(walk.root([before, after], sign).map(|found| found.drive));
             }
         }
-        let is_moving = |fastest: f64| fastest > STILL * most * self.mechanism.units.length;
-        for travel in SliderTravel::of(&self.scene, &self.mechanism) {
-            self.dead_centres.extend(travel.dead_centres(all, walk, is_moving, IN_LINE));
-        }
-        self.dead_centres.sort_by(|a, b| a.drive.total_cmp(&b.drive));
         self.extremes(all, walk);
+    }
+
+    /// Finds where something turns back between positions, at which it has these rates, and at the last of
+    /// them, by its rate and its value.
+    fn turn_back(
+        &mut self,
+        name: &str,
+        (all, rates): (&[SolvedPosition], &[f64]),
+        walk: &mut DriveWalk,
+        (rate, value): (impl Fn(&DriveWalk) -> f64, impl Fn(&DriveWalk, &Position) -> f64),
+    ) {
+        for (pair, rates) in all.windows(2).zip(rates.windows(2)) {
+            if (rates[0] * rates[1] < 0.0 || rates[1] == 0.0)
+                && let Some(found) = walk.root([&pair[0], &pair[1]], &rate)
+            {
+                self.dead_centres.push(DeadCentre {
+                    drive: found.drive,
+                    name: name.to_owned(),
+                    value: value(walk, &found),
+                    in_line: walk.in_line(IN_LINE),
+                });
+            }
+        }
     }
 
     /// Looks for the extremes of all columns.

@@ -103,10 +103,7 @@ pub(super) fn travel<C: Real>(
 }
 
 /// The row of the travel of a slider without a law.
-pub(in crate::dynamics) fn travel_along<C: Real>(
-    forest: &Forest<C>,
-    slider: &Slider<C>,
-) -> ConstraintEquation<C> {
+pub(crate) fn travel_along<C: Real>(forest: &Forest<C>, slider: &Slider<C>) -> ConstraintEquation<C> {
     on_rail(forest, &slider.name, slider, rail(slider), None)
 }
 

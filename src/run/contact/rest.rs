@@ -60,14 +60,8 @@ pub(in crate::run) struct Flight {
     behind: Option<Vec<f64>>,
 }
 
-/// How a motion changes.
-fn rates(mechanism: &Mechanism, motion: &Motion) -> MotionRates<f64> {
-    let [phi, omega] = motion.rounded();
-    rates_at(mechanism, motion.time, &phi, &omega)
-}
-
-/// The same at a time, of coordinates and rates.
-fn rates_at(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> MotionRates<f64> {
+/// How a motion changes at a time, of coordinates and rates.
+fn motion_rates(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> MotionRates<f64> {
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
     let (power, _) = kernel.powers(mechanism, t, phi, omega);
@@ -108,7 +102,7 @@ impl Flight {
             let rates = bounced.mean(&omega);
             return Some(Self { contact, last: bounced.last, rates, behind: Some(bounced.behind) });
         }
-        let rates = rates(&held.moving(&others, &modes), motion);
+        let rates = motion_rates(&held.moving(&others, &modes), motion.time, &phi, &omega);
         let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
         let inward = inward(&rates.accelerations, wall, motion.time, at);
         let last = 2.0 * speed / (inward * (1.0 - wall.restitution));
@@ -121,13 +115,13 @@ impl Flight {
     /// How the mechanism moves that holds the point at once, halfway to the end of the bounces.
     fn beside(&self, held: &Mechanism, motion: &Motion, closed: &[f64]) -> MotionRates<f64> {
         let ([mut phi, mut omega], Self { last, rates, .. }) = (motion.rounded(), self);
-        let first = rates_at(held, motion.time, &phi, closed).accelerations;
+        let first = motion_rates(held, motion.time, &phi, closed).accelerations;
         for (k, (phi, omega)) in phi.iter_mut().zip(&mut omega).enumerate() {
             let end = *omega + rates.accelerations[k] * last;
             *phi += 0.5 * last * (end - 0.75 * last * first[k]);
             *omega = end - 0.5 * last * first[k];
         }
-        rates_at(held, motion.time + 0.5 * last, &phi, &omega)
+        motion_rates(held, motion.time + 0.5 * last, &phi, &omega)
     }
 }
 
@@ -174,7 +168,7 @@ impl Bouncing<f64> for FlyingPoint<'_> {
         modes: &[FrictionMode],
     ) -> Option<Course<f64>> {
         let (t, z) = (self.t + *late, self.held.elements(phi));
-        let rates = rates_at(&self.held.moving(self.others, modes), t, phi, omega);
+        let rates = motion_rates(&self.held.moving(self.others, modes), t, phi, omega);
         let accelerations = &rates.accelerations;
         let at = ConstraintArguments { phi, z: &z, omega };
         let inward = inward(accelerations, &self.held.contacts[self.contact], t, at);
@@ -223,7 +217,7 @@ pub(in crate::run) fn come_to_rest(
         return Some(());
     }
     let (mut turned, mut rates) = (vec![0.0; omega.len()], closed.clone());
-    let at_once = self::rates(held, motion);
+    let at_once = motion_rates(held, t, &phi, &omega);
     for flight in flights {
         let (last, flown) = (flight.last, &flight.rates);
         let beside = flight.behind.is_some().then(|| flight.beside(held, motion, &closed));
@@ -293,9 +287,8 @@ impl ContactDriver {
         if self.free.frictions.is_empty() || touching.iter().all(|contact| still.contains(contact)) {
             return None;
         }
-        let motion = self.motion();
         let PresentState { t, z, phi, omega } = self.present_state();
-        let rates = rates(&in_modes(&self.free, held, modes), &motion);
+        let rates = motion_rates(&in_modes(&self.free, held, modes), t, &phi, &omega);
         touching.iter().copied().find(|contact| {
             let wall = &self.free.contacts[*contact];
             let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };

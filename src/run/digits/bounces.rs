@@ -46,7 +46,7 @@ impl<'a, const W: usize> DigitsFlight<'a, W> {
     /// All coordinates at a moment.
     fn posture(&self, at: &FlightMoment<Digits<W>>) -> DigitsCoordinates<W> {
         let (phi, omega) = (at.phi.clone(), at.omega.clone());
-        DigitsCoordinates { phi, omega, ..self.motion.state_posture() }
+        DigitsCoordinates { phi, omega, work: [Digits::ZERO; 2], lost: Digits::ZERO }
     }
 
     /// What is known of a moment.

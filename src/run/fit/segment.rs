@@ -5,8 +5,7 @@ use super::super::build::build;
 use super::super::contact::ContactDriver;
 use super::super::running::Outcome;
 use super::super::sensitivity::{Derived, Look, Study, Variation, outputs};
-use crate::arithmetic::DoubleDouble;
-use crate::dynamics::{Motion, Time};
+use crate::dynamics::Motion;
 use crate::run::driver::Pause;
 use crate::stepping::{Cause, StepError};
 use nalgebra::DMatrix;
@@ -108,11 +107,7 @@ pub(super) fn pass(
     let mut plan = study.plan.clone();
     (plan.until, plan.every) = (until, until);
     let start = match from {
-        Some((t, [phi, omega], _)) => {
-            let all = |from: &[f64]| from.iter().map(|&x| DoubleDouble::from(x)).collect::<Vec<_>>();
-            let turns = vec![0; phi.len()];
-            Motion { time: Time::from(t), phi: all(phi), omega: all(omega), turns, ..Motion::default() }
-        }
+        Some((t, [phi, omega], _)) => Motion::of_doubles(t, [phi, omega]),
         None => study.start.clone(),
     };
     let drives = study.mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.drives());

@@ -171,12 +171,5 @@ pub(super) fn at_rest(phi: &[f64], t: f64) -> Motion {
 
 /// Coordinates and rates at a time.
 pub(super) fn moving([phi, omega]: &[Vec<f64>; 2], t: f64) -> Motion {
-    let of = |values: &[f64]| values.iter().map(|&value| Time::of(value)).collect();
-    Motion {
-        time: Time::of(t),
-        phi: of(phi),
-        omega: of(omega),
-        turns: vec![0; phi.len()],
-        ..Motion::default()
-    }
+    Motion::of_doubles(t, [phi, omega])
 }

@@ -13,7 +13,6 @@ use super::local::Local;
 use super::period::{check_period, common_period};
 use super::{DISTINCT, ModesError, Stability, moving};
 use crate::arithmetic::sum::larger;
-use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
 use crate::run::contact::ContactDriver;
@@ -219,9 +218,7 @@ fn course(
 ) -> Result<Vec<[Vec<f64>; 2]>, String> {
     let mut plan = plan.clone();
     let mut outcome = Outcome::begun(mechanism, plan.clone());
-    let [phi, omega] = begin.clone().map(|all| all.into_iter().map(DoubleDouble::of).collect::<Vec<_>>());
-    let turns = vec![0; phi.len()];
-    let start = Motion { phi, omega, turns, ..Motion::default() };
+    let start = Motion::of_doubles(0.0, begin.each_ref().map(Vec::as_slice));
     let driver = build(mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(mechanism), driver);
     driver.meet(&mut outcome).map_err(|stop| stop.what)?;

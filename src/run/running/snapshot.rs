@@ -8,7 +8,6 @@ use super::super::plan::{MORE_IS_ALLOWED, Plan};
 use super::super::sample::Sample;
 use super::super::trust::{ErrorEstimator, SavedEstimator};
 use super::{Outcome, Running};
-use crate::arithmetic::DoubleDouble;
 use crate::dynamics::{Mechanism, Motion};
 use crate::stepping::StepError;
 
@@ -48,14 +47,7 @@ pub enum ResumeError {
 
 /// The motion of a sample, as far as the sample has it; `None` before the first.
 pub(super) fn moment(sample: &Sample) -> Option<Motion> {
-    let doubled = |all: &[f64]| all.iter().copied().map(DoubleDouble::from).collect();
-    (!sample.phi.is_empty()).then(|| Motion {
-        time: sample.t.into(),
-        phi: doubled(&sample.phi),
-        turns: vec![0; sample.phi.len()],
-        omega: doubled(&sample.omega),
-        ..Motion::default()
-    })
+    (!sample.phi.is_empty()).then(|| Motion::of_doubles(sample.t, [&sample.phi, &sample.omega]))
 }
 
 impl Running {
