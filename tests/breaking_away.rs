@@ -140,6 +140,32 @@ fn what_breaks_away_without_an_acceleration_does_not_stick_again_at_once() {
     }
 }
 
+/// With equal coefficients the velocity of what breaks loose grows with the square of time: a coarse method has it
+/// against its sense at first, which is no return to rest.
+#[test]
+fn what_breaks_loose_with_nothing_to_spare_slides_by_coarse_methods_too() {
+    for (torque, rate, friction) in
+        [(4.947, 8.306, 0.116), (4.407, 3.726, 0.254), (4.722, 2.092, 0.149), (3.195, 4.11, 0.273)]
+    {
+        let text = format!(
+            r#"{{"name": "rocker", "gravity": [0, -9.81],
+            "bars": [{{"name": "a", "mass": 1, "centre": [0.3, 0.2], "inertia": 0.1, "length": 0.5}}],
+            "walls": [{{"name": "W", "body": "a", "point": [0, 0], "restitution": 0,
+                "line": {{"through": [0, 0], "normal": [0, 1]}}, "friction": {{"kinetic": {friction}}}}}],
+            "torsion_springs": [{{"name": "T", "body": "a", "stiffness": 400, "free_angle": 0, "damping": 0.2}}],
+            "torques": [{{"name": "Q", "body": "a", "torque": "{torque}*sin({rate}*t)"}}],
+            "start": {{"a": {{"phi": 0.02, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}}},
+            "until": 2, "every": 0.1}}"#
+        );
+        let [fine, coarse] = [(MethodId::Taylor, 1e-12), (MethodId::Radau(3), 1e-6)]
+            .map(|(method, tolerance)| done(&text, &adaptive(method, tolerance)));
+        let off = coarse.last.phi.iter().zip(&fine.last.phi).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(off < 2e-4, "{torque}: {off:e}");
+        let [count, usual] = [&coarse, &fine].map(|outcome| outcome.friction_count);
+        assert!(count <= 2 * usual + 4, "{torque}: {count} transitions for {usual}");
+    }
+}
+
 /// A slider-crank at its wall, with friction at the crank pin and on the rail.
 const CRANK: &str = r#"{"name": "crank", "gravity": [-0.95, -9.81],
         "bars": [{"name": "crank", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": 0.2},

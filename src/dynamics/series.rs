@@ -266,12 +266,18 @@ impl<T: SeriesNumber> Series<T> {
         u_rate: &[T],
     ) {
         self.law_series(terms, t);
-        T::begin(self, t, u, u_rest, u_rate);
-        T::orders(self, terms, 0);
-        if self.find_reversals(terms.structure.units.time) {
+        // A loop, and not the same twice: what is compiled here is large.
+        let mut has_reversals = false;
+        loop {
             T::begin(self, t, u, u_rest, u_rate);
             T::orders(self, terms, 0);
-            self.forget_reversals();
+            if has_reversals {
+                return self.forget_reversals();
+            }
+            has_reversals = self.find_reversals(terms.structure.units.time);
+            if !has_reversals {
+                return;
+            }
         }
     }
 

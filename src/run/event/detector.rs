@@ -73,6 +73,8 @@ pub(in crate::run) struct EventDetector {
     closers: Vec<(usize, Vec<String>)>,
     /// What the last coefficients of an interpolant may be over its largest value.
     pub(super) resolved: f64,
+    /// The relative tolerance of the method, zero where it has none.
+    pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
     pub(super) undefined: Option<usize>,
     /// Events since somebody last took them.
@@ -114,6 +116,7 @@ impl EventDetector {
             memory,
             closers,
             resolved,
+            tolerance: 0.0,
             undefined: None,
             found,
             count: 0,
@@ -185,7 +188,8 @@ impl EventDetector {
 
     /// Looks at the steps of a method of this relative tolerance from now on.
     pub fn suit(&mut self, tolerance: Option<f64>) {
-        self.resolved = RESOLVED.max(SHARE * tolerance.unwrap_or_default());
+        self.tolerance = tolerance.unwrap_or_default();
+        self.resolved = RESOLVED.max(SHARE * self.tolerance);
     }
 
     /// Goes on with the places with friction in the modes of a mechanism.

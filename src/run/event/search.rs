@@ -31,6 +31,8 @@ pub(super) const NO_VALUE: f64 = 1e-12;
 /// while.
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
+/// How many times later it is looked again where that may take the whole step.
+const LATER: f64 = 1.25;
 /// Share of a step after which a function has left a corner that began it, and share of its largest value
 /// there that tells a side.
 const AFTER: f64 = 1e-6;
@@ -71,15 +73,23 @@ impl StepPart<'_> {
     }
 }
 
+/// Shares of a step at which it is looked whether a curve has left its zero, closer at the beginning.
+fn ahead() -> impl Iterator<Item = f64> {
+    std::iter::successors(Some(0.0), |&step| Some(if step == 0.0 { SAME } else { 4.0 * step }))
+}
+
 /// Where a curve has left what it may be `off` by about its zero, from `share` on; `None` where that is not
 /// soon.
 fn clear(curve: &Chebyshev, share: f64, off: f64) -> Option<f64> {
     let is_clear = |at: &f64| *at >= 1.0 || curve.at(*at)[0].abs() > CLEAR * off;
-    let mut ahead =
-        std::iter::successors(Some(0.0), |&step| Some(if step == 0.0 { SAME } else { 4.0 * step }))
-            .take_while(|&step| step < SOON)
-            .map(|step| share + step);
-    ahead.find(is_clear)
+    ahead().take_while(|&step| step < SOON).map(|step| share + step).find(is_clear)
+}
+
+/// Where in a step a curve is beyond a magnitude first.
+fn beyond(curve: &Chebyshev, least: f64) -> Option<f64> {
+    let late = std::iter::successors(Some(SOON), |&share| Some(LATER * share));
+    let shares = ahead().take_while(|&share| share < SOON).chain(late.take_while(|&share| share < 1.0));
+    shares.chain([1.0]).find(|&share| curve.at(share)[0].abs() > least)
 }
 
 /// Where a curve that begins near zero has left it: it may be back before the next node.
@@ -152,14 +162,20 @@ impl EventDetector {
         // impact may have carried it across.
         let other = if mode { -1 } else { 1 };
         let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
-        let left = is_there.then(|| left(curve, first, self.resolved)).flatten();
-        // What slides from rest and has not left it here may begin against its sense, by rounding.
+        let mut left = is_there.then(|| left(curve, first, self.resolved)).flatten();
+        // What slides from rest may begin against its sense, by what the method leaves open: with equal
+        // coefficients its velocity grows with the square of time.
         if let Owner::Friction(watch, function) = self.owner(event)
             && is_there
-            && left.is_none()
-            && most <= watch.at_rest(function)
+            && let off = watch.at_rest(function, self.tolerance)
+            && off > 0.0
+            && first.abs() <= CLEAR * off
         {
-            return;
+            let least = CLEAR * off.max(first.abs()).max(self.resolved.max(NO_VALUE) * most);
+            left = beyond(curve, least);
+            if left.is_none() {
+                return;
+            }
         }
         if is_there && sign(left.map_or(next, |share| curve.at(share)[0])) == other {
             all.push(Passage { t: part.begin, event, rises: !mode, jumps: false });
