@@ -536,6 +536,42 @@ fn numbers_of_which_only_the_sum_is_told_are_named_together() {
     );
 }
 
+/// Friction by a radius times a coefficient, beside a column that stays as it is and is known to the last digit: its
+/// derivatives are rounding, and tell nothing.
+#[test]
+fn a_column_that_stays_as_it_is_tells_nothing() {
+    let bar = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}"#)
+    };
+    let text = format!(
+        r#"{{"name": "two", "gravity": [0, -9.81], "bars": [{}, {}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}],
+                "friction": {{"radius": 0.05, "kinetic": 0.3}}}},
+            {{"name": "B", "between": [{{"body": "ground", "point": [3, 0]}}, {{"body": "c", "point": [0, 0]}}]}}],
+        "locks": [{{"name": "l", "body": "c"}}],
+        "start": {{"b": {{"phi": -0.5, "omega": 0.3}}, "c": {{"phi": 0.3, "omega": 0}}}}, "until": 3, "every": 0.05}}"#,
+        bar("b"),
+        bar("c"),
+    );
+    let template = |set: &[&str]| {
+        let set: Vec<_> = set.iter().map(|set| set.parse().expect("an override")).collect();
+        Template::new(text.clone(), "two.json".into(), &set)
+    };
+    let scene = template(&[]).scene().expect("a scene");
+    let mut rows = String::from("t [s],b.phi [rad],c.x [m]\n");
+    let outcome = Simulation::new(&scene).expect("a simulation").run_with(|sample| {
+        writeln!(rows, "{:?},{:?},{:?}", sample.t, sample.phi[0], sample.centre[1][0]).expect("a string");
+        Ok(())
+    });
+    outcome.expect("a run");
+    let data = Data::parse(&rows, "data.csv").expect("a table");
+    let off = ["hinges.A.friction.radius=0.0507", "hinges.A.friction.kinetic=0.296"];
+    let vary = ["hinges.A.friction.radius", "hinges.A.friction.kinetic"].map(str::to_owned).to_vec();
+    let request = FitRequest { vary, ..FitRequest::default() };
+    let error = fit(&template(&off), &data, &request, &mut || false).map(|_| ()).expect_err("no fit");
+    assert!(error.to_string().contains("do not tell"), "{error}");
+}
+
 /// An angle that stays where no motion from the start is: ever stiffer springs and dampers fit it better.
 #[test]
 fn a_search_that_runs_away_says_where_to() {

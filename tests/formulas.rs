@@ -1,7 +1,7 @@
 //! Scenes with formulas: against closed forms and against the scene's own parts.
 
 use driftless::Level;
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, integrate};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, integrate, simulate};
 use driftless::scene::formula::Formula;
 use driftless::scene::{Scene, parse_scene, read_scene};
 use driftless::{Mechanism, Simulation};
@@ -475,6 +475,29 @@ fn steps_beside_a_wall_do_not_depend_on_the_size_of_an_integral() {
     let [small, large] = ["0.01", "1e5"].map(steps);
     println!("{small} and {large} steps");
     assert!(large < 3 * small, "{small} and {large} steps");
+}
+
+/// What carries an integral has no energy of its own to speak of, however large the integral is.
+#[test]
+fn an_integral_is_no_energy() {
+    let text = r#"{"name": "bar", "gravity": [0, -9.81], "integrals": {"I": "1e6*b.sin"},
+        "bars": [{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "start": {"b": {"phi": 0.5, "omega": 0}}, "until": 2, "every": 0.25}"#;
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Gauss(8)] {
+        let request = Request { method: Some(method), ..Request::default() };
+        let outcome = simulate(&scene(text), &request, &mut |sample| {
+            let expected = 0.5 * (0.1 + 0.25) * sample.omega[0].powi(2);
+            assert!(
+                (sample.kinetic - expected).abs() < 1e-14 * (1.0 + expected),
+                "{method}: {}",
+                sample.kinetic
+            );
+            assert!(sample.work.abs() < 1e-14, "{method}: {}", sample.work);
+            Ok(())
+        });
+        assert!(outcome.expect("a run").stop.is_none(), "{method}");
+    }
 }
 
 #[test]

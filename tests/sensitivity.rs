@@ -543,6 +543,32 @@ fn spectra_add_up_to_what_the_dissipation_says() {
     assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
 }
 
+/// A force that jumps where a rate passes a value spreads or draws together what comes there.
+#[test]
+fn spectra_add_up_where_forces_jump_with_rates() {
+    for more in [
+        r#""torques": [{"name": "q", "body": "b", "torque": "0.8*if(b.omega > 1, 1, -0.5)"}]"#,
+        r#""torques": [{"name": "q", "body": "b", "torque": 0.8}],
+            "events": [{"name": "e", "when": "b.omega - 1", "off": ["q"]}]"#,
+    ] {
+        let text = format!(
+            r#"{{"name": "jump", "gravity": [0, -9.81], {more},
+            "bars": [{{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "start": {{"b": {{"phi": -0.5, "omega": 0.3}}}}, "until": 6, "every": 6}}"#
+        );
+        let found = lyapunov(&Template::new(text, "jump".into(), &[]), None, None, &mut || false);
+        let found = found.expect("a spectrum");
+        assert!(
+            found.sum.abs() > 1e-3 && found.defect() < 1e-8,
+            "{} {} {:?}",
+            found.sum,
+            found.expected_sum,
+            found.lost
+        );
+    }
+}
+
 /// Neither a point that comes to rest on its wall nor a joint that opens leaves the directions there were.
 #[test]
 fn a_spectrum_ends_where_directions_come_or_go() {

@@ -11,7 +11,7 @@ use super::kernel::{Kernel, dot};
 use super::{Mechanism, Motion, Time, tree};
 use crate::arithmetic::lanes::{self, Code, Lanes};
 use crate::arithmetic::{Complex, DoubleDouble, Dual, Real, Scalar};
-use crate::scene::Scene;
+use crate::scene::{Integral, Scene};
 
 /// Share of the energy that gravity on free bodies and applied forces can bring below which what is there at
 /// the start does not count.
@@ -80,6 +80,13 @@ impl Mechanism {
             }
         }
         Ok(())
+    }
+
+    /// Kinetic energy of the rotors that carry integrals \[J\], and the work of their torques: no energy of the
+    /// scene.
+    pub fn energy_of_integrals<T: Real>(&self, omega: &[T]) -> T {
+        let half = T::of(0.5 * Integral::INERTIA);
+        self.integrals().fold(T::ZERO, |sum, (_, rotor)| sum + half * omega[rotor] * omega[rotor])
     }
 
     /// The scene's start as a motion: found from the rows where a part of it can be, else as given.

@@ -198,9 +198,10 @@ impl Sampler {
         sample.singular = if is_watched { self.holding.conditioning(&self.plain) } else { f64::NAN };
         sample.weakest = self.plain.weakest.row;
         sample.t = motion.time.hi;
-        sample.kinetic = kinetic.hi;
+        let of_integrals = mechanism.energy_of_integrals(&motion.omega);
+        sample.kinetic = (kinetic - of_integrals).hi;
         sample.potential = potential.hi;
-        sample.work = motion.work.hi;
+        sample.work = (motion.work - of_integrals).hi;
         sample.stabilizer = motion.stabilizer;
         sample.friction = motion.friction;
         sample.imbalance = (balance - reference).hi / mechanism.energy_scale;

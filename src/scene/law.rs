@@ -58,7 +58,7 @@ pub struct Integral {
 
 impl Integral {
     /// Mass and moment of inertia of the rotor, a power of two so small that its energy counts nothing
-    /// \[kg, kg·m²\].
+    /// \[kg, kg·m²\]; what is told of energy and work leaves it out.
     pub const INERTIA: f64 = 1.0 / (1_u64 << 60) as f64;
     /// The same in formulas, exactly.
     pub(super) const INERTIA_AS_FORMULA: &str = "2^(-60)";

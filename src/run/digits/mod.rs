@@ -257,7 +257,8 @@ impl<const W: usize> Runner<W> {
             [posture.phi[k], posture.omega[k], at.re, at.im, rate.re, rate.im].map(Digits::resized)
         };
         let bodies = centres.into_iter().enumerate().map(body).collect();
-        let energy = [kinetic, potential, posture.work[0]].map(Digits::resized);
+        let of_integrals = mechanism.structure.energy_of_integrals(&posture.omega);
+        let energy = [kinetic - of_integrals, potential, posture.work[0] - of_integrals].map(Digits::resized);
         let left = self.motion.keeper.left(mechanism, t, &posture.phi, &posture.omega);
         let residual = [0, 1].map(|level| left.iter().fold(0.0, |most, left| larger(left[level], most)));
         let residuals = left.into_iter().take(mechanism.structure.standing_rows()).collect();

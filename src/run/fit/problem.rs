@@ -71,8 +71,8 @@ pub(super) struct FitProblem<'a> {
     pub(super) is_long: bool,
     /// The numbers as guessed, over their scale.
     guess: Vec<f64>,
-    measured: Vec<Vec<Option<f64>>>,
-    sigma: Vec<f64>,
+    pub(super) measured: Vec<Vec<Option<f64>>>,
+    pub(super) sigma: Vec<f64>,
     pub(super) weight: f64,
     pub(super) x: DVector<f64>,
     /// True where the search was refused a step, and where a run at it would take too many steps.
@@ -344,7 +344,8 @@ impl<'a> FitProblem<'a> {
             before = Some((passed, first));
             first += 2 * f;
         }
-        let jacobian = DMatrix::from_fn(lines.len(), self.x.len(), |i, j| lines[i][j]);
+        let mut jacobian = DMatrix::from_fn(lines.len(), self.x.len(), |i, j| lines[i][j]);
+        self.leave_out_rounding(&mut jacobian, &owners);
         let residuals = DVector::from_vec(residuals);
         match residuals.iter().chain(jacobian.iter()).all(|x| x.is_finite()) {
             true => Ok(Evaluated { residuals, jacobian, owners, model, gap }),

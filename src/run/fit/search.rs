@@ -18,6 +18,8 @@ const FARTHER: f64 = 10.0;
 const LONG: usize = 8;
 /// What a change of a number by its own size does to the columns, over the data, below which it does nothing.
 const NOTHING: f64 = 1e-11;
+/// The same of one column, over its largest value: the rounding of its derivatives.
+const ROUNDING: f64 = 1e-13;
 /// Share of a number, over the largest one, in a change of several that does nothing, from which it is named.
 const PARTNER: f64 = 0.01;
 
@@ -65,6 +67,27 @@ impl FitProblem<'_> {
         problem.found.as_ref().map_err(Clone::clone)?;
         problem.rebase()?;
         Ok((problem, ended))
+    }
+
+    /// Takes what is rounding of a column's derivatives by the numbers for zero: of a column that stays as it is,
+    /// and is as exact, that would count as much as the others.
+    pub(super) fn leave_out_rounding(&self, jacobian: &mut DMatrix<f64>, owners: &[Option<usize>]) {
+        let largest =
+            |column: &[Option<f64>]| column.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let least: Vec<f64> = self
+            .measured
+            .iter()
+            .zip(&self.sigma)
+            .map(|(own, sigma)| ROUNDING * largest(own) / sigma)
+            .collect();
+        for (mut row, owner) in jacobian.row_iter_mut().zip(owners) {
+            let Some(column) = *owner else { continue };
+            for entry in
+                row.iter_mut().take(self.variables.len()).filter(|entry| entry.abs() <= least[column])
+            {
+                *entry = 0.0;
+            }
+        }
     }
 
     /// Refuses a number that does nothing to the columns: no step of it is too large for the search.

@@ -3,10 +3,10 @@
 
 use super::neighbours::Neighbours;
 use super::variation::{CrossingTime, Variation};
-use crate::dynamics::Mechanism;
+use crate::dynamics::{Mechanism, Motion};
 use crate::run::contact::Jump;
 use crate::run::event::SwitchFunction;
-use crate::run::saltation::{Crossed, Delta, Discontinuity, Levels, cross, engage};
+use crate::run::saltation::{Crossed, Delta, Discontinuity, Levels, Side, cross, engage, event_value};
 use std::sync::Arc;
 
 /// Parameters that events set, in which the columns may differ.
@@ -65,6 +65,7 @@ impl Variation {
         if let Some(dissipation) = &mut self.dissipation {
             let restitutions = passed.walls.iter().map(|(wall, _)| before.contacts[*wall].restitution);
             dissipation.total += restitutions.map(|e| 2.0 * libm::log(e)).sum::<f64>();
+            dissipation.total += expansion(&before, jumps);
         }
         let t = last.before.time.hi;
         if jumps[0].before.omega != last.after.omega && !passed.late.is_empty() {
@@ -132,6 +133,29 @@ impl Variation {
             neighbours.follow(mechanism, &self.off, &known)?;
         }
         Ok(())
+    }
+}
+
+/// ln of the volume of small differences after a switch over that before: that of the rates of the function at
+/// whose zero forces change, which differ where it speaks of rates.
+///
+/// The saltation matrix is 1 + (f⁺ - f⁻) ∇gᵀ/g'⁻, whose determinant is g'⁺/g'⁻.
+fn expansion(before: &Arc<Mechanism>, jumps: &[Jump]) -> f64 {
+    let (Some(jump), Some(last)) = (jumps.iter().find(|jump| jump.switch.is_some()), jumps.last()) else {
+        return 0.0;
+    };
+    let Some(switch) = jump.switch.as_ref().filter(|_| jump.before.omega == last.after.omega) else {
+        return 0.0;
+    };
+    let rate = |side: Side| {
+        let value = &mut |motion: &Motion| Some(vec![event_value(before, switch.at, motion)?]);
+        side.slope(&side.ahead(), 1.0, f64::INFINITY, value).map(|rate| rate[0])
+    };
+    let [earlier, later] =
+        [Side::new(before, &jump.before), Side::new(&last.mechanism, &last.after)].map(rate);
+    match (earlier, later) {
+        (Some(earlier), Some(later)) => libm::log((later / earlier).abs()),
+        _ => 0.0,
     }
 }
 
