@@ -110,6 +110,29 @@ fn limits_and_dead_centres_are_where_the_law_of_cosines_has_them() {
     assert!((range.min[0] - least).abs() < 1e-12 && (range.max[0] - FRAC_PI_2).abs() < 1e-6, "{range:?}");
 }
 
+/// The rocker as the drive from beside its limit, where the crank is fast: it stays on its side of the dead centre.
+#[test]
+fn no_branch_is_left_for_another_beside_a_limit() {
+    let text = std::fs::read_to_string("examples/scenes/crank_rocker.json").expect("a shipped scene");
+    let dead = ((D * D + (A + B) * (A + B) - C * C) / (2.0 * D * (A + B))).acos();
+    for beside in [0.01, 0.003, 0.001, -0.003, -0.01] {
+        let crank = dead + beside;
+        let [coupler, rocker] = closed(crank);
+        let text = text
+            .replace("\"speed*t\"", &format!("\"{crank:?} + speed*t\""))
+            .replace("0.9}", &format!("{coupler:?}}}, \"rocker\": {{\"phi\": {rocker:?}}}"));
+        let scene = parse_scene(&text, "beside", &[]).expect("a scene");
+        for count in 2..60 {
+            let found = over(&scene, &format!("rocker={rocker:?}..{:?}", rocker + 0.6), count);
+            for Position { drive, phi, .. } in &found.positions {
+                let turned = (phi[0] - dead) * beside.signum();
+                assert!(turned > 0.0 && turned < PI, "{beside} {count}: crank {} at {drive}", phi[0]);
+                assert!((closed(phi[0])[1] - drive).abs() < 1e-9, "{beside} {count}: {drive}");
+            }
+        }
+    }
+}
+
 #[test]
 fn extremes_are_the_same_wherever_a_turn_begins_and_however_many_positions_it_has() {
     let mut scene = example("crank_rocker");

@@ -170,6 +170,11 @@ impl DriveWalk {
         (0..self.alpha.len()).map(|k| (self.omega(k) / self.size(k)).abs()).fold(0.0, f64::max)
     }
 
+    fn fastest_coordinate(&self) -> Option<usize> {
+        let pace = |k: &usize| (self.omega(*k) / self.size(*k)).abs();
+        (0..self.alpha.len()).max_by(|a, b| pace(a).total_cmp(&pace(b)))
+    }
+
     fn size(&self, k: usize) -> f64 {
         if k < self.mechanism.bodies.len() { 1.0 } else { self.mechanism.units.length }
     }
@@ -196,6 +201,11 @@ impl DriveWalk {
     /// certain.
     fn step(&mut self, t: f64) -> bool {
         let (n, h) = (self.alpha.len(), t - self.state.time.hi);
+        // A parabola that turns back within the step: eight times as far from a fold as this is, it would come
+        // to the other branch.
+        if self.fastest_coordinate().is_some_and(|k| (0.5 * h * self.alpha[k]).abs() > self.omega(k).abs()) {
+            return false;
+        }
         self.before.clone_from(&self.state);
         self.state.time = Time::of(t);
         for k in 0..n {
@@ -258,8 +268,7 @@ impl DriveWalk {
         if (0..self.mechanism.constraints.len()).any(|r| self.kernel.is_left_out(r)) {
             return None;
         }
-        let pace = |k: &usize| (self.omega(*k) / self.size(*k)).abs();
-        let k = (0..self.alpha.len()).max_by(|a, b| pace(a).total_cmp(&pace(b)))?;
+        let k = self.fastest_coordinate()?;
         let away = 0.5 * self.omega(k) / self.alpha[k];
         away.is_finite().then_some([away, self.state.time.hi + away])
     }
