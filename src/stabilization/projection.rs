@@ -12,13 +12,17 @@
 
 mod natural;
 mod rates;
+mod sizes;
 
 use self::natural::NaturalProjection;
 use self::rates::project_rates;
+use self::sizes::is_position_kept;
+pub(crate) use self::sizes::unit;
+pub(super) use self::sizes::{is_kept, size};
 use crate::arithmetic::Complex;
 use crate::arithmetic::sum::{larger, two_sum};
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::schur::{DROPPED, NEAR};
+use crate::dynamics::schur::NEAR;
 use crate::dynamics::{Form, Mechanism, OdeSystem, State, Time, tree};
 use crate::stepping::{Cause, Integrator, Statistics, StepError};
 
@@ -32,7 +36,7 @@ pub struct Projected<M> {
     balance: Option<f64>,
     near: bool,
     /// Largest violation left that counts as converged, at both levels, in the units of the mechanism,
-    /// relative to levers and speeds where these are larger.
+    /// relative to levers and speeds where these are larger; no less than the rounding of angles and places.
     pub tolerance: f64,
 }
 
@@ -196,8 +200,6 @@ fn past_singular(method: &str) -> &'static str {
 
 /// Turns up to this \[rad\] need no new sines, and no new factors of M and S, which change by as little.
 const SMALL: f64 = 1e-8;
-/// Violation, relative to levers and speeds, that a row left out may have.
-const LEFT_OUT: f64 = 1e-6;
 /// Changes up to this, relative to the rates where they are above one, are rounding: what is known of the
 /// rates at the state stays true.
 const ROUNDING: f64 = 1e-14;
@@ -336,7 +338,7 @@ fn project_sized<const N: usize>(
             kernel.linearise_at::<N>(mechanism, state.time, phi, omega);
         }
     }
-    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
+    is_position_kept(mechanism, kernel, state, tolerance)?;
     if let Some(change) = project_rates::<N>(mechanism, kernel, state, tolerance)? {
         (moved, far) = (true, larger(far, change));
     }
@@ -349,16 +351,6 @@ fn project_sized<const N: usize>(
         state.y[2 * n + 1] += energy_change;
     }
     Ok(Corrected { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.is_near })
-}
-
-/// The unit of coordinate `k` \[rad, m\].
-pub(super) fn size(mechanism: &Mechanism, k: usize) -> f64 {
-    if k < mechanism.bodies.len() { 1.0 } else { mechanism.units.length }
-}
-
-/// The unit of row `r` \[rad, m\].
-pub(crate) fn unit(mechanism: &Mechanism, r: usize) -> f64 {
-    if mechanism.constraints[r].is_angle() { 1.0 } else { mechanism.units.length }
 }
 
 /// Adds M⁻¹ Gᵀ times what is in `multiplier`, with a sign, to the unknowns `from`…, and leaves it in `load`;
@@ -378,53 +370,4 @@ pub(super) fn shift(
         largest_change = larger(largest_change, change.abs() / size(mechanism, k));
     }
     largest_change
-}
-
-/// The longest lever of row `r`, or its unit.
-fn lever(mechanism: &Mechanism, kernel: &Kernel<f64>, r: usize) -> f64 {
-    kernel.fold_gradient(r, unit(mechanism, r), |most: f64, k, g| most.max(g.abs() * size(mechanism, k)))
-}
-
-/// The largest part of the rate of row `r`, or its unit over that of time: a row's rate is a sum of G_k w_k,
-/// and no smaller than their rounding.
-fn step_size(mechanism: &Mechanism, kernel: &Kernel<f64>, omega: &[f64], r: usize) -> f64 {
-    let least = kernel.rows[r].drive.abs().max(unit(mechanism, r) / mechanism.units.time);
-    kernel.fold_gradient(r, least, |most, k, g| most.max((g * omega[k]).abs()))
-}
-
-/// Every row must be kept at both levels, as [`Kernel::linearise`] found them.
-///
-/// # Errors
-/// Name of the first row that is not, and its violation.
-pub(super) fn is_kept(
-    mechanism: &Mechanism,
-    kernel: &Kernel<f64>,
-    omega: &[f64],
-    tolerance: f64,
-) -> Result<(), (String, f64)> {
-    check(mechanism, kernel, tolerance, |r| (kernel.rows[r].position, lever(mechanism, kernel, r)))?;
-    check(mechanism, kernel, tolerance, |r| {
-        (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r))
-    })
-}
-
-/// The worst row must be below tolerance, each measured against its own size.  Near a singular position
-/// rounding grows with the inverse of the distance, of which the share of the weakest row is about the
-/// square; rows left out there are not projected, and come back once it is past.
-fn check(
-    mechanism: &Mechanism,
-    kernel: &Kernel<f64>,
-    tolerance: f64,
-    violation: impl Fn(usize) -> (f64, f64),
-) -> Result<(), (String, f64)> {
-    let near = kernel.weakest.share.clamp(DROPPED, 1.0);
-    for (r, row) in mechanism.constraints.iter().enumerate() {
-        let tolerance = if kernel.is_left_out(r) { tolerance.max(LEFT_OUT) } else { tolerance / near.sqrt() };
-        let (violation, size) = violation(r);
-        let small = violation.abs() <= tolerance * size;
-        if !small {
-            return Err((row.name().into(), violation.abs()));
-        }
-    }
-    Ok(())
 }

@@ -215,7 +215,7 @@ fn land(
         }
         last = worst;
     }
-    is_kept(mechanism, kernel, &landed.y[n..2 * n], TOLERANCE)
+    is_kept(mechanism, kernel, landed, TOLERANCE)
 }
 
 impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {

@@ -150,6 +150,13 @@ impl Aim {
         })
     }
 
+    /// Σ |f_k q_k|: what its value is rounded by at large angles and far places, over the rounding of one.
+    pub fn terms(&self, t: Time, at: ConstraintArguments<f64>) -> f64 {
+        self.results(t, at, |slots| {
+            self.slopes.iter().map(|&(k, slope)| (slots[slope as usize] * at.phi[k]).abs()).sum()
+        })
+    }
+
     /// Its explicit rate f_t.
     pub fn drive(&self, t: Time, at: ConstraintArguments<f64>) -> f64 {
         self.results(t, at, |slots| slots[self.drive as usize])

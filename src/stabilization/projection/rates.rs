@@ -1,6 +1,7 @@
 //! The velocity level of a projection.
 
-use super::{check, shift, size, step_size};
+use super::shift;
+use super::sizes::{is_rate_kept, size, step_size};
 use crate::arithmetic::sum::larger;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::schur::DROPPED;
@@ -46,10 +47,7 @@ pub(super) fn project_rates<const N: usize>(
         changed = Some(larger(changed.unwrap_or(0.0), change / most));
     }
     if changed.is_some() {
-        let omega = &state.y[n..2 * n];
-        check(mechanism, kernel, tolerance, |r| {
-            (kernel.row_rate(r, omega), step_size(mechanism, kernel, omega, r))
-        })?;
+        is_rate_kept(mechanism, kernel, state, tolerance)?;
     }
     Ok(changed)
 }

@@ -46,9 +46,16 @@ fn longest_lever(row: &ConstraintEquation, unit: f64) -> f64 {
     all.map(|(unit, g)| unit * libm::hypot(g.re, g.im)).fold(least, f64::max)
 }
 
-/// The coordinates whose magnitudes a row's rounding grows with.
-pub(super) fn growing(row: &ConstraintEquation) -> Vec<usize> {
-    let RowMeasure::Place(place) = &row.measure else { return Vec::new() };
+/// The angles of which aims of these rows count the turns.
+pub(super) fn counted(rows: &[&ConstraintEquation]) -> Vec<usize> {
+    rows.iter().flat_map(|row| row.aim.iter()).flat_map(|aim| aim.counted_angles()).collect()
+}
+
+/// The coordinates whose magnitudes a row's rounding grows with, where turns of these angles are counted.
+pub(super) fn growing(row: &ConstraintEquation, counted: &[usize]) -> Vec<usize> {
+    let RowMeasure::Place(place) = &row.measure else {
+        return row.coordinates().into_iter().filter(|k| counted.contains(k)).collect();
+    };
     let angles = row.aim.iter().flat_map(|aim| aim.counted_angles());
     let mut growing: Vec<usize> =
         row.coordinates().into_iter().filter(|&k| k >= place.angles).chain(angles).collect();
