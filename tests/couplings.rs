@@ -169,6 +169,89 @@ fn rails_are_kept_to_the_rounding_of_places_far_away() {
     }
 }
 
+/// Two bodies on pins; of the second, the wheel, these motors are.
+fn worm(motors: &str, until: f64) -> Scene {
+    scene(&format!(
+        r#"{{"name": "worm", "gravity": [0, 0],
+        "bars": [{{"name": "arm", "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+            {{"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1}}],
+        "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "arm", "point": [0, 0]}}]}},
+            {{"name": "W", "between": [{{"body": "ground", "point": [0, -1]}}, {{"body": "wheel", "point": [0, 0]}}]}}],
+        "motors": [{motors}], "start": {{"arm": {{"phi": 0}}}}, "until": {until}, "every": {until}}}"#
+    ))
+}
+
+#[test]
+fn constraints_of_small_ratios_are_independent() {
+    // The wheel turns by 0.001 t²/2, the arm 10000 times as far, whatever way the gear is written.
+    for law in [
+        r#""body": "wheel", "law": "0.0001*arm.phi""#,
+        r#""body": "arm", "law": "10000*wheel.phi""#,
+        r#""body": "wheel", "law": "1e-6*arm.phi + 0.0099*sin(0.01*arm.phi)""#,
+    ] {
+        let motors = format!(
+            r#"{{"name": "m0", "body": "wheel", "law": {{"start": 0, "rate": 0, "acceleration": 0.001}}}},
+            {{"name": "m1", {law}}}"#
+        );
+        // The last: wheel = 0.0001 arm to the third power of the arm's angle.
+        let (until, most) = if law.contains("sin") { (0.05, 1e-6) } else { (0.25, 1e-8) };
+        for request in methods() {
+            let outcome = finished(&worm(&motors, until), &request);
+            let phi = 5.0 * until * until;
+            assert!((outcome.last.phi[0] - phi).abs() < most, "{law}: {:?}", outcome.last.phi);
+            assert!((outcome.last.omega[0] - 10.0 * until).abs() < 1e-6, "{law}: {:?}", outcome.last.omega);
+        }
+    }
+}
+
+#[test]
+fn a_block_far_out_on_an_arm_that_a_gear_turns_keeps_its_rail() {
+    // omega = 5 by a gear of ratio 0.001, r = 0.5 cosh 5 t: 180 m on an arm of 1 m.
+    let text = r#"{"name": "centrifuge", "gravity": [0, 0],
+        "bars": [{"name": "arm", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1},
+            {"name": "block", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2},
+            {"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "arm", "point": [0, 0]}]},
+            {"name": "W", "between": [{"body": "ground", "point": [0, -1]}, {"body": "wheel", "point": [0, 0]}]}],
+        "sliders": [{"name": "s", "point": {"body": "block", "point": [0, 0]},
+            "rail": {"body": "arm", "point": [0, 0], "direction": [1, 0]}, "angle": "locked"}],
+        "motors": [{"name": "m0", "body": "wheel", "law": {"start": 0, "rate": 0.005}},
+            {"name": "m1", "body": "wheel", "law": "0.001*block.phi"}],
+        "start": {"arm": {"phi": 0, "omega": 5}, "block": {"phi": 0, "omega": 5, "origin": [0.5, 0], "velocity": [0, 2.5]}},
+        "until": 1.2, "every": 1.2}"#;
+    let r = 0.5 * 6f64.cosh();
+    for request in methods() {
+        let outcome = run(&scene(text), &request);
+        assert!(outcome.stop.is_none(), "{:?}: {:?}", request.method, outcome.stop);
+        let [x, y] = outcome.last.centre[1];
+        let (sin, cos) = 6f64.sin_cos();
+        assert!((x / r - cos).abs() + (y / r - sin).abs() < 1e-6, "{:?}: {x} {y}", request.method);
+        assert!((outcome.last.omega[0] - 5.0).abs() < 1e-6, "{:?}: {:?}", request.method, outcome.last.omega);
+    }
+}
+
+#[test]
+fn screws_of_fine_pitch_start_with_the_rates_of_their_tables() {
+    // The table runs at 0.03 cos 3 t, the screw 2 pi / 0.05 mm as fast.
+    let text = r#"{"name": "screw", "gravity": [0, 0],
+        "bars": [{"name": "table", "mass": 2, "centre": [0, 0], "inertia": 0.01, "length": 0.2},
+            {"name": "screw", "mass": 0.1, "centre": [0, 0], "inertia": 1e-6, "length": 0.02}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0.1]}, {"body": "screw", "point": [0, 0]}]}],
+        "sliders": [{"name": "rail", "point": {"body": "table", "point": [0, 0]},
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "angle": "locked"}],
+        "points": [{"name": "p", "body": "table", "point": [0, 0]}],
+        "motors": [{"name": "drive", "slider": "rail", "law": {"start": 0, "rate": 0, "sines": [{"amplitude": 0.01, "frequency": 3}]}},
+            {"name": "nut", "body": "screw", "law": "2*pi*p.x/(0.05 mm)"}],
+        "start": {"table": {"phi": 0}, "screw": {"phi": 0}}, "until": 0.4, "every": 0.4}"#;
+    let per = std::f64::consts::TAU / 5e-5;
+    for request in methods() {
+        let outcome = finished(&scene(text), &request);
+        let (sin, cos) = 1.2f64.sin_cos();
+        assert!((outcome.last.phi[1] / (per * 0.01 * sin) - 1.0).abs() < 1e-7, "{:?}", outcome.last.phi);
+        assert!((outcome.last.omega[1] / (per * 0.03 * cos) - 1.0).abs() < 1e-7, "{:?}", outcome.last.omega);
+    }
+}
+
 #[test]
 fn an_aim_of_time_and_place_does_work() {
     // The wheel is to run ahead of the bar by 3 t + 0.2 sin(bar): psi = phi + 3 t + 0.2 sin phi.

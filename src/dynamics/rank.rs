@@ -10,16 +10,28 @@
 //! G are scaled to one, column by column and row by row.  The share is about the square of the distance from
 //! a singular position.  Pivots are taken in the order of S, so that the constraints that A finds dependent
 //! are those that have no pivot in S.
+//!
+//! Bounds of slopes of gears and cams are what they come to over a turn, and those of sliders the size of the
+//! parts; where the mechanism goes far beyond them, they are what is found there.  Ratios of gears couple
+//! parts of a mechanism by numbers of any size: with such constraints D begins at the d that make all
+//! e_r b_rk d_k as nearly equal as they can be, in the least squares of their logarithms.  Source: A. R.
+//! Curtis, J. K. Reid, IMA J. Appl. Math. 10 (1972).
 
 use super::Mechanism;
 use super::constraint::{ConstraintEquation, ForceDirection, RowMeasure};
 use super::schur::{DROPPED, NEAR, Weakest};
 use crate::arithmetic::Real;
+use std::borrow::Cow;
 
 /// Rounds of the scaling.
 const ROUNDS: usize = 4;
 /// Pivots of S below this part of those of A owe it to masses and levers: so many digits are lost to them.
 const LOSS: f64 = 1e-3;
+
+/// Rounds of the scaling it begins with where ratios couple the columns.
+const EVEN_ROUNDS: usize = 32;
+/// What is known of a derivative's square may be exceeded so many times before it is replaced.
+const BEYOND: f64 = 100.0;
 
 /// Share above which a position is far from any singular one.
 const WIDE: f64 = 0.3;
@@ -27,9 +39,20 @@ const WIDE: f64 = 0.3;
 /// Squared bounds of a constraint's derivatives by the coordinates; a coordinate may come up more than once.
 pub type Levers = Vec<(usize, f64)>;
 
+/// The levers of all constraints.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Bounds {
+    levers: Vec<Levers>,
+    /// The constraints whose derivatives are not bounded by their levers.
+    open: Vec<usize>,
+    /// True where some are gears or cams.
+    has_ratios: bool,
+}
+
 /// What the rank of constraints is measured with.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metric {
+    bounds: Bounds,
     /// D, a number a column of G.
     pub columns: Vec<f64>,
     /// What pivots of A are measured against.
@@ -50,39 +73,58 @@ pub struct RankVerdict {
 }
 
 impl Metric {
-    /// Of constraints with these levers in so many columns.
-    pub fn new(levers: &[Levers], columns: usize, redundant: usize) -> Self {
-        let inverse = |most: f64| if most > 0.0 { 1.0 / most } else { 1.0 };
+    /// Of constraints with these bounds in so many columns.
+    pub fn new(bounds: Bounds, columns: usize, redundant: usize) -> Self {
         let most =
             |levers: &Levers, d: &[f64]| levers.iter().fold(0.0, |most: f64, &(k, b)| most.max(b * d[k]));
-        let mut d = vec![1.0; columns];
+        let mut d = if bounds.has_ratios { bounds.even(columns) } else { vec![1.0; columns] };
         for _ in 0..ROUNDS {
             let mut largest = vec![0.0_f64; columns];
-            for levers in levers {
+            for levers in &bounds.levers {
                 let e = inverse(most(levers, &d));
                 levers.iter().for_each(|&(k, b)| largest[k] = largest[k].max(e * b));
             }
             d = largest.into_iter().map(inverse).collect();
         }
-        let rows = levers.iter().map(|levers| levers.iter().map(|&(k, b)| b * d[k]).sum()).collect();
-        Self { columns: d, rows, redundant }
+        let rows = bounds.levers.iter().map(|levers| levers.iter().map(|&(k, b)| b * d[k]).sum()).collect();
+        Self { bounds, columns: d, rows, redundant }
+    }
+
+    /// The metric of a position with these derivatives, constraint by constraint, where they are far beyond
+    /// their bounds.
+    pub fn beyond<I: Iterator<Item = (usize, f64)>>(&self, gradient: impl Fn(usize) -> I) -> Cow<'_, Self> {
+        let mut bounds = Cow::Borrowed(&self.bounds);
+        for &r in &self.bounds.open {
+            for (k, g) in gradient(r) {
+                let known = self.bounds.levers[r].iter().filter(|lever| lever.0 == k);
+                let most = known.fold(0.0, |most: f64, lever| most.max(lever.1));
+                if g * g > BEYOND * most && (g * g).is_finite() {
+                    bounds.to_mut().levers[r].push((k, g * g));
+                }
+            }
+        }
+        match bounds {
+            Cow::Borrowed(_) => Cow::Borrowed(self),
+            Cow::Owned(bounds) => Cow::Owned(Self::new(bounds, self.columns.len(), self.redundant)),
+        }
     }
 
     /// The verdict on constraints with this Jacobian (r × columns).
     pub fn judge<T: Real>(&self, jacobian: &[T]) -> RankVerdict {
         let (r, n) = (self.rows.len(), self.columns.len());
         let row = |i: usize| &jacobian[i * n..(i + 1) * n];
+        let metric = self.beyond(|i| row(i).iter().map(|g| g.value()).enumerate());
         let mut a = vec![0.0; r * r];
         for i in 0..r {
             for j in i..r {
-                let products = row(i).iter().zip(row(j)).zip(&self.columns);
+                let products = row(i).iter().zip(row(j)).zip(&metric.columns);
                 a[i * r + j] = products.map(|((x, y), d)| x.value() * y.value() * d).sum();
             }
         }
         let mut shares = vec![0.0; r];
         for k in (0..r).rev() {
             let pivot = a[k * r + k];
-            shares[k] = pivot / self.rows[k];
+            shares[k] = pivot / metric.rows[k];
             if is_dependent(shares[k]) {
                 continue;
             }
@@ -108,6 +150,55 @@ impl Metric {
         let is_singular = is_left_out.iter().filter(|&&is_left_out| is_left_out).count() > self.redundant;
         let weakest = if is_singular { shares.iter().enumerate().fold(Weakest::NONE, least) } else { kept };
         RankVerdict { weakest, kept: kept.share, is_left_out }
+    }
+}
+
+/// One over it, and 1 of nothing.
+fn inverse(most: f64) -> f64 {
+    if most > 0.0 { 1.0 / most } else { 1.0 }
+}
+
+impl Bounds {
+    /// Of these constraints; `size` \[m\] bounds what nothing else does, and `column` tells where a
+    /// coordinate is.
+    pub fn new<'a>(
+        rows: impl Iterator<Item = &'a ConstraintEquation>,
+        size: f64,
+        column: impl Fn(usize) -> Option<usize>,
+    ) -> Self {
+        let mut bounds = Self::default();
+        for (r, row) in rows.enumerate() {
+            let levers = row.levers(size).into_iter();
+            bounds.levers.push(levers.filter_map(|(k, b)| Some((column(k)?, b))).collect());
+            bounds.has_ratios |= row.aim.is_some();
+            if !row.is_bounded() {
+                bounds.open.push(r);
+            }
+        }
+        bounds
+    }
+
+    /// D with which all entries are about one.
+    fn even(&self, columns: usize) -> Vec<f64> {
+        let logs: Vec<Levers> = (self.levers.iter())
+            .map(|levers| {
+                levers.iter().filter(|lever| lever.1 > 0.0).map(|&(k, b)| (k, libm::log2(b))).collect()
+            })
+            .collect();
+        let mut d = vec![0.0; columns];
+        for _ in 0..EVEN_ROUNDS {
+            let mut sums = vec![(0.0, 0.0); columns];
+            for levers in &logs {
+                let sum: f64 = levers.iter().map(|&(k, b)| b + d[k]).sum();
+                let e = sum / levers.len().max(1) as f64;
+                for &(k, b) in levers {
+                    sums[k].0 += e - b;
+                    sums[k].1 += 1.0;
+                }
+            }
+            d = sums.into_iter().map(|(sum, count): (f64, f64)| sum / count.max(1.0)).collect();
+        }
+        d.into_iter().map(libm::exp2).collect()
     }
 }
 
@@ -157,6 +248,14 @@ impl RankVerdict {
 }
 
 impl ConstraintEquation {
+    /// True where its derivatives are no larger than its levers wherever the mechanism goes.
+    fn is_bounded(&self) -> bool {
+        let RowMeasure::Place(place) = &self.measure else { return true };
+        let is_rod = self.push.as_ref().is_some_and(|push| matches!(push.way, ForceDirection::Span(..)));
+        let travels = place.bilinear.iter().any(|&(j, k, _)| j.max(k) >= place.angles);
+        is_rod || (self.aim.is_none() && !travels)
+    }
+
     /// Its levers, angles in rad; `size` \[m\] bounds what nothing else does.
     pub fn levers(&self, size: f64) -> Levers {
         let square = size * size;
@@ -171,8 +270,12 @@ impl ConstraintEquation {
             }
             RowMeasure::Place(place) => place,
         };
-        let mut levers: Levers =
-            self.aim.iter().flat_map(|aim| aim.coordinates()).map(|k| (k, 1.0)).collect();
+        let mut levers: Levers = self
+            .aim
+            .iter()
+            .flat_map(|aim| aim.slope_sizes(size))
+            .map(|(k, slope)| (k, slope * slope))
+            .collect();
         for &(k, g) in &place.linear {
             match k < place.angles {
                 true => levers.push((k, g.norm_squared())),
@@ -195,7 +298,7 @@ impl Mechanism {
     /// What the rank of its constraints is measured with.
     pub fn rank_metric(&self) -> Metric {
         let size = self.size_of_parts();
-        let levers: Vec<Levers> = self.constraints.iter().map(|row| row.levers(size)).collect();
-        Metric::new(&levers, self.coordinates(), self.assembly.redundant.len())
+        let bounds = Bounds::new(self.constraints.iter(), size, Some);
+        Metric::new(bounds, self.coordinates(), self.assembly.redundant.len())
     }
 }

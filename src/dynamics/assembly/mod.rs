@@ -23,7 +23,7 @@ pub(in crate::dynamics) mod svd;
 mod watch;
 
 use super::compile::CompileError;
-use super::constraint::RowMeasure;
+use super::constraint::{ConstraintEquation, RowMeasure};
 use super::forest::BodyOrigin;
 use super::law::Law;
 use super::partition::CoordinatePartition;
@@ -233,8 +233,13 @@ impl Mechanism {
 impl<'a> AssemblyProblem<'a> {
     fn new(mechanism: &'a Mechanism, scene: &Scene, kept: &[usize], given: &dyn Fn(usize) -> Given) -> Self {
         let (size, angles) = (mechanism.size_of_parts(), mechanism.bodies.len());
-        let unit = (0..mechanism.coordinates()).map(|k| if k < angles { 1.0 } else { size }).collect();
-        let lever = mechanism.constraints.iter().map(|row| newton::lever(&row.measure, size)).collect();
+        let unit: Vec<f64> =
+            (0..mechanism.coordinates()).map(|k| if k < angles { 1.0 } else { size }).collect();
+        let lever = |row: &ConstraintEquation| {
+            let slopes = row.aim.iter().flat_map(|aim| aim.slope_sizes(size));
+            slopes.fold(newton::lever(&row.measure, size), |most, (k, slope)| most.max(slope * unit[k]))
+        };
+        let lever = mechanism.constraints.iter().map(lever).collect();
         let mut aims = Vec::new();
         for (bar, start) in scene.start.iter().enumerate() {
             if given(bar).phi {

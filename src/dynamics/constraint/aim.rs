@@ -17,6 +17,7 @@ use crate::dynamics::Time;
 use crate::dynamics::configuration::{Configuration, ConfigurationSource};
 use crate::dynamics::force::UserForce;
 use std::cell::RefCell;
+use std::f64::consts::{PI, TAU};
 
 /// What a formula of time and place asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +33,20 @@ pub(in crate::dynamics) enum AimInput {
     /// The rate of a coordinate.
     Rate(usize),
 }
+
+impl AimInput {
+    /// The coordinate it belongs to.
+    fn coordinate(&self) -> Option<usize> {
+        match *self {
+            Self::Number(_) | Self::Time => None,
+            Self::Angle(k) | Self::Cosine(k) | Self::Sine(k) | Self::Origin(k) | Self::Rate(k) => Some(k),
+        }
+    }
+}
+
+/// Places at which slopes are looked at for their sizes, and the angle that spreads them over a turn \[rad\].
+const PLACES: usize = 8;
+const GOLDEN: f64 = 2.399_963_229_728_653;
 
 /// A formula of time and place with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -155,6 +170,31 @@ impl Aim {
         self.results(t, at, |slots| {
             self.slopes.iter().map(|&(k, slope)| (slots[slope as usize] * at.phi[k]).abs()).sum()
         })
+    }
+
+    /// How large its slopes come to be by coordinate, with angles anywhere in a turn and origins up to `size`
+    /// \[m\] away.
+    pub fn slope_sizes(&self, size: f64) -> Vec<(usize, f64)> {
+        let mut sizes: Vec<(usize, f64)> = self.coordinates().map(|k| (k, 0.0)).collect();
+        let room = self.inputs.iter().filter_map(AimInput::coordinate).max().map_or(0, |most| most + 1);
+        for place in 1..=PLACES {
+            let turn = |k: usize| (GOLDEN * (place * (k + 1)) as f64) % TAU - PI;
+            let z: Vec<Complex<f64>> = (0..room).map(|k| Complex::unit(turn(k))).collect();
+            let mut phi: Vec<f64> = (0..room).map(turn).collect();
+            for input in &self.inputs {
+                if let AimInput::Origin(k) = *input {
+                    phi[k] *= size / PI;
+                }
+            }
+            let at = ConstraintArguments { phi: &phi, z: &z, omega: &[] };
+            self.results(Time::default(), at, |slots| {
+                for ((_, most), &(_, slope)) in sizes.iter_mut().zip(&self.slopes) {
+                    let slope = slots[slope as usize].abs();
+                    *most = if slope.is_finite() { most.max(slope) } else { *most };
+                }
+            });
+        }
+        sizes
     }
 
     /// Its explicit rate f_t.

@@ -284,9 +284,12 @@ impl<T: Real> RecursiveRows<T> {
         let gradient: Vec<f64> = self.gradient.iter().map(|gradient| gradient.value()).collect();
         let (mut matrix, mut shares) = (vec![0.0; ways.entries()], vec![0.0; ways.rows()]);
         let mut pivot = shares.clone();
-        ways.cross(&mut matrix, &gradient, |coordinate| self.metric.columns[coordinate]);
+        let metric = self
+            .metric
+            .beyond(|row| ways.range(row).map(|at| (ways.steps[at].coordinate, self.gradient[at].value())));
+        ways.cross(&mut matrix, &gradient, |coordinate| metric.columns[coordinate]);
         ways.envelope.factor_by(&mut matrix, &mut pivot, |i, pivot: f64| {
-            shares[i] = pivot / self.metric.rows[ways.order[i]];
+            shares[i] = pivot / metric.rows[ways.order[i]];
             if shares[i] >= DROPPED { 1.0 / pivot } else { 0.0 }
         });
         self.metric.verdict(&shares)

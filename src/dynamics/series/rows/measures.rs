@@ -4,7 +4,7 @@ use crate::arithmetic::Real;
 use crate::dynamics::Mechanism;
 use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
 use crate::dynamics::partition::CoordinatePartition;
-use crate::dynamics::rank::{Levers, Metric};
+use crate::dynamics::rank::{Bounds, Metric};
 
 /// Numbers of a mechanism that tell how far its rows are violated and how independent they are, all
 /// coordinates free.
@@ -80,8 +80,6 @@ pub(super) fn measures<C: Real>(
 ) -> (Vec<f64>, Metric) {
     let scale = rows.iter().map(|row| row.scale(&mechanism.tree)).collect();
     let size = mechanism.size_of_parts();
-    let base = |(k, b): (usize, f64)| partition.bodies[k].base.map(|base| (base, b));
-    let levers: Vec<Levers> =
-        rows.iter().map(|row| row.levers(size).into_iter().filter_map(base).collect()).collect();
-    (scale, Metric::new(&levers, partition.count(), mechanism.assembly.redundant.len()))
+    let bounds = Bounds::new(rows.iter().copied(), size, |k| partition.bodies[k].base);
+    (scale, Metric::new(bounds, partition.count(), mechanism.assembly.redundant.len()))
 }
