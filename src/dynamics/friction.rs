@@ -48,6 +48,8 @@ const MOST_ROUNDS: usize = 9;
 
 /// What is left of the equations of friction after all steps, over their forces, where they have no solution.
 const UNSETTLED: f64 = 1e-3;
+/// Share of the largest of all forces that rounding leaves of one that passes zero.
+const ROUNDED: f64 = 1e-9;
 /// What is returned in place of a determinant where no forces of friction fit a motion.
 const NO_FORCES: f64 = -1.0;
 
@@ -317,7 +319,8 @@ pub(super) fn forces<T: Real>(
             change[j] = coefficient * size - tau[j];
             if round == ROUNDS {
                 let parts = (coefficient * size).value().abs() + tau[j].value().abs();
-                goes_on |= change[j].value().abs() > UNSETTLED * parts;
+                let rounding = ROUNDED * coefficient.value().abs() * largest(start, &response, tau);
+                goes_on |= change[j].value().abs() > UNSETTLED * parts + rounding;
             }
             for k in 0..f {
                 matrix[j * f + k] = -coefficient * along.dot(response(j, k));
@@ -344,6 +347,14 @@ pub(super) fn forces<T: Real>(
         }
     }
     regularity
+}
+
+/// The largest of the forces \[N\] that normal forces are sums of.
+fn largest<T: Real>(start: &[Complex<T>], response: &impl Fn(usize, usize) -> Complex<T>, tau: &[T]) -> f64 {
+    let size = |force: Complex<T>| libm::hypot(force.re.value(), force.im.value());
+    let by_tau = |j: usize| tau.iter().enumerate().map(move |(k, &tau)| size(response(j, k).times(tau)));
+    let all = start.iter().map(|&force| size(force)).chain((0..start.len()).flat_map(by_tau));
+    all.fold(0.0, f64::max)
 }
 
 /// Solves a small system in place by elimination with exchange of rows, and returns its determinant.
@@ -378,4 +389,44 @@ pub fn solve<T: Real>(matrix: &mut [T], x: &mut [T]) -> f64 {
         x[k] = sum / matrix[k * d + k];
     }
     determinant
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(
+        sliding: &[(Normal, f64)],
+        start: &[Complex<f64>],
+        response: &[Complex<f64>],
+    ) -> (f64, Vec<f64>) {
+        let (f, mut tau) = (start.len(), vec![0.0; start.len()]);
+        let regularity = forces(sliding, start, |j, k| response[j * f + k], &mut tau);
+        (regularity, tau)
+    }
+
+    /// A hinge alone, and beside a rail whose force is zero under the hinge's friction: the same friction.
+    #[test]
+    fn a_force_that_passes_zero_beside_another_is_no_paradox() {
+        for k in 0..200 {
+            let [a, b, c, d] = [1.0, 2.0, 3.0, 4.0].map(|factor| libm::sin(factor * f64::from(k) + factor));
+            let hinge = (Normal::Joint(0), 0.0222);
+            let (start, own) = (Complex::new(900.0 * a, 300.0 * b), Complex::new(c, d));
+            let (alone, tau) = found(&[hinge], &[start], &[own]);
+            assert!(alone > 0.5);
+            let rail = [(0.5 + 0.1 * c) * tau[0], 0.5 + 0.1 * c, 0.05 + 0.02 * d];
+            let [zero, by_hinge, by_rail] = rail.map(|x| Complex::new(x, 0.0));
+            let response = [own, Complex::new(d, a), by_hinge, by_rail];
+            let (regularity, both) =
+                found(&[hinge, (Normal::Rail, -0.0859)], &[start, Complex::new(-zero.re, 0.0)], &response);
+            assert!(regularity > 0.5, "{k}: {regularity}");
+            assert!(
+                (both[0] - tau[0]).abs() < 1e-14 * tau[0] && both[1].abs() < 1e-14 * tau[0],
+                "{k}: {both:?}"
+            );
+        }
+        // tau = |1 + 2 tau| has no solution where tau is positive, and none where it is not.
+        let [start, response] = [1.0, 2.0].map(|x| Complex::new(x, 0.0));
+        assert!(found(&[(Normal::Rail, 1.0)], &[start], &[response]).0 < 0.0);
+    }
 }
