@@ -260,9 +260,8 @@ impl ErrorEstimator {
         }
         let Err(stop) = gone else { return Ok(()) };
         let is_dear = reference_run.plan().in_double_double;
-        if let Some(finer::Finer { mut plan, name }) =
-            is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten()
-        {
+        let second = is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten();
+        if let Some(finer::Finer { mut plan, name }) = second {
             let from = crate::arithmetic::shown::about(reference_run.motion.time.hi);
             (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
@@ -271,6 +270,7 @@ impl ErrorEstimator {
             measured.name = format!("{}, from {from} s on {name}", measured.name);
             return self.accompany(time, statistics);
         }
+        measured.is_cut = stop.is_none();
         Err(stop.unwrap_or_else(|| match measured.level {
             Level::Full => {
                 let expansions = reference_run.expansions();

@@ -65,8 +65,9 @@ pub(super) struct TrustMeasurement {
     pub lost: Option<f64>,
     /// What the last digit of the inputs came to at the horizon.
     pub input_error: Option<f64>,
-    /// Why it went no further.
+    /// Why it went no further, and whether that is what it may cost.
     pub why: Option<String>,
+    pub is_cut: bool,
     /// Growth of small differences against time, once the reference solution has ended, and of which kind it
     /// may be.
     pub history: Vec<[f64; 2]>,
@@ -109,6 +110,7 @@ impl TrustMeasurement {
             lost: None,
             input_error: None,
             why: None,
+            is_cut: false,
             history: Vec::new(),
             nature: Nature::default(),
             no_growth: None,
@@ -248,6 +250,7 @@ impl TrustMeasurement {
             horizon,
             lost,
             why,
+            is_cut,
             history,
             no_growth,
             nature,
@@ -290,7 +293,7 @@ impl TrustMeasurement {
             (rate, torque) = beside;
         } else if until >= t && trust.record.len() > 1 || t == 0.0 {
             (trust.how, trust.error_estimate) = (How::ReferenceSolution, Some(printed(error)));
-        } else if let Some(power) = power(&trust.record, &history, nature) {
+        } else if let Some(power) = power(&trust.record, &history, nature).filter(|_| is_cut) {
             (trust.how, trust.is_upper_bound) = (How::Extrapolated(until), false);
             let base = error.max(LEAST);
             let ahead = base * libm::pow(t / until, power);
@@ -364,6 +367,23 @@ mod tests {
         let power = |until: f64| power(&record, &followed(until), Nature::default());
         assert!(power(1.5).is_some_and(|power| (power - 1.0).abs() < 0.1));
         assert_eq!(power(0.5), None);
+    }
+
+    #[test]
+    fn an_estimate_is_carried_on_from_where_the_budget_ends_and_not_from_a_stop() {
+        let mut measured = TrustMeasurement::new(Level::Auto, String::new(), Vec::new());
+        for k in 0..=20 {
+            let t = 0.1 * f64::from(k);
+            measured.take(t, Apart { angle: 1e-9 * t, ..Apart::default() });
+        }
+        measured.history = (0..=8).map(|k| [0.25 * f64::from(k), 0.05 * f64::from(k)]).collect();
+        measured.why = Some("the reference solution stopped".into());
+        let stopped = measured.clone().trust(4.0);
+        assert_eq!((stopped.how, stopped.error_estimate), (How::None, None));
+        measured.is_cut = true;
+        let cut = measured.trust(4.0);
+        assert_eq!(cut.how, How::Extrapolated(2.0));
+        assert!(cut.error_estimate.is_some_and(|error| (error / (CAUTION * 4e-9) - 1.0).abs() < 0.1));
     }
 
     #[test]

@@ -20,7 +20,7 @@
 //!
 //! What the reference solution may cost is counted in work, not in seconds: the same run has the same figures
 //! on every machine ([`budget`]).  Where it is used up, a regular motion's error is carried on by the power
-//! law it followed so far, and said to be *extrapolated*.
+//! law it followed so far, and said to be *extrapolated*; not where the reference solution stopped by itself.
 //!
 //! Source of the constants of R: fitted on random starts of double pendulums with springs and motors against
 //! references in double-double; the table of `tests/trust.rs` is their test.
