@@ -700,6 +700,37 @@ fn companions_have_other_errors_where_their_steps_are_those_of_the_run() {
     }
 }
 
+/// A torque that is switched off at about the time at which double-double has cost enough: the reference goes
+/// on from where it is, with the parts that act there.
+#[test]
+fn companions_go_on_in_doubles_from_after_an_event() {
+    let text = |off: f64| {
+        format!(
+            r#"{{"name": "switched", "gravity": [0, -9.8125],
+            "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.25, "length": 0.5}},
+                {{"name": "c", "mass": 1, "centre": [0.5, 0], "inertia": 0.125, "length": 1}}],
+            "hinges": [{{"name": "h", "between": [{{"body": "b", "point": [0, 0]}}, {{"body": "c", "point": [0, 0]}}]}}],
+            "sliders": [{{"name": "s", "point": {{"body": "b", "point": [0, 0]}},
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked"}}],
+            "torques": [{{"name": "q", "body": "c", "torque": 2}}],
+            "events": [{{"name": "e", "when": "t - {off}", "off": ["q"]}}],
+            "start": {{"b": {{"phi": 0, "origin": [0, 0]}}, "c": {{"phi": 0, "omega": 0}}}}, "until": 4, "every": 0.5}}"#
+        )
+    };
+    for off in [0.23, 0.24, 0.25, 0.26, 0.28, 0.29] {
+        let scene = driftless::scene::parse_scene(&text(off), "switched.json", &[]).expect("a scene");
+        let last = |rtol: f64| {
+            let outcome = trusted(&scene, &asked("taylor", rtol, 4.0, 0.5), Level::Auto);
+            (outcome.last.phi[1], outcome.trust.expect("asked for"))
+        };
+        let ((coarse, trust), (fine, _)) = (last(1e-9), last(1e-13));
+        let (told, truth) = (trust.error_estimate.expect("a figure"), (coarse - fine).abs());
+        assert!(trust.error_estimator.is_some_and(|name| name.contains("s on taylor")), "{off}");
+        assert_eq!(trust.horizon, None, "{off}");
+        assert!(told > truth / 3.0 && told < 1e-7, "{off}: {told:e} for {truth:e}");
+    }
+}
+
 /// Extended orders leave less than doubles can show, and it is seen.
 #[test]
 fn extended_runs_are_judged_in_double_double() {

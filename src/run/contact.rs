@@ -16,12 +16,14 @@ pub(super) use jumps::{Jump, JumpLog, Switch};
 pub(super) use rest::{Flight, come_to_rest};
 pub(super) use state::ContactDriverState;
 
+use super::build::build;
 use super::driver::{Driver, Halt, Pause, StepWatch};
 use super::event::{EventDetector, EventMemory};
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
 use super::impact_monitor;
 use super::inside::{ObserverAdapter, StepWatcher, Watchers};
+use super::methods::Stabilization;
 use super::monitor::{Monitor, lent};
 use super::plan::Plan;
 use super::running::Outcome;
@@ -177,15 +179,20 @@ impl ContactDriver {
         &self.mechanism
     }
 
-    /// The mechanism with the parts that act and on the branches its laws are on, without holds; `compiled`
-    /// where nothing was switched.
-    pub(super) fn acting(&self, compiled: &Arc<Mechanism>) -> Arc<Mechanism> {
-        if self.whole.laws.is_none() && self.off.is_empty() && self.shifts.is_empty() {
-            return Arc::clone(compiled);
+    /// Goes on by another plan from the motion that is read at present, with the parts that act there.
+    pub(super) fn go_on_by(&mut self, plan: &mut Plan, motion: &Motion) -> Result<(), StepError> {
+        if self.mechanism.constraints.len() > self.free.constraints.len() {
+            plan.stabilization = Stabilization::Projection;
         }
-        let mut acting = Mechanism::clone(&self.free);
-        acting.whole = Some((Arc::clone(&self.whole), self.off.clone()));
-        Arc::new(acting)
+        self.driver = build(&self.mechanism, plan, motion)?;
+        if self.events.as_ref().is_some_and(|events| events.memory.pending.is_some()) {
+            // The event at the end of the last step is still to come, and is found anew.
+            self.events = EventDetector::of_scene(&self.whole);
+            if let Some(events) = &mut self.events {
+                events.watch_friction(&self.mechanism);
+            }
+        }
+        Ok(())
     }
 
     /// The mechanism with all its parts and no holds.

@@ -265,7 +265,7 @@ impl ErrorEstimator {
             let from = crate::arithmetic::shown::about(reference_run.motion.time.hi);
             (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
             self.prices = Prices::new(&self.mechanism, &plan, &self.run);
-            reference_run.change(&self.mechanism, plan)?;
+            reference_run.change(plan)?;
             measured.is_bound |= finer::is_bound(reference_run.plan(), &self.run);
             measured.name = format!("{}, from {from} s on {name}", measured.name);
             return self.accompany(time, statistics);
@@ -407,7 +407,7 @@ impl ErrorEstimator {
         let finer::Finer { mut plan, .. } = finer::coarse(mechanism, run);
         (plan.until, plan.every) = (reference_run.plan().until, reference_run.plan().every);
         *prices = Prices::new(mechanism, &plan, run);
-        if let Err(why) = reference_run.change(mechanism, plan) {
+        if let Err(why) = reference_run.change(plan) {
             self.end(&why);
         }
     }

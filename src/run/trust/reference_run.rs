@@ -106,13 +106,11 @@ impl ReferenceRun {
     ///
     /// # Errors
     /// Why it cannot.
-    pub(super) fn change(&mut self, mechanism: &Arc<Mechanism>, mut series: Plan) -> Result<(), String> {
-        let motion = self.motion.clone();
-        let mechanism = &self.contact_driver.acting(mechanism);
-        (self.contact_driver, self.outcome) = contact_driver(mechanism, &mut series, &motion)?;
-        self.contact_driver.jumps = self.tangent.is_some().then(JumpLog::with_switches);
+    pub(super) fn change(&mut self, series: Plan) -> Result<(), String> {
+        self.outcome.plan = series;
+        self.contact_driver.go_on_by(&mut self.outcome.plan, &self.motion).map_err(|stop| stop.what)?;
         (self.is_rounded, self.begun, self.last) =
-            (is_rounded(&series), motion.time.hi, Statistics::default());
+            (is_rounded(self.plan()), self.motion.time.hi, Statistics::default());
         Ok(())
     }
 
@@ -188,8 +186,8 @@ impl ReferenceRun {
         (t - self.begun) / self.last.steps.max(1) as f64
     }
 
-    /// To a time, with the motion there in `motion`; what it cost is added to what was spent, which must not
-    /// pass the budget.
+    /// To a time, with the motion there in `motion`, or to where the budget is used up; what it cost is added
+    /// to what was spent.
     ///
     /// # Errors
     /// Why the reference solution stopped, or `None` where the budget was used up.
@@ -197,7 +195,8 @@ impl ReferenceRun {
         while let Some(next) = self.tangent.as_ref().map(TangentFlow::next).filter(|&next| next <= until.hi) {
             // After an event that came in a long step of the flow its steps may be so short that they end
             // before the step in which the motion is known.
-            let is_behind = next < self.motion.time.hi && next < self.contact_driver.step_begin().hi;
+            let is_behind =
+                next < self.motion.time.hi && next < self.contact_driver.step_begin().hi.max(self.begun);
             if !is_behind {
                 self.integrate(Time::from(next), budget)?;
             }
@@ -223,12 +222,11 @@ impl ReferenceRun {
             left == 0
         };
         let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
-        if !arrived.map_err(|stop| {
+        let arrived = arrived.map_err(|stop| {
             Some(format!("the reference solution stopped at t = {} s: {}", figure(stop.t), stop.what))
-        })? || *budget.spent > budget.limit
-        {
-            return Err(None);
-        }
+        })?;
+        let is_paid = arrived && *budget.spent <= budget.limit;
+        // Where another series goes on, this is where it begins.
         self.contact_driver.look(&mut self.motion);
         if let (Some(tangent), Some(jumps)) = (&mut self.tangent, &self.contact_driver.jumps) {
             tangent.jump(&jumps.take());
@@ -236,6 +234,6 @@ impl ReferenceRun {
         let statistics = self.contact_driver.statistics();
         *budget.spent += (statistics.evaluations - self.last.evaluations) as f64 * each + budget.prices.look;
         self.last = statistics;
-        Ok(())
+        if is_paid { Ok(()) } else { Err(None) }
     }
 }
