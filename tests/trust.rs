@@ -700,6 +700,21 @@ fn companions_have_other_errors_where_their_steps_are_those_of_the_run() {
     }
 }
 
+/// One step is all that it takes to a near horizon, by the run and by its reference: at the usual tolerance
+/// both are of a high order, and not of the same.
+#[test]
+fn a_single_step_is_judged_by_another_order() {
+    let text = r#"{"name": "short", "gravity": [0, -9.8125],
+        "bars": [{"name": "b", "mass": 2.970703125, "centre": [0.29248046875, 0.00390625],
+            "inertia": 0.138916015625, "length": 0.5849609375}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "start": {"b": {"phi": -1.298828125, "omega": -0.0185546875}}, "until": 0.39453125,
+        "every": 0.39453125}"#;
+    let scene = driftless::scene::parse_scene(text, "short.json", &[]).expect("a scene");
+    let [[told, truth], _] = told_and_true(&scene, &asked("taylor", 1e-9, 0.39453125, 0.39453125));
+    assert!(truth > 3e-14 && (0.5..10.0).contains(&(told / truth)), "{told:e} for {truth:e}");
+}
+
 /// A torque that is switched off at about the time at which double-double has cost enough: the reference goes
 /// on from where it is, with the parts that act there.
 #[test]

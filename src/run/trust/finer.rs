@@ -15,10 +15,10 @@ const FINER: f64 = 100.0;
 const ORDER: usize = 24;
 /// The order of those in doubles where powers of formulas or of friction are what a step costs.
 const ORDER_OF_FORMULAS: usize = 16;
-/// The order of those in doubles beside a series of the least order: where tables, transitions, events or the
-/// horizon end the steps of both they are the same, and of the same order they would have the same error.
-/// From this order on that is hardly more than rounding.
-const ANOTHER_ORDER: usize = 20;
+/// What is added to the order of those in doubles beside a series of the same order: where tables, transitions,
+/// events or the horizon end the steps of both they are the same, and of the same order they would have the
+/// same error.
+const ANOTHER_ORDER: usize = 4;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
 /// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of
@@ -102,15 +102,18 @@ fn in_doubles(mechanism: &Mechanism, run: &Plan) -> Finer {
     in_doubles_at(mechanism, run, tolerance)
 }
 
-/// A series in doubles, of another order than a coarse run that is a series itself.
+/// A series in doubles, of another order than a run that is a series itself.
 fn in_doubles_at(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
     let mut finer = series(mechanism, run, tolerance, [false; 2]);
     let order = |plan: &Plan| {
         let is_series = plan.method == MethodId::Taylor;
         is_series.then(|| plan.series(plan.tolerance.unwrap_or_default()).order)
     };
-    if order(run).is_some_and(|own| own < ANOTHER_ORDER && order(&finer.plan) == Some(own)) {
-        finer.plan.order = Some(ANOTHER_ORDER);
+    // At the least tolerance it is rounding that they differ by.
+    if let Some(own) = order(run).filter(|_| tolerance > FINEST)
+        && order(&finer.plan) == Some(own)
+    {
+        finer.plan.order = Some(own + ANOTHER_ORDER);
     }
     finer
 }
