@@ -715,6 +715,31 @@ fn a_single_step_is_judged_by_another_order() {
     assert!(truth > 3e-14 && (0.5..10.0).contains(&(told / truth)), "{told:e} for {truth:e}");
 }
 
+/// A method that is better than its tolerance has a reference that is much finer than that with dry friction,
+/// too: a pendulum on a rough pin, against `taylor` at 1e-14.
+#[test]
+fn companions_are_much_finer_than_runs_with_friction() {
+    let text = r#"{"name": "rough", "gravity": [0, -9.8125],
+        "bars": [{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.125, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}],
+            "friction": {"radius": 0.0625, "kinetic": 0.25}}],
+        "start": {"b": {"phi": 0.5, "omega": 1}}, "until": 4, "every": 0.0625}"#;
+    let scene = driftless::scene::parse_scene(text, "rough.json", &[]).expect("a scene");
+    let run = |method: &str, rtol: f64| {
+        let mut angles = Vec::new();
+        let run = begun(&scene, &asked(method, rtol, 4.0, 0.0625), Level::Auto);
+        let outcome = integrate(run, &mut |sample| {
+            angles.push(sample.phi[0]);
+            Ok(())
+        });
+        (angles, outcome.expect("no observer fails").trust.expect("asked for").error_estimate)
+    };
+    let ((coarse, told), (fine, _)) = (run("radau9", 1e-7), run("taylor", 1e-14));
+    let off = coarse.iter().zip(&fine).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    let told = told.expect("a figure");
+    assert!((0.5..2.0).contains(&(told / off)), "{told:e} for {off:e}");
+}
+
 /// A torque that is switched off at about the time at which double-double has cost enough: the reference goes
 /// on from where it is, with the parts that act there.
 #[test]

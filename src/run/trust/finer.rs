@@ -66,6 +66,7 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
         return stepwise(mechanism, run, finer.filter(|_| !finds_impacts_likewise).unwrap_or(FINE).max(FINE));
     }
     if !mechanism.frictions.is_empty() {
+        let finer = finer.filter(|_| run.method == MethodId::Taylor);
         return in_doubles_at(mechanism, run, finer.unwrap_or(FINE).max(FINE));
     }
     let is_near = is_near_rounding(run);
