@@ -413,6 +413,41 @@ fn only_chaotic_motions_have_an_exponent() {
     }
 }
 
+/// A pendulum that is driven by a torque of time is chaotic or not however its torque is written, and one that is
+/// driven is not said to be free.
+#[test]
+fn a_single_degree_of_freedom_is_driven_by_formulas_of_time_as_well() {
+    let scene = |torque: &str| {
+        parse_scene(
+            &format!(
+                r#"{{"name": "driven", "gravity": [0, -9.81], "until": 60, "every": 1,
+        "bars": [{{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+        "torsion_springs": [{{"name": "d", "body": "b", "stiffness": 0, "free_angle": 0, "damping": 0.655}}],
+        "torques": [{{"name": "q", "body": "b", "torque": {torque}}}],
+        "start": {{"b": {{"phi": 1.5, "omega": 0}}}}}}"#
+            ),
+            "driven.json",
+            &[],
+        )
+        .expect("a scene")
+    };
+    let law = r#"5.64, "law": {"start": 0, "sines": [{"amplitude": 1, "frequency": 2.495, "phase": 1.5707963267948966}]}"#;
+    let [by_law, by_formula] = [law, r#""5.64*cos(2.495*t)""#].map(|torque| trust(&scene(torque), 100.0));
+    let exponent = |trust: &Trust| trust.lyapunov.expect("an exponent").exponent;
+    assert!((exponent(&by_law) - exponent(&by_formula)).abs() < 0.3 * exponent(&by_law), "{by_formula:?}");
+    // A ball on a table that goes up and down.
+    let text = r#"{"name": "table", "gravity": [0, -9.81], "until": 20, "every": 1,
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+        "sliders": [{"name": "s", "point": {"body": "b", "point": [0, 0]},
+            "rail": {"body": "ground", "point": [0, 0], "direction": [0, 1]}, "angle": "locked"}],
+        "walls": [{"name": "w", "body": "b", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]},
+            "restitution": 1, "law": "0.05*sin(15*t)"}],
+        "start": {"b": {"phi": 0, "origin": [0, 0.5], "velocity": [0, 0]}}}"#;
+    let found = trust(&parse_scene(text, "table.json", &[]).expect("a scene"), 20.0);
+    assert!(found.lyapunov.is_some(), "{found:?}");
+}
+
 /// A few coordinates under gravity alone have their matrix from Jacobians, and nearly the same as from the
 /// series: many starts of two and three bars.
 #[test]

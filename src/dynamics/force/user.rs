@@ -195,6 +195,12 @@ impl<C: Real> UserForce<C> {
         })
     }
 
+    /// True where time is in it.
+    pub(crate) fn depends_on_time(&self) -> bool {
+        let mut numbers = self.parts.iter().flat_map(|part| part.tape.inputs());
+        numbers.any(|number| self.inputs[number as usize] == ForceInput::Time)
+    }
+
     /// True where what is applied depends on rates, as drag does.
     pub fn depends_on_rates(&self) -> bool {
         let ForceTape { tape, forces, torques, .. } = &self.parts[1];

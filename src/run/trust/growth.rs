@@ -11,6 +11,8 @@
 
 use super::{Lyapunov, TangentFlow};
 use crate::dynamics::Mechanism;
+use crate::dynamics::constraint::ConstraintEquation;
+use crate::dynamics::force::UserForce;
 use serde::{Deserialize, Serialize};
 
 /// Growth \[ln\] within the second half of the time from which on a motion may be chaotic: that of the third
@@ -53,8 +55,10 @@ const NEAR_UNSTABLE: &str = "it does not follow a power of time in this run, and
 impl Nature {
     /// Of a mechanism whose flow has begun.
     pub fn new(mechanism: &Mechanism, tangent: &TangentFlow) -> Self {
-        let moves = mechanism.constraints.iter().any(|row| row.is_motor());
-        let pushes = mechanism.actions.iter().any(|action| action.law.is_some());
+        let walls = mechanism.contacts.iter().map(|contact| &contact.row);
+        let moves = mechanism.constraints.iter().chain(walls).any(ConstraintEquation::is_motor);
+        let pushes = mechanism.actions.iter().any(|action| action.law.is_some())
+            || mechanism.forces.iter().any(UserForce::depends_on_time);
         // Branches that laws stay on are states as well.
         let remembers = mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.switches());
         Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes && !remembers, rate: tangent.rate() }
