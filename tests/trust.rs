@@ -814,6 +814,41 @@ fn rates_and_torques_have_estimates_of_their_own() {
     let off = coarse.iter().zip(&fine).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
     let told = told.expect("a motor");
     assert!((1.0 / 3.0..10.0).contains(&(told / off)), "{told:e} for {off:e}");
+    // A lock is no motor.
+    assert_eq!(
+        trusted(&shipped("cart_pole", &[]), &asked("dp8", 1e-7, 1.0, 0.1), Level::Auto)
+            .trust
+            .expect("asked for")
+            .torque_error,
+        None
+    );
+}
+
+/// A pendulum of moment I about its hinge turns a flywheel of moment J by a gear, psi = r phi, whose torque is
+/// r J phi'' with (I + r² J) phi'' = -m g s cos phi: that of the angle.
+#[test]
+fn torques_of_gears_have_estimates() {
+    let text = r#"{"name": "geared", "gravity": [0, -9.81],
+        "bars": [{"name": "bar", "mass": 2, "length": 1, "centre": [0.5, 0], "inertia": 0.2},
+            {"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.03}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]},
+            {"name": "B", "between": [{"body": "ground", "point": [1, 0]}, {"body": "wheel", "point": [0, 0]}]}],
+        "motors": [{"name": "gear", "body": "wheel", "law": "2.3*bar.phi"}],
+        "start": {"bar": {"phi": 0.4, "omega": 9}}, "until": 2, "every": 0.02}"#;
+    let scene = driftless::scene::parse_scene(text, "geared.json", &[]).expect("a scene");
+    let torques = |rtol: f64| {
+        let mut torques = Vec::new();
+        let run = begun(&scene, &asked("dp8", rtol, 2.0, 0.02), Level::Auto);
+        let outcome = integrate(run, &mut |sample| {
+            torques.push(-2.3 * 0.03 * 9.81 * sample.phi[0].cos() / (0.7 + 2.3 * 2.3 * 0.03));
+            Ok(())
+        });
+        (torques, outcome.expect("no observer fails").trust.expect("asked for").torque_error)
+    };
+    let ((coarse, told), (fine, _)) = (torques(1e-6), torques(1e-12));
+    let off = coarse.iter().zip(&fine).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+    let told = told.expect("a gear");
+    assert!((1.0 / 3.0..10.0).contains(&(told / off)), "{told:e} for {off:e}");
 }
 
 #[test]

@@ -85,7 +85,7 @@ impl SavedEstimator {
     }
 }
 
-/// Torques of motors, from positions and rates.
+/// Torques and forces of motors, gears and cams among them, from positions and rates.
 struct Torques {
     kernel: Kernel<f64>,
     of: [Vec<f64>; 2],
@@ -95,8 +95,9 @@ impl Torques {
     /// `None` where there are no motors, or torques depend on what holds a point or switches at the moment.
     fn new(mechanism: &Mechanism) -> Option<Self> {
         let is_smooth = mechanism.contacts.is_empty() && !mechanism.is_switched();
-        let has_motors = is_smooth && mechanism.constraints.iter().any(|row| row.law.is_some());
-        has_motors.then(|| Self { kernel: Kernel::new(mechanism), of: [Vec::new(), Vec::new()] })
+        let has_motors = (0..mechanism.constraints.len()).any(|row| mechanism.is_motor(row));
+        (is_smooth && has_motors)
+            .then(|| Self { kernel: Kernel::new(mechanism), of: [Vec::new(), Vec::new()] })
     }
 
     /// The largest difference between two motions, and the largest torque of the second.
@@ -107,9 +108,9 @@ impl Torques {
             kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
             mechanism.share_multipliers(motion.time, kernel, &phi, &omega);
             torques.clear();
-            let motors =
-                mechanism.constraints.iter().zip(&kernel.multiplier).filter(|(row, _)| row.law.is_some());
-            torques.extend(motors.map(|(_, &torque)| torque));
+            let multipliers = kernel.multiplier.iter().enumerate();
+            torques
+                .extend(multipliers.filter(|&(row, _)| mechanism.is_motor(row)).map(|(_, &torque)| torque));
         }
         let [one, other] = of;
         one.iter()
