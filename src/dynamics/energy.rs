@@ -82,8 +82,8 @@ impl Mechanism {
         Ok(())
     }
 
-    /// Kinetic energy of the rotors that carry integrals \[J\], and the work of their torques: no energy of the
-    /// scene.
+    /// Kinetic energy of the rotors that carry integrals \[J\], and the work of their torques: no energy of
+    /// the scene.
     pub fn energy_of_integrals<T: Real>(&self, omega: &[T]) -> T {
         let half = T::of(0.5 * Integral::INERTIA);
         self.integrals().fold(T::ZERO, |sum, (_, rotor)| sum + half * omega[rotor] * omega[rotor])

@@ -68,8 +68,8 @@ impl FrictionWatch {
         self.mechanism.frictions.get(function)
     }
 
-    /// Magnitude up to which a function is rounding of a place that slides from rest, or what a method of this
-    /// tolerance leaves open of it.
+    /// Magnitude up to which a function is rounding of a place that slides from rest, or what a method of
+    /// this tolerance leaves open of it.
     pub fn at_rest(&self, function: usize, tolerance: f64) -> f64 {
         match self.mechanism.modes.get(function) {
             Some(FrictionMode::Slip(_)) => NO_SPEED.max(tolerance) * self.mechanism.speed_unit(function),

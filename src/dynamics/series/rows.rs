@@ -18,7 +18,7 @@ mod bordered;
 mod measures;
 
 pub use self::measures::RowMeasures;
-use self::measures::{counted, growing, in_force, measures};
+use self::measures::{growing, in_force, measures};
 use super::aim::AimSeries;
 use super::coefficient::{SeriesNumber, Terms};
 use super::factors::Scale;
@@ -138,8 +138,7 @@ impl<T: SeriesNumber> RowSeries<T> {
         };
         let in_force = in_force(&mechanism.constraints, partition);
         let works = in_force.iter().map(|row| row.is_motor()).collect();
-        let counted = counted(&in_force);
-        let growing = in_force.iter().map(|row| growing(row, &counted)).collect();
+        let growing = growing(&in_force);
         // Where each lane has its own, whoever looks at the pivots has them.
         let (scale, metric) =
             if T::HAS_BORDER { Default::default() } else { measures(mechanism, partition, &in_force) };

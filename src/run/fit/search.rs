@@ -69,8 +69,8 @@ impl FitProblem<'_> {
         Ok((problem, ended))
     }
 
-    /// Takes what is rounding of a column's derivatives by the numbers for zero: of a column that stays as it is,
-    /// and is as exact, that would count as much as the others.
+    /// Takes what is rounding of a column's derivatives by the numbers for zero: of a column that stays as it
+    /// is, and is as exact, that would count as much as the others.
     pub(super) fn leave_out_rounding(&self, jacobian: &mut DMatrix<f64>, owners: &[Option<usize>]) {
         let largest =
             |column: &[Option<f64>]| column.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));

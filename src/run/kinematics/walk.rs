@@ -201,8 +201,8 @@ impl DriveWalk {
     /// certain.
     fn step(&mut self, t: f64) -> bool {
         let (n, h) = (self.alpha.len(), t - self.state.time.hi);
-        // A parabola that turns back within the step: eight times as far from a fold as this is, it would come
-        // to the other branch.
+        // The parabola must not turn back within the step: eight times as far from a fold as this is, it
+        // would come to the other branch.
         if self.fastest_coordinate().is_some_and(|k| (0.5 * h * self.alpha[k]).abs() > self.omega(k).abs()) {
             return false;
         }

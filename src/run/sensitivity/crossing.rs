@@ -136,8 +136,8 @@ impl Variation {
     }
 }
 
-/// ln of the volume of small differences after a switch over that before: that of the rates of the function at
-/// whose zero forces change, which differ where it speaks of rates.
+/// ln of the volume of small differences after a switch over that before: that of the rates of the function
+/// at whose zero forces change, which differ where it speaks of rates.
 ///
 /// The saltation matrix is 1 + (f⁺ - f⁻) ∇gᵀ/g'⁻, whose determinant is g'⁺/g'⁻.
 fn expansion(before: &Arc<Mechanism>, jumps: &[Jump]) -> f64 {

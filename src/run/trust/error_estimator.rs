@@ -287,9 +287,7 @@ impl ErrorEstimator {
 
     /// Looks at the run.
     fn look(&mut self, motion: &Motion, statistics: Statistics) {
-        let Some(until) = self.reference_run.as_ref().map(|reference_run| reference_run.plan().until) else {
-            return;
-        };
+        let Some(until) = self.reference_run.as_ref().map(|run| run.plan().until) else { return };
         let t = motion.time.hi;
         if self.measured.seen > 0 && t <= self.measured.until {
             return;

@@ -15,9 +15,9 @@ const FINER: f64 = 100.0;
 const ORDER: usize = 24;
 /// The order of those in doubles where powers of formulas or of friction are what a step costs.
 const ORDER_OF_FORMULAS: usize = 16;
-/// What is added to the order of those in doubles beside a series of the same order: where tables, transitions,
-/// events or the horizon end the steps of both they are the same, and of the same order they would have the
-/// same error.
+/// What is added to the order of those in doubles beside a series of the same order: where tables,
+/// transitions, events or the horizon end the steps of both they are the same, and of the same order they
+/// would have the same error.
 const ANOTHER_ORDER: usize = 4;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;

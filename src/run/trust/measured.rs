@@ -328,8 +328,8 @@ pub(in crate::run) fn crossing([t0, e0]: [f64; 2], [t1, e1]: [f64; 2]) -> f64 {
 }
 
 /// The power of time with which the error of a regular motion grew over the last three quarters of the
-/// logarithm of time; `None` where it is not known to be regular, over many turns or half of the run of `until`
-/// \[s\] at least.
+/// logarithm of time; `None` where it is not known to be regular, over many turns or half of the run of
+/// `until` \[s\] at least.
 fn power(record: &[[f64; 2]], history: &[[f64; 2]], nature: Nature, until: f64) -> Option<f64> {
     let (last, end) = (history.last()?, record.last()?);
     let half = history.iter().rev().find(|point| point[0] <= 0.5 * last[0])?;

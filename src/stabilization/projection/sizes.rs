@@ -1,7 +1,8 @@
 //! What violations of constraints are measured against.
 //!
 //! ```text
-//! position:  |C| <= tolerance · lever       or the rounding of its terms,  16 ε (Σ |terms of Q| + Σ |f_k q_k|)
+//! position:  |C| <= tolerance · lever
+//!            or the rounding of its terms,  16 ε (Σ |terms of Q| + Σ |f_k q_k|)
 //! velocity:  |C'| <= tolerance · max |G_k w_k|
 //! ```
 //!
@@ -99,9 +100,9 @@ pub(super) fn is_rate_kept(
     })
 }
 
-/// The worst row must be below tolerance, each measured against its own size, or at the rounding of its terms.
-/// Near a singular position rounding grows with the inverse of the distance, of which the share of the weakest
-/// row is about the square; rows left out there are not projected, and come back once it is past.
+/// The worst row must be below tolerance, each measured against its own size, or at the rounding of its
+/// terms.  Near a singular position rounding grows with the inverse of the distance, of which the share of
+/// the weakest row is about the square; rows left out there are not projected, and come back once it is past.
 fn check<F: Fn() -> f64>(
     mechanism: &Mechanism,
     kernel: &Kernel<f64>,

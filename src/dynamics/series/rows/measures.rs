@@ -46,13 +46,15 @@ fn longest_lever(row: &ConstraintEquation, unit: f64) -> f64 {
     all.map(|(unit, g)| unit * libm::hypot(g.re, g.im)).fold(least, f64::max)
 }
 
-/// The angles of which aims of these rows count the turns.
-pub(super) fn counted(rows: &[&ConstraintEquation]) -> Vec<usize> {
-    rows.iter().flat_map(|row| row.aim.iter()).flat_map(|aim| aim.counted_angles()).collect()
+/// The coordinates whose magnitudes the rounding of rows grows with, row by row.
+pub(super) fn growing(rows: &[&ConstraintEquation]) -> Vec<Vec<usize>> {
+    let aims = rows.iter().flat_map(|row| row.aim.iter());
+    let counted: Vec<usize> = aims.flat_map(|aim| aim.counted_angles()).collect();
+    rows.iter().map(|row| growing_of(row, &counted)).collect()
 }
 
-/// The coordinates whose magnitudes a row's rounding grows with, where turns of these angles are counted.
-pub(super) fn growing(row: &ConstraintEquation, counted: &[usize]) -> Vec<usize> {
+/// Those of one row, where turns of these angles are counted.
+fn growing_of(row: &ConstraintEquation, counted: &[usize]) -> Vec<usize> {
     let RowMeasure::Place(place) = &row.measure else {
         return row.coordinates().into_iter().filter(|k| counted.contains(k)).collect();
     };
