@@ -437,14 +437,14 @@ fn a_single_degree_of_freedom_is_driven_by_formulas_of_time_as_well() {
     let exponent = |trust: &Trust| trust.lyapunov.expect("an exponent").exponent;
     assert!((exponent(&by_law) - exponent(&by_formula)).abs() < 0.3 * exponent(&by_law), "{by_formula:?}");
     // A ball on a table that goes up and down.
-    let text = r#"{"name": "table", "gravity": [0, -9.81], "until": 20, "every": 1,
+    let text = r#"{"name": "table", "gravity": [0, -9.81], "until": 40, "every": 1,
         "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
         "sliders": [{"name": "s", "point": {"body": "b", "point": [0, 0]},
             "rail": {"body": "ground", "point": [0, 0], "direction": [0, 1]}, "angle": "locked"}],
         "walls": [{"name": "w", "body": "b", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]},
             "restitution": 1, "law": "0.05*sin(15*t)"}],
         "start": {"b": {"phi": 0, "origin": [0, 0.5], "velocity": [0, 0]}}}"#;
-    let found = trust(&parse_scene(text, "table.json", &[]).expect("a scene"), 20.0);
+    let found = trust(&parse_scene(text, "table.json", &[]).expect("a scene"), 40.0);
     assert!(found.lyapunov.is_some(), "{found:?}");
 }
 
