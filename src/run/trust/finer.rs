@@ -15,10 +15,12 @@ const FINER: f64 = 100.0;
 const ORDER: usize = 24;
 /// The order of those in doubles where powers of formulas or of friction are what a step costs.
 const ORDER_OF_FORMULAS: usize = 16;
-/// What is added to the order of those in doubles beside a series of the same order: where tables,
-/// transitions, events or the horizon end the steps of both they are the same, and of the same order they
-/// would have the same error.
-const ANOTHER_ORDER: usize = 4;
+/// The least order of those in doubles beside a series of the same order, and what is added to that order
+/// where tables, transitions, events or a horizon this near \[rad of the fastest mode\] end the steps of both:
+/// they are the same, and of the same order they would have the same error.
+const ANOTHER_ORDER: usize = 20;
+const HIGHER: usize = 4;
+const NEAR: f64 = 20.0;
 /// From which tolerance of a run on its rounding counts.
 const NEAR_ROUNDING: f64 = 1e-10;
 /// Tolerance \[rad/s\] of reference solutions in doubles: of runs that are not near rounding, at most, and of
@@ -114,7 +116,10 @@ fn in_doubles_at(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
     if let Some(own) = order(run).filter(|_| tolerance > FINEST)
         && order(&finer.plan) == Some(own)
     {
-        finer.plan.order = Some(own + ANOTHER_ORDER);
+        let tree = &mechanism.tree;
+        let is_near = || tree.is_dense() && run.until * tree.fastest_rate(&mechanism.springs) < NEAR;
+        let higher = if mechanism.is_switched() || is_near() { HIGHER } else { 0 };
+        finer.plan.order = Some((own + higher).max(ANOTHER_ORDER));
     }
     finer
 }
