@@ -16,8 +16,8 @@ const ORDER: usize = 24;
 /// The order of those in doubles where powers of formulas or of friction are what a step costs.
 const ORDER_OF_FORMULAS: usize = 16;
 /// The least order of those in doubles beside a series of the same order, and what is added to that order
-/// where tables, transitions, events or a horizon this near \[rad of the fastest mode\] end the steps of both:
-/// they are the same, and of the same order they would have the same error.
+/// where tables, transitions, events or a horizon this near \[rad of the fastest mode\] end the steps of
+/// both: they are the same, and of the same order they would have the same error.
 const ANOTHER_ORDER: usize = 20;
 const HIGHER: usize = 4;
 const NEAR: f64 = 20.0;
