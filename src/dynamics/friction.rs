@@ -319,8 +319,9 @@ pub(super) fn forces<T: Real>(
             change[j] = coefficient * size - tau[j];
             if round == ROUNDS {
                 let parts = (coefficient * size).value().abs() + tau[j].value().abs();
-                let rounding = ROUNDED * coefficient.value().abs() * largest(start, &response, tau);
-                goes_on |= change[j].value().abs() > UNSETTLED * parts + rounding;
+                let rounding = || ROUNDED * coefficient.value().abs() * largest(start, &response, tau);
+                let (left, settled) = (change[j].value().abs(), UNSETTLED * parts);
+                goes_on |= left > settled && left > settled + rounding();
             }
             for k in 0..f {
                 matrix[j * f + k] = -coefficient * along.dot(response(j, k));

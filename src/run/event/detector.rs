@@ -14,10 +14,6 @@ use crate::run::magnitude::changes;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// What the last coefficients of an interpolant may be over the largest value: so much, or the given share of
-/// the relative tolerance, by which the dense output of a step is not smooth itself.
-const RESOLVED: f64 = 1e-11;
-const SHARE: f64 = 0.1;
 /// Share of a step within which the event that began it does not happen again.
 pub(super) const SAME: f64 = 1e-9;
 /// Records of a kind kept: events, of which more are counted, and in many digits holds and transitions too.
@@ -71,8 +67,6 @@ pub(in crate::run) struct EventDetector {
     pub memory: EventMemory,
     /// Events of the scene that close joints and locks, and these.
     closers: Vec<(usize, Vec<String>)>,
-    /// What the last coefficients of an interpolant may be over its largest value.
-    pub(super) resolved: f64,
     /// The relative tolerance of the method, zero where it has none.
     pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
@@ -107,7 +101,6 @@ impl EventDetector {
         let laws = mechanism.laws.clone();
         let friction = FrictionWatch::new(&mechanism);
         let (memory, found, closers) = (EventMemory::default(), Vec::new(), Vec::new());
-        let resolved = RESOLVED;
         let mut detector = Self {
             events,
             laws,
@@ -115,7 +108,6 @@ impl EventDetector {
             friction,
             memory,
             closers,
-            resolved,
             tolerance: 0.0,
             undefined: None,
             found,
@@ -189,7 +181,6 @@ impl EventDetector {
     /// Looks at the steps of a method of this relative tolerance from now on.
     pub fn suit(&mut self, tolerance: Option<f64>) {
         self.tolerance = tolerance.unwrap_or_default();
-        self.resolved = RESOLVED.max(SHARE * self.tolerance);
     }
 
     /// Goes on with the places with friction in the modes of a mechanism.

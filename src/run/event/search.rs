@@ -11,6 +11,10 @@ use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolate
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
+/// What the last coefficients of an interpolant may be over the largest value: so much, or the given share of
+/// the relative tolerance, by which the dense output of a step is not smooth itself.
+const RESOLVED: f64 = 1e-11;
+const SHARE: f64 = 0.1;
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: the function has
 /// no zero there, whatever its other digits are.
 const CERTAIN: f64 = 1e-3;
@@ -73,6 +77,12 @@ impl StepPart<'_> {
     }
 }
 
+/// What the last coefficients of an interpolant may be over its largest value, beside a method of this
+/// tolerance.
+fn resolved(tolerance: f64) -> f64 {
+    RESOLVED.max(SHARE * tolerance)
+}
+
 /// Shares of a step at which it is looked whether a curve has left its zero, closer at the beginning.
 fn ahead() -> impl Iterator<Item = f64> {
     std::iter::successors(Some(0.0), |&step| Some(if step == 0.0 { SAME } else { 4.0 * step }))
@@ -109,7 +119,7 @@ impl EventDetector {
     ) {
         self.friction.iter().for_each(FrictionWatch::search);
         let at = |share: f64, row: &mut Vec<f64>| self.append_values(inside.at(begin + share * span), row);
-        let (resolved, largest) = (self.resolved, &self.memory.largest[..self.before_friction()]);
+        let (resolved, largest) = (resolved(self.tolerance), &self.memory.largest[..self.before_friction()]);
         let is_enough = |event: usize, curve: &Chebyshev| {
             let (off, most) = (curve.tail(), curve.most());
             let stays_at_zero = largest.get(event).is_some_and(|largest| most <= NO_VALUE * largest);
@@ -162,7 +172,7 @@ impl EventDetector {
         // impact may have carried it across.
         let other = if mode { -1 } else { 1 };
         let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
-        let mut left = is_there.then(|| left(curve, first, self.resolved)).flatten();
+        let mut left = is_there.then(|| left(curve, first, resolved(self.tolerance))).flatten();
         // What slides from rest may begin against its sense, by what the method leaves open: with equal
         // coefficients its velocity grows with the square of time.
         if let Owner::Friction(watch, function) = self.owner(event)
@@ -171,7 +181,7 @@ impl EventDetector {
             && off > 0.0
             && first.abs() <= CLEAR * off
         {
-            let least = CLEAR * off.max(first.abs()).max(self.resolved.max(NO_VALUE) * most);
+            let least = CLEAR * off.max(first.abs()).max(resolved(self.tolerance).max(NO_VALUE) * most);
             left = beyond(curve, least);
             if left.is_none() {
                 return;
@@ -184,7 +194,7 @@ impl EventDetector {
         largest[event] = largest[event].max(most);
         let is_behind = first == 0.0 || last.contains(&(event, part.begin));
         sides[event] = if is_behind { sign(next) } else { sign(first) };
-        let off = is_of_laws.then_some(self.resolved * most);
+        let off = is_of_laws.then_some(resolved(self.tolerance) * most);
         // Of what begins to slide, whose velocity is zero there, rounding is no passage.
         let from = left.filter(|_| !is_of_laws).unwrap_or(0.0);
         self.zeros(part, event, (from, off), all);
@@ -236,8 +246,11 @@ impl EventDetector {
         }
         // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
         let leaves = is_woken || begins || was_still && is_at_zero;
-        let from =
-            if leaves { left(part.curve, first, self.resolved).unwrap_or(0.0).max(LEAVES) } else { 0.0 };
+        let from = if leaves {
+            left(part.curve, first, resolved(self.tolerance)).unwrap_or(0.0).max(LEAVES)
+        } else {
+            0.0
+        };
         if leaves {
             *side = sign(part.curve.at(from)[0]);
         }
@@ -251,7 +264,7 @@ impl EventDetector {
     /// wall: on which side rounding has it there does not matter.
     fn end_at_zero(&mut self, part: &StepPart, event: usize, end: Time, all: &mut Vec<Passage>) {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
-        let off = self.resolved.max(NO_VALUE) * part.curve.most();
+        let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
         if *side != 0 && value.abs() <= off && sign(slope) == -*side {
             all.push(Passage { t: end, event, rises: *side < 0, jumps: false });
             *side = -*side;
@@ -294,7 +307,7 @@ impl EventDetector {
         (event, is_behind): (usize, bool),
         all: &mut Vec<Passage>,
     ) {
-        let off = self.resolved.max(NO_VALUE) * part.curve.most();
+        let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
         let (mut side, mut before) = (self.memory.sides[event], 0.0);
         let nodes = part.places.iter().zip(part.values).rev().skip(usize::from(is_behind));
         for (&node, &value) in nodes.filter(|(_, value)| value.abs() > off) {

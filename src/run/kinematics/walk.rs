@@ -167,12 +167,17 @@ impl DriveWalk {
 
     /// The largest rate, positions in units of length.
     fn fastest(&self) -> f64 {
-        (0..self.alpha.len()).map(|k| (self.omega(k) / self.size(k)).abs()).fold(0.0, f64::max)
+        (0..self.alpha.len()).map(|k| self.pace(k)).fold(0.0, f64::max)
     }
 
+    /// The coordinate whose rate that is; none where there are no coordinates.
     fn fastest_coordinate(&self) -> Option<usize> {
-        let pace = |k: &usize| (self.omega(*k) / self.size(*k)).abs();
-        (0..self.alpha.len()).max_by(|a, b| pace(a).total_cmp(&pace(b)))
+        (0..self.alpha.len()).max_by(|&a, &b| self.pace(a).total_cmp(&self.pace(b)))
+    }
+
+    /// The magnitude of the rate of coordinate `k`, of positions in units of length.
+    fn pace(&self, k: usize) -> f64 {
+        (self.omega(k) / self.size(k)).abs()
     }
 
     fn size(&self, k: usize) -> f64 {
