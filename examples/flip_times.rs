@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let vary = |bar: &str| Vary { name: format!("{bar}.phi"), from: -edge, to: edge, count: starts as u64 };
     let template = Template::read("examples/scenes/free.json".as_ref(), &[])?;
     let request = Request { until: Some(until), every: Some(until), rtol: Some(1e-9), ..Request::default() };
-    // V = -m g l (3 cos phi1 + cos phi2)/2: of the postures with a bar upright the lowest has the first
+    // V = -m g l (3 cos phi1 + cos phi2)/2: of the configurations with a bar upright the lowest has the first
     // hanging and the second up, V = -m g l.
     let is_too_low = |phi: &[f64]| 3.0 * phi[0].cos() + phi[1].cos() > 2.0;
     let plan = Sweep::new(&template, vec![vary("bar1"), vary("bar2")], &request)?

@@ -19,13 +19,13 @@ use trees::{Dice, tree};
 type C = Complex<f64>;
 
 /// Where the bodies of a scene are, as its own equations say.
-struct Posture {
+struct Configuration {
     mechanism: Mechanism,
     kernel: Kernel<f64>,
     translations: Vec<C>,
 }
 
-impl Posture {
+impl Configuration {
     fn new(scene: &Scene, motion: impl Fn(&Mechanism) -> Motion) -> Option<Self> {
         let mechanism = Mechanism::new(scene).ok()?;
         let phi: Vec<f64> = motion(&mechanism).phi.iter().map(|phi| phi.hi).collect();
@@ -76,7 +76,7 @@ fn law(value: f64, dice: &mut Dice) -> Law {
 }
 
 /// A tree with some of everything natural coordinates take: a body hung on nothing, pins, sliders and slots
-/// with and without a law of travel, locks, a motor, constant forces.  All of it fits the posture at the
+/// with and without a law of travel, locks, a motor, constant forces.  All of it fits the configuration at the
 /// start.
 fn mechanism(n: usize, seed: u64) -> Option<Scene> {
     let dice = &mut Dice::new(seed);
@@ -88,21 +88,21 @@ fn mechanism(n: usize, seed: u64) -> Option<Scene> {
         let loose = dice.pick(scene.hinges.len());
         scene.hinges.remove(loose);
     }
-    let posture = Posture::new(&scene, |mechanism| mechanism.start(&scene))?;
+    let configuration = Configuration::new(&scene, |mechanism| mechanism.start(&scene))?;
     let other =
         |bar: usize, dice: &mut Dice| Some(dice.pick(n + 1)).filter(|&other| other < n && other != bar);
     for extra in 0..1 + dice.pick(3) {
         let bar = dice.pick(n);
         let base = other(bar, dice);
         let point = Place { bar: Some(bar), point: [dice.within(-0.5, 0.5), dice.within(-0.5, 0.5)] };
-        let at = posture.at(point);
+        let at = configuration.at(point);
         let name = format!("extra{extra}");
         match dice.pick(5) {
-            0 => scene.hinges.push(Hinge { name, between: [point, posture.place(base, at)] }),
+            0 => scene.hinges.push(Hinge { name, between: [point, configuration.place(base, at)] }),
             1 | 2 => {
                 let (angle, travel) = (dice.within(-3.0, 3.0), dice.within(-0.5, 0.5));
-                let along = posture.direction(base, C::unit(angle));
-                let mut place = posture.place(base, at);
+                let along = configuration.direction(base, C::unit(angle));
+                let mut place = configuration.place(base, at);
                 place.point = [place.point[0] - travel * along.re, place.point[1] - travel * along.im];
                 let rail = Rail { place, direction: [along.re, along.im] };
                 if dice.pick(3) == 0 {

@@ -54,7 +54,7 @@ fn bar(k: usize, mass: f64, centre: [f64; 2], inertia: f64) -> Bar {
     Bar { name: format!("bar{}", k + 1), length: 0.5, mass, centre, inertia }
 }
 
-/// Eight equal bars in a row, let go from a bent posture.
+/// Eight equal bars in a row, let go from a bent configuration.
 fn chain() -> Scene {
     let mut scene = free();
     let point = |k: usize| if k == 0 { place(None, [0.0, 0.0]) } else { place(Some(k - 1), [0.5, 0.0]) };

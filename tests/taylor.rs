@@ -412,7 +412,7 @@ impl FourBar {
 
     /// Angles of all bars at a crank angle, and their rates at crank rate one, from the triangle of coupler
     /// and rocker.
-    fn posture(&self, q: f64) -> ([f64; 3], [f64; 3]) {
+    fn configuration(&self, q: f64) -> ([f64; 3], [f64; 3]) {
         let [a, b, c] = self.length;
         let elbow = [a * q.cos(), a * q.sin()];
         let gap = [Self::GROUND[0] - elbow[0], Self::GROUND[1] - elbow[1]];
@@ -430,7 +430,7 @@ impl FourBar {
 
     /// Energy at crank rate one, half the effective inertia, and potential energy.
     fn energies(&self, q: f64) -> (f64, f64) {
-        let (phi, rate) = self.posture(q);
+        let (phi, rate) = self.configuration(q);
         let arm = |k: usize, share: f64| {
             [share * self.length[k] * phi[k].cos(), share * self.length[k] * phi[k].sin()]
         };
@@ -475,7 +475,7 @@ impl FourBar {
     fn mechanism(&self, q: f64, rate: f64) -> (Arc<Mechanism>, Motion) {
         let mut scene = common::pendulum(0.0, 0.0);
         scene.gravity = [9.81, 0.0];
-        let (phi, rates) = self.posture(q);
+        let (phi, rates) = self.configuration(q);
         scene.bars.clear();
         scene.hinges.clear();
         scene.start.clear();
@@ -558,7 +558,7 @@ fn a_closed_loop_keeps_time_with_its_one_degree_of_freedom() {
         assert!(crank > 9.0, "{crank}");
         let time = FOUR_BAR.time(0.4, crank, energy);
         assert!((time - until).abs() < 2e-12, "{:e} s off", time - until);
-        let (phi, rates) = FOUR_BAR.posture(crank);
+        let (phi, rates) = FOUR_BAR.configuration(crank);
         for k in 0..3 {
             assert!(
                 (Complex::unit(phi[k]) - Complex::unit(last.phi[k].hi)).norm_squared().sqrt() < 1e-13,

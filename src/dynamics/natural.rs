@@ -30,7 +30,7 @@
 pub mod columns;
 pub mod coupling;
 mod guide;
-pub mod keeper;
+pub mod projection;
 mod reduced;
 
 use coupling::GuideCoupling;

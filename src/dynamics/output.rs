@@ -366,9 +366,9 @@ fn tension<'a>(
         return along(spring.force(&kernel.z, omega));
     }
     if let Some(law) = mechanism.forces.iter().find(|force| force.name == name) {
-        let posture = ConstraintArguments { phi: at.winding, z: &kernel.z, omega };
+        let configuration = ConstraintArguments { phi: at.winding, z: &kernel.z, omega };
         let mut pulls = [Complex::ZERO; 2];
-        law.forces(time.hi, posture, |body, force| {
+        law.forces(time.hi, configuration, |body, force| {
             if let Some(end) = ends.iter().position(|end| end.body == Some(body)) {
                 pulls[end] += force;
             }

@@ -144,7 +144,7 @@ impl<C: Real> Quadratic<C> {
         self.bilinear.iter().fold(sum, |sum, &(j, k, h)| sum + rate(j).dot(rate(k).turn(h)).scale(2.0))
     }
 
-    /// What a row with C = Q - s(t) is at this posture, without s; adds its Jacobian to `jacobian`.
+    /// What a row with C = Q - s(t) is at this configuration, without s; adds its Jacobian to `jacobian`.
     #[inline]
     pub fn linearise<T: Real + Over<C>>(
         &self,

@@ -2,9 +2,9 @@
 //! to act.
 
 use super::build::build;
+use super::closing;
 use super::contact::{ContactDriver, Jump, Switch, in_modes};
 use super::event::{Action, Change, EventDetector, SwitchFunction};
-use super::latch;
 use super::monitor::Monitor;
 use super::running::Outcome;
 use crate::arithmetic::shown::about;
@@ -168,7 +168,7 @@ impl ContactDriver {
         };
         let mut held = self.mechanism.held.clone();
         held.retain(|&contact| !free.contacts[contact].is_off && stays(&free, contact, &after));
-        if let Err((what, hint)) = latch::close([&self.free, &free], &mut held, &mut after) {
+        if let Err((what, hint)) = closing::close([&self.free, &free], &mut held, &mut after) {
             return Err(refused(self, what, hint));
         }
         if let Some(what) = broken([(&*self.free, &before), (&*free, &after)]) {
@@ -181,7 +181,7 @@ impl ContactDriver {
         if held != self.mechanism.held {
             self.record(&held, after.time.hi, outcome);
         }
-        let modes = latch::modes(&free, &self.mechanism.modes, &held);
+        let modes = closing::modes(&free, &self.mechanism.modes, &held);
         self.mechanism = in_modes(&free, &held, &modes);
         if let Some(events) = &mut self.events {
             // What joints do that close here, by the parameters that hold from here on.

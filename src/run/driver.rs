@@ -4,9 +4,9 @@
 //! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) to output times.
 
 use super::flip::{self, FlipDetector};
-use super::inside::{Inside, StepWatcher};
 use super::monitor::Monitor;
-use super::shrink::SpringGuard;
+use super::observer::{Inside, StepWatcher};
+use super::spring_guard::SpringGuard;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{BodyAngles, Form, Motion, MotionPowers, State, Time};

@@ -8,8 +8,8 @@
 
 mod parts;
 
-use super::inside::{Inside, StepWatcher};
-use super::magnitude::changes;
+use super::observer::{Inside, StepWatcher};
+use super::rounding::changes;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch, Outputs};

@@ -23,6 +23,8 @@ pub mod choice;
 #[doc(hidden)]
 pub mod clock;
 #[doc(hidden)]
+mod closing;
+#[doc(hidden)]
 pub mod compare;
 #[doc(hidden)]
 pub mod contact;
@@ -50,19 +52,17 @@ pub mod flip;
 #[doc(hidden)]
 pub mod friction;
 mod impact_monitor;
-#[doc(hidden)]
-pub mod inside;
 pub mod kinematics;
-#[doc(hidden)]
-mod latch;
-mod magnitude;
 pub mod methods;
 pub mod modes;
 mod monitor;
 #[doc(hidden)]
+pub mod observer;
+#[doc(hidden)]
 pub mod plan;
 #[doc(hidden)]
 pub mod reference;
+mod rounding;
 #[doc(hidden)]
 pub mod running;
 mod saltation;
@@ -70,7 +70,7 @@ mod saltation;
 pub mod sample;
 #[doc(hidden)]
 pub mod sensitivity;
-mod shrink;
+mod spring_guard;
 #[doc(hidden)]
 pub mod stress;
 #[doc(hidden)]
@@ -105,10 +105,10 @@ pub use fast::FastMode;
 pub use files::{FileError, Folder, Stream, StreamPosition};
 pub use flip::Flip;
 pub use friction::FrictionRecord;
-pub use inside::{Observer, Step};
 pub use kinematics::{Kinematics, kinematics};
 pub use methods::{METHODS, MethodId, MethodInfo, Stabilization};
 pub use modes::{Modes, modes};
+pub use observer::{Observer, Step};
 pub use plan::{Plan, Request, RequestRefusal};
 pub use reference::{Reference, reference};
 pub use running::{Outcome, ResumeError, Run, RunError, Running, Snapshot, integrate, simulate};

@@ -26,10 +26,10 @@ mod together;
 pub(super) use finer::{Difference, DistanceLevel, agreeing};
 pub(super) use side::Side;
 
+use super::closing::plastic;
 use super::contact::{Flight, Jump, Switch, come_to_rest};
 use super::event::SwitchFunction;
 use super::friction::FrictionWatch;
-use super::latch::plastic;
 use crate::dynamics::friction::FrictionMode;
 use crate::dynamics::{Mechanism, Motion};
 use std::sync::Arc;

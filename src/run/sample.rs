@@ -216,8 +216,9 @@ impl Sampler {
         });
         for (r, row) in mechanism.constraints.iter().enumerate() {
             self.jacobian.fill(DoubleDouble::ZERO);
-            let posture = ConstraintArguments { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };
-            let here = row.linearise(motion.time, posture, &mut self.jacobian);
+            let configuration =
+                ConstraintArguments { phi: &motion.phi, z: &self.exact.z, omega: &motion.omega };
+            let here = row.linearise(motion.time, configuration, &mut self.jacobian);
             let rate = self.jacobian.iter().zip(&motion.omega).fold(here.drive, |sum, (&g, &w)| sum + g * w);
             sample.constraints[r] = [here.position.hi, rate.hi];
             let force = -self.plain.multiplier[r];

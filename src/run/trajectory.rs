@@ -1,6 +1,6 @@
 //! A whole motion as a function of time: Chebyshev interpolants of the dense output of every step.
 
-use super::inside::{Observer, Step};
+use super::observer::{Observer, Step};
 use super::running::Outcome;
 use super::sample::Sample;
 use crate::dynamics::{Motion, Time};

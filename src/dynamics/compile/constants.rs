@@ -70,7 +70,7 @@ fn long_constants(bodies: &[Body], forest: &Forest, gravity: Complex<f64>) -> Tr
     Tree { coordinates: n, angles: bodies.len(), coupling: Vec::new(), diagonal, weight, off_axis }
 }
 
-/// Postures that are tried besides the start: so much of a turn, or metres, from it.
+/// Configurations that are tried besides the start: so much of a turn, or metres, from it.
 const SHIFTS: [f64; 3] = [0.0, 0.3, 1.1];
 /// Slope of a constraint that counts as none.
 const NO_SLOPE: f64 = 1e-12;

@@ -108,7 +108,7 @@ impl<C: Real> Aim<C> {
         })
     }
 
-    /// What it comes to at a time [s] and a posture: all results of its tape.
+    /// What it comes to at a time [s] and a configuration: all results of its tape.
     pub fn at<T: Over<C>, R>(&self, time: T, at: ConstraintArguments<T>, then: impl FnOnce(&[T]) -> R) -> R {
         let input = |number: u32| match self.inputs[number as usize] {
             AimInput::Number(number) => T::constant(self.numbers[number]),
@@ -347,7 +347,7 @@ impl<C: Real> ConfigurationSource<Symbol, C> for AimRecorder<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::constraint::tests::{assert_derivatives, free, posture, rod};
+    use crate::dynamics::constraint::tests::{assert_derivatives, configuration, free, rod};
     use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
     use crate::dynamics::quadratic::Quadratic;
     use std::sync::Arc;
@@ -369,7 +369,7 @@ mod tests {
             aim: Some(Arc::new(aim.expect("a formula of place"))),
         };
         assert_derivatives(&row);
-        let (phi, z, omega) = posture(0.0);
+        let (phi, z, omega) = configuration(0.0);
         let mut jacobian = vec![Default::default(); 4];
         row.linearise(
             Default::default(),

@@ -340,7 +340,7 @@ pub(super) mod tests {
     const ACCELERATION: [f64; 4] = [0.3, 2.0, -0.6, 1.1];
 
     /// Coordinates, elements and rates of two bodies and an origin in uniformly accelerated motion.
-    pub fn posture(t: f64) -> (Vec<DoubleDouble>, Vec<Complex<DoubleDouble>>, Vec<DoubleDouble>) {
+    pub fn configuration(t: f64) -> (Vec<DoubleDouble>, Vec<Complex<DoubleDouble>>, Vec<DoubleDouble>) {
         let (of, t) = (DoubleDouble::of, DoubleDouble::of(t));
         let phi: Vec<_> =
             (0..4).map(|k| of(START[k]) + t.scale(RATE[k]) + (t * t).scale(0.5 * ACCELERATION[k])).collect();
@@ -353,7 +353,7 @@ pub(super) mod tests {
     /// Jacobian, drive and convective term against differences of the row's own C along a motion.
     pub fn assert_derivatives(row: &ConstraintEquation) {
         let at = |t: f64| {
-            let (phi, z, omega) = posture(t);
+            let (phi, z, omega) = configuration(t);
             let mut jacobian = [DoubleDouble::ZERO; 4];
             let here = row.linearise(
                 DoubleDouble::of(t),

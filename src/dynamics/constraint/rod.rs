@@ -35,7 +35,7 @@ pub fn rod_equation<C: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::dynamics::constraint::tests::{assert_derivatives, crank, free, posture, rod};
+    use crate::dynamics::constraint::tests::{assert_derivatives, configuration, crank, free, rod};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
@@ -47,7 +47,7 @@ mod tests {
     #[test]
     fn it_measures_the_distance() {
         let (a, b) = (rod(), free());
-        let (_, z, _) = posture(0.3);
+        let (_, z, _) = configuration(0.3);
         let distance = a.point.minus(&b.point).position(&z).norm_squared().hi.sqrt();
         assert!(rod_equation("rod", &a, &b, distance, 2).gap(&z).hi.abs() < 1e-15);
         assert!((rod_equation("rod", &a, &b, distance - 1e-6, 2).gap(&z).hi - 1e-6).abs() < 1e-11);

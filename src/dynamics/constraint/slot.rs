@@ -49,7 +49,7 @@ mod tests {
     use super::*;
     use crate::arithmetic::Scalar;
     use crate::dynamics::constraint::ConstraintArguments;
-    use crate::dynamics::constraint::tests::{assert_derivatives, crank, free, law, posture, rod};
+    use crate::dynamics::constraint::tests::{assert_derivatives, configuration, crank, free, law, rod};
 
     #[test]
     fn its_derivatives_are_those_of_its_position() {
@@ -62,7 +62,7 @@ mod tests {
     fn its_convective_term_is_that_of_the_turning_line() {
         let (normal, point, origin_point) = (Complex::new(-0.6, 0.8), rod(), crank());
         let row = slot_equation("slot", &point, 0, &origin_point, normal, None, 2);
-        let (phi, z, omega) = posture(0.3);
+        let (phi, z, omega) = configuration(0.3);
         let mut jacobian = vec![Default::default(); 4];
         let here = row.linearise(
             Default::default(),

@@ -114,11 +114,11 @@ impl Mechanism {
     /// The relative velocity \[rad/s, m/s\] of every place, zero where it is rounding.
     fn sliding_rates(&self, at: FrictionMoment) -> Vec<f64> {
         let mut row = vec![0.0; at.phi.len()];
-        let posture = ConstraintArguments { phi: at.phi, z: at.z, omega: at.omega };
+        let configuration = ConstraintArguments { phi: at.phi, z: at.z, omega: at.omega };
         (self.frictions.iter().enumerate())
             .map(|(number, friction)| {
                 row.fill(0.0);
-                let here = friction.tangent.differentiate(at.t, posture, &mut row);
+                let here = friction.tangent.differentiate(at.t, configuration, &mut row);
                 let rate = dot(&row, at.omega) + here.drive;
                 let parts: f64 = row.iter().zip(at.omega).map(|(d, omega)| (d * omega).abs()).sum();
                 let size = parts.max(self.speed_unit(number));
@@ -145,11 +145,11 @@ impl Evidence for InDoubles<'_> {
         let pressures = closed.iter().zip(&kernel.multiplier[mechanism.standing_rows()..]);
         let pressure = |(&contact, &multiplier): (&usize, &f64)| free.contacts[contact].pressure(multiplier);
         let pressures = pressures.map(pressure).map(|pressure| sign(pressure, ROUNDING)).collect();
-        let posture = ConstraintArguments { phi: at.phi, z: at.z, omega: at.omega };
+        let configuration = ConstraintArguments { phi: at.phi, z: at.z, omega: at.omega };
         let mut row = vec![0.0; at.phi.len()];
         let mut acceleration = |of: &super::ConstraintEquation| {
             row.fill(0.0);
-            let here = of.differentiate(at.t, posture, &mut row);
+            let here = of.differentiate(at.t, configuration, &mut row);
             let parts = row.iter().zip(&kernel.load).map(|(g, a)| (g * a).abs()).sum::<f64>();
             (dot(&row, &kernel.load) + here.convective, parts + here.convective.abs())
         };

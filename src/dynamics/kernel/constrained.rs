@@ -24,7 +24,7 @@ impl<T: Real> Kernel<T> {
             self.vibrate::<N>(mechanism, vibration);
         }
         let is_biased = bias != Bias::default();
-        let posture = ConstraintArguments { phi, z: &self.z[..n], omega };
+        let configuration = ConstraintArguments { phi, z: &self.z[..n], omega };
         let (all, multiplier, correction) =
             (&mut self.jacobian[..rows * n], &mut self.multiplier[..rows], &mut self.correction[..rows]);
         let load = &mut self.load[..n];
@@ -35,9 +35,9 @@ impl<T: Real> Kernel<T> {
             }
             // Only a bias asks for C.
             let here = if is_biased {
-                row.linearise(t, posture, jacobian)
+                row.linearise(t, configuration, jacobian)
             } else {
-                row.differentiate(t, posture, jacobian)
+                row.differentiate(t, configuration, jacobian)
             };
             multiplier[r] = dot(jacobian, load) + here.convective;
             correction[r] = T::ZERO;
@@ -83,14 +83,14 @@ impl<T: Real> Kernel<T> {
     /// C, G, C_t, gamma of every row, and nothing else.
     pub fn rows_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) {
         let n = mechanism.tree.coordinates;
-        let posture = ConstraintArguments { phi, z: &self.z, omega };
+        let configuration = ConstraintArguments { phi, z: &self.z, omega };
         if let Some(bodywise) = &mut self.bodywise {
-            bodywise.rows_at(mechanism, t, posture, &mut self.rows);
+            bodywise.rows_at(mechanism, t, configuration, &mut self.rows);
             return;
         }
         self.jacobian.fill(T::ZERO);
         for (r, row) in mechanism.constraints.iter().enumerate() {
-            self.rows[r] = row.linearise(t, posture, &mut self.jacobian[r * n..(r + 1) * n]);
+            self.rows[r] = row.linearise(t, configuration, &mut self.jacobian[r * n..(r + 1) * n]);
         }
     }
 

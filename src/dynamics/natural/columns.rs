@@ -1,5 +1,5 @@
-//! The natural form of a few bodies in lanes, one a body: what depends on the posture, and the solve with one
-//! row a body.
+//! The natural form of a few bodies in lanes, one a body: what depends on the configuration, and the
+//! solve with one row a body.
 //!
 //! ```text
 //! u_j = W_·j z_j   (column j),    S_kj = z_k·u_kj,    T_kj = (i z_k)·u_kj

@@ -1,10 +1,10 @@
-//! Passes over the trees for power series, which ask the same posture for one order after another.
+//! Passes over the trees for power series, which ask the same configuration for one order after another.
 //!
 //! ```text
 //! R = H x + (forces taken off), without the diagonal of H:    outwards  A_k = A_p + r_k x_p;
 //!     inwards  G_k = c_k x_k + Σ G_j,  R_k = conj(c_k) A_k + Σ conj(r_j) G_j
 //! M alpha = Q - Im(conj(z) R):     inwards   e_k = Q_k - z_k × R_k - Σ (u_j·F_j + b_j e_j),
-//!     F_k = Σ (F_j + s_j e_j)          with s = h/d, b = u·s of the posture
+//!     F_k = Σ (F_j + s_j e_j)          with s = h/d, b = u·s of the configuration
 //!                                  outwards  alpha_k = e_k/d - s_k·a_p - b_k alpha_p,
 //!                                      a_k = a_p + u_k alpha_p
 //! ```
@@ -17,7 +17,7 @@
 use super::{Links, Recursive};
 use crate::arithmetic::{Complex, Real};
 
-/// A body's constants at a posture.
+/// A body's constants at a configuration.
 #[derive(Clone, Copy, Debug, Default)]
 struct Brace<T> {
     /// u \[m\].
@@ -61,7 +61,7 @@ pub struct InwardRequest<'a, T> {
     pub load: &'a [T],
 }
 
-/// The passes of one posture; nothing is allocated after [`Passes::new`].
+/// The passes of one configuration; nothing is allocated after [`Passes::new`].
 #[derive(Clone, Debug)]
 pub struct Passes<T> {
     /// Σ m gamma of the ground, then of the bodies \[kg·m\].
@@ -89,7 +89,7 @@ impl<T: Real> Passes<T> {
         }
     }
 
-    /// Takes the posture of the last [`Recursive::inward_pass`].
+    /// Takes the configuration of the last [`Recursive::inward_pass`].
     pub fn unit_vectors(&mut self, links: &Links, trees: &Recursive<T>) {
         for ((brace, place), link) in self.braces.iter_mut().zip(&trees.places).zip(&links.links).skip(1) {
             let joint = &trees.joints[link.body];

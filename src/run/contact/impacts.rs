@@ -46,11 +46,16 @@ impl ContactDriver {
         for _ in 0..ROUNDS {
             let mut quiet = true;
             for number in 0..self.free.contacts.len() {
-                let posture = self.present_state();
+                let configuration = self.present_state();
                 let contact = &self.free.contacts[number];
-                let approach = -contact.gap_rate(posture.t, &posture.phi, &posture.z, &posture.omega);
-                let is_met = contact.touches(posture.t, &posture.phi, &posture.z)
-                    && approach > self.no_speed(number, &posture.omega).max(NO_SPEED * hardest);
+                let approach = -contact.gap_rate(
+                    configuration.t,
+                    &configuration.phi,
+                    &configuration.z,
+                    &configuration.omega,
+                );
+                let is_met = contact.touches(configuration.t, &configuration.phi, &configuration.z)
+                    && approach > self.no_speed(number, &configuration.omega).max(NO_SPEED * hardest);
                 if is_met && !self.mechanism.held.contains(&number) {
                     hardest = hardest.max(self.impact_at(number, &[], outcome)?);
                     quiet = false;

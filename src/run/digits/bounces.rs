@@ -1,11 +1,11 @@
 //! Bounces that are left out of a motion in many digits, where they are not alike: each is followed, see
 //! [`bounces`](crate::dynamics::contact::bounces).
 
+use super::coordinates::DigitsCoordinates;
 use super::evidence::{InDigits, gradient, second};
 use super::friction::first_powers;
 use super::friction_impact;
 use super::motion::DigitsMotion;
-use super::posture::DigitsCoordinates;
 use super::wall::gap_rate_at;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::Digits;
@@ -36,7 +36,7 @@ pub(super) fn all<const W: usize>(
     others: &[usize],
     modes: &[FrictionMode],
 ) -> Option<Bounced<Digits<W>>> {
-    let DigitsCoordinates { phi, omega, .. } = motion.state_posture();
+    let DigitsCoordinates { phi, omega, .. } = motion.state_coordinates();
     let start = FlightMoment { late: Digits::ZERO, phi, omega };
     let restitution = motion.mechanism.walls[wall].1;
     bounces::all(&DigitsFlight { motion, wall, others }, start, modes, restitution, libm::exp2(FOLLOWED))
@@ -44,7 +44,7 @@ pub(super) fn all<const W: usize>(
 
 impl<'a, const W: usize> DigitsFlight<'a, W> {
     /// All coordinates at a moment.
-    fn posture(&self, at: &FlightMoment<Digits<W>>) -> DigitsCoordinates<W> {
+    fn coordinates(&self, at: &FlightMoment<Digits<W>>) -> DigitsCoordinates<W> {
         let (phi, omega) = (at.phi.clone(), at.omega.clone());
         DigitsCoordinates { phi, omega, work: [Digits::ZERO; 2], lost: Digits::ZERO }
     }
@@ -52,13 +52,13 @@ impl<'a, const W: usize> DigitsFlight<'a, W> {
     /// What is known of a moment.
     fn evidence(&self, at: &FlightMoment<Digits<W>>) -> InDigits<'a, W> {
         let t = self.motion.state().t + at.late;
-        InDigits::at(self.motion, t, self.posture(at), self.motion.precision.rounding(SURE))
+        InDigits::at(self.motion, t, self.coordinates(at), self.motion.precision.rounding(SURE))
     }
 }
 
 impl<const W: usize> Bouncing<Digits<W>> for DigitsFlight<'_, W> {
     fn rebound(&self, at: &FlightMoment<Digits<W>>) -> Digits<W> {
-        gap_rate_at(self.motion, self.wall, self.motion.state().t + at.late, &self.posture(at)).rate
+        gap_rate_at(self.motion, self.wall, self.motion.state().t + at.late, &self.coordinates(at)).rate
     }
 
     fn modes(
@@ -92,10 +92,10 @@ impl<const W: usize> Bouncing<Digits<W>> for DigitsFlight<'_, W> {
     }
 
     fn strike(&self, at: &FlightMoment<Digits<W>>) -> Option<(Vec<Digits<W>>, Digits<W>)> {
-        let (t, posture) = (self.motion.state().t + at.late, self.posture(at));
-        let gap = gap_rate_at(self.motion, self.wall, t, &posture);
+        let (t, coordinates) = (self.motion.state().t + at.late, self.coordinates(at));
+        let gap = gap_rate_at(self.motion, self.wall, t, &coordinates);
         let (jump, pulls) =
-            friction_impact::jump_at(self.motion, (t, &posture), self.others, self.wall, &gap).ok()?;
+            friction_impact::jump_at(self.motion, (t, &coordinates), self.others, self.wall, &gap).ok()?;
         let structure = &self.motion.mechanism.structure;
         // What is pulled would be let go, and what rubs takes part.
         let takes_part = |(&other, pull): (&usize, &Digits<W>)| {

@@ -180,8 +180,8 @@ impl<const W: usize> EventWatch<W> {
     fn happening(&self, motion: &DigitsMotion<W>) -> impl Iterator<Item = Happened<W>> {
         let happens = |&EventAhead { event, after, .. }: &EventAhead<W>| {
             let t = motion.state().t + after;
-            let posture = motion.at(t);
-            Happened { event, t, phi: posture.phi, omega: posture.omega }
+            let coordinates = motion.at(t);
+            Happened { event, t, phi: coordinates.phi, omega: coordinates.omega }
         };
         self.ahead.iter().take(KEPT.saturating_sub(self.happened.len())).map(happens)
     }

@@ -1,10 +1,10 @@
 //! What many digits tell of a combination of modes of places with dry friction: accelerations, forces and
 //! relative velocities, of which what is rounding in three quarters of the digits is zero.
 
+use super::coordinates::DigitsCoordinates;
 use super::friction::SURE;
-use super::keep::DigitsKeeper;
 use super::motion::DigitsMotion;
-use super::posture::DigitsCoordinates;
+use super::projection::DigitsProjection;
 use super::wall::gap;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
@@ -30,7 +30,7 @@ pub(super) struct InDigits<'a, const W: usize> {
     /// Time \[s\].
     pub t: Digits<W>,
     /// All coordinates.
-    pub posture: DigitsCoordinates<W>,
+    pub coordinates: DigitsCoordinates<W>,
     z: Vec<Complex<Digits<W>>>,
     /// Where each place sticks, if it does.
     anchors: Vec<Digits<W>>,
@@ -40,24 +40,24 @@ pub(super) struct InDigits<'a, const W: usize> {
 
 impl<'a, const W: usize> InDigits<'a, W> {
     pub fn of(motion: &'a DigitsMotion<W>) -> Self {
-        Self::at(motion, motion.state.t, motion.state_posture(), motion.precision.rounding(SURE))
+        Self::at(motion, motion.state.t, motion.state_coordinates(), motion.precision.rounding(SURE))
     }
 
     /// What is known of another time and other coordinates.
     pub fn at(
         motion: &'a DigitsMotion<W>,
         t: Digits<W>,
-        posture: DigitsCoordinates<W>,
+        coordinates: DigitsCoordinates<W>,
         rounding: f64,
     ) -> Self {
         let mechanism = &motion.mechanism;
-        let z = mechanism.elements(&posture.phi);
+        let z = mechanism.elements(&coordinates.phi);
         let anchor = |(friction, mode): (&CompiledFriction<Digits<W>>, &FrictionMode<Digits<W>>)| match mode {
             FrictionMode::Stick(at) => *at,
-            _ => friction.displacement(&posture.phi, &z),
+            _ => friction.displacement(&coordinates.phi, &z),
         };
         let anchors = mechanism.frictions.iter().zip(&mechanism.acting.sliding).map(anchor).collect();
-        Self { motion, t, posture, z, anchors, rounding }
+        Self { motion, t, coordinates, z, anchors, rounding }
     }
 
     /// Modes with the displacements of what sticks in all digits.
@@ -78,7 +78,7 @@ impl<'a, const W: usize> InDigits<'a, W> {
 
     /// The first powers of the motion in these modes.
     pub fn series(&self, mechanism: &ExactMechanism<Digits<W>>) -> Series<Digits<W>> {
-        let DigitsCoordinates { phi, omega, .. } = &self.posture;
+        let DigitsCoordinates { phi, omega, .. } = &self.coordinates;
         let mut series = Series::of_terms(&mechanism.terms(), Coordinates::All, POWERS);
         series.resolve_reversals(self.rounding);
         let zeros = vec![Digits::ZERO; phi.len()];
@@ -147,7 +147,7 @@ pub(super) fn gradient<const W: usize>(
 
 impl<const W: usize> Evidence for InDigits<'_, W> {
     fn rates(&self) -> Vec<f64> {
-        (0..self.anchors.len()).map(|place| self.rate(place, &self.posture.omega)).collect()
+        (0..self.anchors.len()).map(|place| self.rate(place, &self.coordinates.omega)).collect()
     }
 
     fn told(&self, closed: &[usize], modes: &[FrictionMode], touching: &[usize]) -> Option<ContactSigns> {
@@ -209,7 +209,7 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         load: &[f64],
     ) -> Option<ContactSigns> {
         let moment = Digits::of(libm::exp2(A_MOMENT) * self.motion.mechanism.structure.units.time);
-        let mut later = self.posture.clone();
+        let mut later = self.coordinates.clone();
         for ((phi, omega), &load) in later.phi.iter_mut().zip(&mut later.omega).zip(load) {
             let change = Digits::of(load) * moment;
             *phi += (*omega + change.scale(0.5)) * moment;
@@ -229,9 +229,9 @@ impl<const W: usize> Evidence for InDigits<'_, W> {
         let Some(mechanism) = self.mechanism(closed, &vec![FrictionMode::Open; self.anchors.len()]) else {
             return false;
         };
-        let DigitsCoordinates { phi, mut omega, .. } = self.posture.clone();
-        let mut keeper = DigitsKeeper::new(&mechanism, self.motion.precision);
-        keeper.close(&mechanism, self.t, &phi, &mut omega);
+        let DigitsCoordinates { phi, mut omega, .. } = self.coordinates.clone();
+        let mut projection = DigitsProjection::new(&mechanism, self.motion.precision);
+        projection.close(&mechanism, self.t, &phi, &mut omega);
         self.rate(place, &omega) == 0.0
     }
 }

@@ -6,10 +6,10 @@
 //! of geometry, is told in doubles.  A place that sticks is a row like any other, the last ones.
 
 use super::bounces;
+use super::coordinates::DigitsCoordinates;
 use super::evidence::{InDigits, gradient, second};
-use super::keep::DigitsKeeper;
 use super::motion::{DigitsMotion, LongState};
-use super::posture::DigitsCoordinates;
+use super::projection::DigitsProjection;
 use super::resting;
 use super::wall::{GapRate, distance, gap_rate};
 use crate::arithmetic::digits::Digits;
@@ -129,11 +129,11 @@ impl<const W: usize> DigitsMotion<W> {
     fn seen_in_doubles<R>(
         &self,
         t: Digits<W>,
-        posture: &DigitsCoordinates<W>,
+        coordinates: &DigitsCoordinates<W>,
         tell: impl FnOnce(FrictionMoment) -> R,
     ) -> R {
         let in_doubles = |x: &[Digits<W>]| -> Vec<f64> { x.iter().map(|x| x.value()).collect() };
-        let (phi, omega) = (in_doubles(&posture.phi), in_doubles(&posture.omega));
+        let (phi, omega) = (in_doubles(&coordinates.phi), in_doubles(&coordinates.omega));
         let z = self.mechanism.structure.elements(&phi);
         tell(FrictionMoment { t: Time::from(t.value()), phi: &phi, z: &z, omega: &omega })
     }
@@ -141,7 +141,7 @@ impl<const W: usize> DigitsMotion<W> {
     /// True where motors and locks hold a place, whose velocity friction has no part in.
     pub(super) fn is_driven(&self, place: usize) -> bool {
         let structure = &self.mechanism.structure;
-        self.seen_in_doubles(self.state.t, &self.state_posture(), |at| structure.is_driven(at, place))
+        self.seen_in_doubles(self.state.t, &self.state_coordinates(), |at| structure.is_driven(at, place))
     }
 
     /// The walls that hold a point and the modes of all places from the present moment on; of walls those
@@ -172,7 +172,7 @@ impl<const W: usize> DigitsMotion<W> {
         contacts: [&[usize]; 2],
         transition: Transition,
     ) -> Result<Modes, Paradox> {
-        self.seen_in_doubles(evidence.t, &evidence.posture, |at| {
+        self.seen_in_doubles(evidence.t, &evidence.coordinates, |at| {
             self.mechanism.structure.modes_by(evidence, at, before, contacts, transition)
         })
     }
@@ -248,7 +248,7 @@ impl<const W: usize> DigitsMotion<W> {
         };
         let modes: Vec<FrictionMode> = self.mechanism.frictions.iter().zip(modes).map(mode).collect();
         if let Some(bounced) = bounces::all(self, wall, &others, &modes) {
-            return Some((bounced.last, bounced.mean(&evidence.posture.omega)));
+            return Some((bounced.last, bounced.mean(&evidence.coordinates.omega)));
         }
         let mechanism = evidence.mechanism(&others, &modes)?;
         let series = evidence.series(&mechanism);
@@ -305,13 +305,13 @@ impl<const W: usize> DigitsMotion<W> {
         let modes = acting.sliding.iter().map(kept).collect();
         let rest = self.mechanism.with(Acting { held, sliding: modes, ..acting.clone() });
         let rest = rest.map_err(|error| self.cannot_go_on(&error, "look at that formula"))?;
-        let mut keeper = DigitsKeeper::new(&rest, self.precision);
-        let DigitsCoordinates { phi, mut omega, .. } = self.state_posture();
-        let (mut work, _) = keeper.close(&rest, t, &phi, &mut omega);
+        let mut projection = DigitsProjection::new(&rest, self.precision);
+        let DigitsCoordinates { phi, mut omega, .. } = self.state_coordinates();
+        let (mut work, _) = projection.close(&rest, t, &phi, &mut omega);
         let z = self.mechanism.elements(&phi);
         // Points that what sticks holds along their normals have nothing to be taken off.
         let mut is_free = |gap: &GapRate<W>| {
-            let (response, _) = keeper.response(&rest, t, [&phi, &omega], &gap.gradient);
+            let (response, _) = projection.response(&rest, t, [&phi, &omega], &gap.gradient);
             !response.iter().all(Digits::is_zero)
         };
         let (places, gaps): (Vec<usize>, Vec<_>) = (sliding.iter())
@@ -325,7 +325,7 @@ impl<const W: usize> DigitsMotion<W> {
             gap.gradient.iter().zip(along).map(|(&g, along)| g - coefficient * along).collect::<Vec<_>>()
         });
         let responses: Vec<Vec<Digits<W>>> =
-            pushes.map(|push| keeper.response(&rest, t, [&phi, &omega], &push).0).collect();
+            pushes.map(|push| projection.response(&rest, t, [&phi, &omega], &push).0).collect();
         let entry = |gap: &GapRate<W>| {
             responses.iter().map(|response| dot(&gap.gradient, response)).collect::<Vec<_>>()
         };

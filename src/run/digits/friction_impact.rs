@@ -5,13 +5,13 @@
 //! that presses a point which touches another wall at rest, held or not, is one at both where one of them has
 //! friction (module `several`).
 
+use super::coordinates::DigitsCoordinates;
 use super::evidence::gradient;
 use super::friction::SURE;
-use super::keep::DigitsKeeper;
 use super::motion::{DigitsMotion, LongState};
-use super::posture::DigitsCoordinates;
+use super::projection::DigitsProjection;
 use super::resting;
-use super::several::Meeting;
+use super::simultaneous::Meeting;
 use super::wall::{GapRate, ImpulseJump, work_of_rows};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -71,13 +71,13 @@ fn jump<const W: usize>(
     gap: &GapRate<W>,
 ) -> Result<Jump<W>, StepError> {
     let LongState { t, acting, .. } = motion.state();
-    jump_at(motion, (*t, &motion.state_posture()), &acting.held, wall, gap)
+    jump_at(motion, (*t, &motion.state_coordinates()), &acting.held, wall, gap)
 }
 
 /// The same at another time and other coordinates, while these walls hold points.
 pub(super) fn jump_at<const W: usize>(
     motion: &DigitsMotion<W>,
-    (t, posture): (Digits<W>, &DigitsCoordinates<W>),
+    (t, coordinates): (Digits<W>, &DigitsCoordinates<W>),
     held: &[usize],
     wall: usize,
     GapRate { gradient: normal, travel, rate }: &GapRate<W>,
@@ -86,20 +86,20 @@ pub(super) fn jump_at<const W: usize>(
     let acting = Acting { held: held.to_vec(), sliding, ..motion.state().acting.clone() };
     let striking = motion.mechanism.with(acting);
     let striking = striking.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
-    let mut keeper = DigitsKeeper::new(&striking, motion.precision);
-    let at = [&posture.phi[..], &posture.omega[..]];
-    let (response, pulls) = keeper.response(&striking, t, at, normal);
+    let mut projection = DigitsProjection::new(&striking, motion.precision);
+    let at = [&coordinates.phi[..], &coordinates.omega[..]];
+    let (response, pulls) = projection.response(&striking, t, at, normal);
     let restitution = motion.mechanism.walls[wall].1;
     let is_here = |friction: &&CompiledFriction<Digits<W>>| friction.normal == Normal::Contact(wall);
     let Some(friction) = motion.mechanism.frictions.iter().find(is_here) else {
         let impulse = -(Digits::ONE + restitution) * *rate / dot(normal, &response);
         let change = response.iter().map(|&a| a * impulse).collect();
-        let work = impulse * (*travel + work_of_rows(&striking, t, posture, &pulls));
+        let work = impulse * (*travel + work_of_rows(&striking, t, coordinates, &pulls));
         return Ok((Some(ImpulseJump { change, work, walls: 1 }), pulls));
     };
-    let along = gradient(&friction.tangent, &motion.mechanism.elements(&posture.phi));
-    let (across, pulls_across) = keeper.response(&striking, t, at, &along);
-    let slides = dot(&along, &posture.omega);
+    let along = gradient(&friction.tangent, &motion.mechanism.elements(&coordinates.phi));
+    let (across, pulls_across) = projection.response(&striking, t, at, &along);
+    let slides = dot(&along, &coordinates.omega);
     let rounding = Digits::ONE.ldexp(motion.precision.rounding(SURE) as i32);
     let mut still = ((*rate).abs() + slides.abs()) * rounding;
     let [a_nn, mut a_nt, mut a_tt] = [dot(normal, &response), dot(normal, &across), dot(&along, &across)];
@@ -123,6 +123,6 @@ pub(super) fn jump_at<const W: usize>(
     let ratio = tangential / impulse;
     let pulls: Vec<_> =
         pulls.iter().zip(&pulls_across).map(|(&pull, &across)| pull + across * ratio).collect();
-    let work = impulse * (*travel + work_of_rows(&striking, t, posture, &pulls));
+    let work = impulse * (*travel + work_of_rows(&striking, t, coordinates, &pulls));
     Ok((Some(ImpulseJump { change, work, walls: 1 }), pulls))
 }

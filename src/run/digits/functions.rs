@@ -37,9 +37,9 @@ impl<const W: usize> Functions<W> {
         if self.series.is_empty() {
             return;
         }
-        let posture = motion.state_posture();
+        let coordinates = motion.state_coordinates();
         for (function, series) in functions.iter().zip(&mut self.series) {
-            let from = (motion.state().t, &posture.phi[..]);
+            let from = (motion.state().t, &coordinates.phi[..]);
             self.powers.push(motion.series.formula(function, series, from).to_vec());
         }
     }

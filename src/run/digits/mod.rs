@@ -4,28 +4,28 @@
 //! numbers are read as written from row to row; [`DigitsPair`] runs two side by side and tells to how many
 //! digits they agree; [`forecast`] measures how fast errors grow and how many digits that takes.
 
-mod acting;
 mod bounces;
 mod branches;
+mod changes;
 mod confirm;
+mod coordinates;
 mod events;
 mod evidence;
+mod first_passage;
 mod friction;
 mod friction_impact;
 mod functions;
 mod growth;
-mod keep;
 mod limits;
 mod motion;
 mod pair;
 mod polynomial;
-mod posture;
 mod precision;
+mod projection;
 mod resting;
 mod saved;
-mod several;
 mod shown;
-mod touch;
+mod simultaneous;
 mod transitions;
 mod wall;
 
@@ -36,13 +36,13 @@ pub use self::precision::{DIGITS, Precision};
 pub use self::saved::SavedDigits;
 pub use self::shown::{LongEvent, LongHold, LongTurn, ShownRow};
 
+use self::coordinates::DigitsCoordinates;
 use self::events::Happened;
 use self::friction::Turn;
 use self::motion::DigitsMotion;
-use self::posture::DigitsCoordinates;
 use self::resting::Hold;
-use super::magnitude::changes;
 use super::plan::{RequestRefusal, check_forces_of_joints};
+use super::rounding::changes;
 use crate::arithmetic::digits::{Digits, MIDDLE, MOST};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{Real, Scalar};
@@ -236,9 +236,9 @@ impl<const W: usize> Runner<W> {
         }
         let start = mechanism.start(&scene, &source.scene);
         let motion = DigitsMotion::new(mechanism, start, precision, until.value())?;
-        let posture = motion.state_posture();
-        let z = motion.mechanism.elements(&posture.phi);
-        let [kinetic, potential] = motion.mechanism.energy(&posture.phi, &posture.omega, &z);
+        let coordinates = motion.state_coordinates();
+        let z = motion.mechanism.elements(&coordinates.phi);
+        let [kinetic, potential] = motion.mechanism.energy(&coordinates.phi, &coordinates.omega, &z);
         let seen = Digits::of(-1.0);
         Ok(Self { motion, rows, energy: kinetic + potential, seen, has_ended: false })
     }
@@ -246,23 +246,24 @@ impl<const W: usize> Runner<W> {
 
 impl<const W: usize> Runner<W> {
     /// The row of a moment.
-    fn shown(&mut self, t: Digits<W>, posture: &DigitsCoordinates<W>) -> ShownRow {
+    fn shown(&mut self, t: Digits<W>, coordinates: &DigitsCoordinates<W>) -> ShownRow {
         let mechanism = &self.motion.mechanism;
-        let z = mechanism.elements(&posture.phi);
-        let [kinetic, potential] = mechanism.energy(&posture.phi, &posture.omega, &z);
-        let balance = kinetic + potential - posture.work[0] - posture.work[1] - self.energy;
+        let z = mechanism.elements(&coordinates.phi);
+        let [kinetic, potential] = mechanism.energy(&coordinates.phi, &coordinates.omega, &z);
+        let balance = kinetic + potential - coordinates.work[0] - coordinates.work[1] - self.energy;
         let drift = balance.value() / mechanism.structure.energy_scale;
-        let centres = mechanism.centres(&z, &posture.omega);
+        let centres = mechanism.centres(&z, &coordinates.omega);
         let body = |(k, [at, rate]): (usize, [crate::arithmetic::Complex<Digits<W>>; 2])| {
-            [posture.phi[k], posture.omega[k], at.re, at.im, rate.re, rate.im].map(Digits::resized)
+            [coordinates.phi[k], coordinates.omega[k], at.re, at.im, rate.re, rate.im].map(Digits::resized)
         };
         let bodies = centres.into_iter().enumerate().map(body).collect();
-        let of_integrals = mechanism.structure.energy_of_integrals(&posture.omega);
-        let energy = [kinetic - of_integrals, potential, posture.work[0] - of_integrals].map(Digits::resized);
-        let left = self.motion.keeper.left(mechanism, t, &posture.phi, &posture.omega);
+        let of_integrals = mechanism.structure.energy_of_integrals(&coordinates.omega);
+        let energy =
+            [kinetic - of_integrals, potential, coordinates.work[0] - of_integrals].map(Digits::resized);
+        let left = self.motion.projection.left(mechanism, t, &coordinates.phi, &coordinates.omega);
         let residual = [0, 1].map(|level| left.iter().fold(0.0, |most, left| larger(left[level], most)));
         let residuals = left.into_iter().take(mechanism.structure.standing_rows()).collect();
-        let friction = self.motion.has_friction().then(|| posture.lost.resized());
+        let friction = self.motion.has_friction().then(|| coordinates.lost.resized());
         ShownRow { t: t.resized(), bodies, energy, friction, drift, residual, residuals }
     }
 }
@@ -286,20 +287,20 @@ impl<const W: usize> LongRun for Runner<W> {
             self.rows = OutputTimes { until: end, last: number, ..self.rows };
         }
         self.seen = t;
-        let posture = self.motion.at(t);
-        Ok(Some(self.shown(t, &posture)))
+        let coordinates = self.motion.at(t);
+        Ok(Some(self.shown(t, &coordinates)))
     }
 
     fn stopped(&mut self) -> Option<ShownRow> {
-        let (t, posture) = (self.motion.state().t, self.motion.state_posture());
-        let is_finite = posture.phi.iter().chain(&posture.omega).all(|x| x.is_finite());
+        let (t, coordinates) = (self.motion.state().t, self.motion.state_coordinates());
+        let is_finite = coordinates.phi.iter().chain(&coordinates.omega).all(|x| x.is_finite());
         // A row that is beside it by rounding has it.
         let rounding = t.log2() + self.motion.precision.rounding(1.0);
         if t <= self.seen || (t - self.seen).log2() <= rounding || !is_finite {
             return None;
         }
         self.seen = t;
-        Some(self.shown(t, &posture))
+        Some(self.shown(t, &coordinates))
     }
 
     fn save(&self) -> SavedDigits {

@@ -17,8 +17,8 @@ use super::confirm::{Probe, confirmed};
 use super::events::EventWatch;
 use super::friction::{self, Turn};
 use super::functions::Functions;
-use super::keep::DigitsKeeper;
 use super::precision::Precision;
+use super::projection::DigitsProjection;
 use super::resting::Hold;
 use super::transitions;
 use super::wall::{self, Ends};
@@ -78,7 +78,7 @@ pub struct DigitsMotion<const W: usize> {
     pub(super) coordinates: Coordinates,
     pub(super) series: Series<Digits<W>>,
     pub(super) state: LongState<W>,
-    pub(super) keeper: DigitsKeeper<W>,
+    pub(super) projection: DigitsProjection<W>,
     /// What confirms steps, where laws need it.
     pub(super) probe: Option<Probe<W>>,
     /// Watches for events.
@@ -113,14 +113,14 @@ impl<const W: usize> DigitsMotion<W> {
         let kept = precision.kept();
         series.keep(kept.clone());
         series.resolve_reversals(precision.rounding(friction::SURE));
-        let keeper = DigitsKeeper::new(&mechanism, precision);
+        let projection = DigitsProjection::new(&mechanism, precision);
         let f = series.coordinates();
         let cut = |x: Digits<W>| x.shortened(precision.limbs);
         let mut motion = Self {
             zeros: vec![Digits::ZERO; f],
             coordinates,
             series,
-            keeper,
+            projection,
             probe: Probe::of(&mechanism, coordinates),
             watch: EventWatch::new(&mechanism, precision.order),
             branches: BranchConditions::new(Functions::new(&mechanism.conditions, precision.order)),
@@ -149,7 +149,7 @@ impl<const W: usize> DigitsMotion<W> {
         let (mut phi, mut omega): (Vec<_>, Vec<_>) =
             start.phi.iter().map(|&x| cut(x)).zip(start.omega.iter().map(|&x| cut(x))).unzip();
         if coordinates == Coordinates::All {
-            motion.keeper.assemble(&motion.mechanism, [&mut phi, &mut omega], &start.given)?;
+            motion.projection.assemble(&motion.mechanism, [&mut phi, &mut omega], &start.given)?;
         }
         let (u, rate) = motion.independent(&phi, &omega, &start.given);
         (motion.state.u, motion.state.rate) = (u, rate);
@@ -169,7 +169,7 @@ impl<const W: usize> DigitsMotion<W> {
             mechanism: self.mechanism.clone(),
             series: self.series.clone(),
             state: self.state.clone(),
-            keeper: self.keeper.clone(),
+            projection: self.projection.clone(),
             probe: self.probe.clone(),
             watch: self.watch.clone(),
             branches: self.branches.clone(),
@@ -184,7 +184,7 @@ impl<const W: usize> DigitsMotion<W> {
     pub(super) fn settle(&mut self) -> Result<(), StepError> {
         if self.coordinates == Coordinates::All && !self.mechanism.constraints.is_empty() {
             let LongState { t, u, rate, .. } = &mut self.state;
-            self.keeper.project(&self.mechanism, *t, u, rate)?;
+            self.projection.project(&self.mechanism, *t, u, rate)?;
         }
         Ok(())
     }

@@ -15,12 +15,12 @@
 //! they would change beyond the impulse taken is of the size `a τ²`, which δ keeps below the digits carried.
 
 use super::super::contact::DRIVEN;
+use super::coordinates::DigitsCoordinates;
+use super::first_passage::{self, TouchPassage};
 use super::friction::Flown;
-use super::keep::DigitsKeeper;
 use super::motion::{DigitsMotion, LongState};
-use super::posture::DigitsCoordinates;
-use super::several::{self, MOST};
-use super::touch::{self, TouchPassage};
+use super::projection::DigitsProjection;
+use super::simultaneous::{self, MOST};
 use super::wall::{gap, gap_rate, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Real, Scalar};
@@ -84,7 +84,7 @@ pub enum Released<const W: usize> {
 /// The mechanism without holds and without dry friction.
 pub struct Unheld<const W: usize> {
     pub mechanism: ExactMechanism<Digits<W>>,
-    pub keeper: DigitsKeeper<W>,
+    pub projection: DigitsProjection<W>,
 }
 
 impl<const W: usize> Unheld<W> {
@@ -102,14 +102,14 @@ impl<const W: usize> Unheld<W> {
     fn but(motion: &DigitsMotion<W>, held: Vec<usize>) -> Result<Self, StepError> {
         let LongState { acting, .. } = motion.state();
         if acting.held == held && acting.sliding.iter().all(|mode| *mode == FrictionMode::Open) {
-            return Ok(Self { mechanism: motion.mechanism.clone(), keeper: motion.keeper.clone() });
+            return Ok(Self { mechanism: motion.mechanism.clone(), projection: motion.projection.clone() });
         }
         let sliding = vec![FrictionMode::Open; acting.sliding.len()];
         let acting = Acting { held, sliding, ..acting.clone() };
         let mechanism = motion.mechanism.with(acting);
         let mechanism = mechanism.map_err(|error| motion.cannot_go_on(&error, "look at that formula"))?;
-        let keeper = DigitsKeeper::new(&mechanism, motion.precision);
-        Ok(Self { mechanism, keeper })
+        let projection = DigitsProjection::new(&mechanism, motion.precision);
+        Ok(Self { mechanism, projection })
     }
 }
 
@@ -133,7 +133,7 @@ pub fn passage<const W: usize>(
     step: f64,
 ) -> TouchPassage<W> {
     let (length, least) = (motion.mechanism.structure.contacts[wall].length, least(motion, wall));
-    let found = touch::passage(powers, length, step, least);
+    let found = first_passage::passage(powers, length, step, least);
     let TouchPassage::At(near) = found else { return found };
     let is_open = powers[0] > Digits::ZERO && powers[0].log2() - libm::log2(length) > least;
     // Where it begins on its wall, what is left of the gap is rounding.
@@ -167,7 +167,7 @@ pub fn pressure_ends<const W: usize>(motion: &DigitsMotion<W>, place: usize, ste
     if powers[0] < Digits::ZERO && powers[0].log2() - libm::log2(unit) > least {
         return Released::Pulled;
     }
-    match touch::passage(&powers, unit, step, least) {
+    match first_passage::passage(&powers, unit, step, least) {
         TouchPassage::Nothing => Released::Not,
         TouchPassage::At(near) => Released::After(refined(motion, &powers, near)),
         TouchPassage::Sinks => Released::After(Digits::ZERO),
@@ -196,9 +196,9 @@ struct Touching<const W: usize> {
 impl<const W: usize> Touching<W> {
     /// Those of a motion, `wall` among them.
     fn at(motion: &DigitsMotion<W>, wall: usize) -> Result<Self, StepError> {
-        let Unheld { mechanism, mut keeper } = Unheld::of(motion)?;
+        let Unheld { mechanism, mut projection } = Unheld::of(motion)?;
         let LongState { t, acting, .. } = motion.state();
-        let DigitsCoordinates { phi, omega, .. } = motion.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = motion.state_coordinates();
         let mut series = Series::of_terms(&mechanism.terms(), Coordinates::All, POWERS);
         series.expand_terms(&mechanism.terms(), *t, &phi, &vec![Digits::ZERO; phi.len()], &omega);
         let (mut walls, mut rates, mut accelerations) = (Vec::new(), Vec::new(), Vec::new());
@@ -227,11 +227,11 @@ impl<const W: usize> Touching<W> {
             walls.push(other);
             rates.push(powers[1]);
             accelerations.push(powers[2].scale(2.0));
-            responses.push(keeper.response(&mechanism, *t, [&phi, &omega], &gradient).0);
+            responses.push(projection.response(&mechanism, *t, [&phi, &omega], &gradient).0);
             gradients.push(gradient);
         }
         let rounding = sure(motion);
-        let problem = several::forces([&gradients, &responses], &accelerations, rounding);
+        let problem = simultaneous::forces([&gradients, &responses], &accelerations, rounding);
         Ok(Self { walls, rates, problem, rounding })
     }
 
@@ -369,7 +369,7 @@ impl<const W: usize> DigitsMotion<W> {
             }
             let pressed = if is_pressed { self.press()? } else { Digits::ZERO };
             let LongState { t, u, rate, .. } = &mut self.state;
-            let (work, _) = self.keeper.close(&self.mechanism, *t, u, rate);
+            let (work, _) = self.projection.close(&self.mechanism, *t, u, rate);
             self.settle()?;
             let work = work + pressed + flown_work;
             self.state.work += work;

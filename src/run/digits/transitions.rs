@@ -9,10 +9,10 @@
 //! What begins near zero, as a velocity does where sliding begins, is followed on all scales of time (module
 //! `touch`).  A place that motors hold at rest slides as soon as they move it.
 
+use super::first_passage::{self, TouchPassage};
 use super::friction::SURE;
 use super::functions::LEAVES;
 use super::motion::DigitsMotion;
-use super::touch::{self, TouchPassage};
 use super::wall::{Ends, in_shares, refined};
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
@@ -105,7 +105,7 @@ fn passes<const W: usize>(
         return Some(Digits::ZERO);
     }
     let is_open = powers[0] > Digits::ZERO && first > least;
-    match touch::passage(powers, unit, step, least) {
+    match first_passage::passage(powers, unit, step, least) {
         TouchPassage::Nothing => None,
         // Where it begins at zero, what is left of that is rounding.
         TouchPassage::At(near) => Some(refined(motion, if is_open { powers } else { &powers[1..] }, near)),

@@ -10,12 +10,12 @@
 //! of the length of a contact are not told from touching, but for those that begin so: see module `touch`.
 
 use super::super::contact::DRIVEN;
+use super::coordinates::DigitsCoordinates;
+use super::first_passage::TouchPassage;
 use super::friction_impact;
 use super::motion::DigitsMotion;
-use super::posture::DigitsCoordinates;
 use super::resting::{self, Released, Unheld};
-use super::several::Meeting;
-use super::touch::TouchPassage;
+use super::simultaneous::Meeting;
 use super::transitions::ModeChange;
 use crate::arithmetic::digits::Digits;
 use crate::arithmetic::{Complex, Real, Scalar};
@@ -165,10 +165,10 @@ pub(super) fn distance<const W: usize>(
     motion: &DigitsMotion<W>,
     row: &ConstraintEquation<Digits<W>>,
 ) -> Digits<W> {
-    let (t, posture) = (motion.state.t, motion.state_posture());
-    let z = motion.mechanism.elements(&posture.phi);
+    let (t, coordinates) = (motion.state.t, motion.state_coordinates());
+    let z = motion.mechanism.elements(&coordinates.phi);
     let travel = row.law.as_ref().map_or(Digits::ZERO, |law| Digits::law_value(law, t));
-    let at = ConstraintArguments { phi: &posture.phi, z: &z, omega: &[] };
+    let at = ConstraintArguments { phi: &coordinates.phi, z: &z, omega: &[] };
     let aim = |aim: &Arc<Aim<Digits<W>>>| aim.at(t, at, |slots| slots[aim.value as usize]);
     row.gap(&z) - travel - row.aim.as_ref().map_or(Digits::ZERO, aim)
 }
@@ -258,13 +258,13 @@ fn has_way_back<const W: usize>(
     if is_among_several && gap.rate.log2() - unit <= motion.precision.rounding(SURE) {
         return Ok(true);
     }
-    let posture = motion.state_posture();
-    let at = [&posture.phi[..], &posture.omega[..]];
+    let coordinates = motion.state_coordinates();
+    let at = [&coordinates.phi[..], &coordinates.omega[..]];
     loop {
         // Of several walls those that hold points press as well.
-        let Unheld { mechanism, mut keeper } =
+        let Unheld { mechanism, mut projection } =
             if is_among_several { Unheld::of(motion) } else { Unheld::but_held(motion) }?;
-        let (response, pulls) = keeper.response(&mechanism, motion.state.t, at, &gap.gradient);
+        let (response, pulls) = projection.response(&mechanism, motion.state.t, at, &gap.gradient);
         if !response.iter().all(Digits::is_zero) {
             return Ok(true);
         }
@@ -285,7 +285,7 @@ fn no_way_back<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> StepErr
 /// Gradient of the gap of a wall by all coordinates, how fast the wall moves, and the rate of the gap
 /// \[m/s\].
 pub(super) fn gap_rate<const W: usize>(motion: &DigitsMotion<W>, wall: usize) -> GapRate<W> {
-    gap_rate_at(motion, wall, motion.state.t, &motion.state_posture())
+    gap_rate_at(motion, wall, motion.state.t, &motion.state_coordinates())
 }
 
 /// The same at another time and other coordinates.
@@ -293,21 +293,21 @@ pub(super) fn gap_rate_at<const W: usize>(
     motion: &DigitsMotion<W>,
     wall: usize,
     t: Digits<W>,
-    posture: &DigitsCoordinates<W>,
+    coordinates: &DigitsCoordinates<W>,
 ) -> GapRate<W> {
-    let z = motion.mechanism.elements(&posture.phi);
+    let z = motion.mechanism.elements(&coordinates.phi);
     let row = &motion.mechanism.walls[wall].0;
-    let mut gradient = vec![Digits::ZERO; posture.phi.len()];
+    let mut gradient = vec![Digits::ZERO; coordinates.phi.len()];
     if let RowMeasure::Place(place) = &row.measure {
         place.slopes(&z, |k, slope| gradient[k] += slope);
     }
-    let at = ConstraintArguments { phi: &posture.phi, z: &z, omega: &posture.omega };
+    let at = ConstraintArguments { phi: &coordinates.phi, z: &z, omega: &coordinates.omega };
     if let Some(aim) = &row.aim {
         let slopes = aim.slopes.iter();
         aim.at(t, at, |slots| slopes.for_each(|&(k, slope)| gradient[k] -= slots[slope as usize]));
     }
     let travel = travel_rate(row, t, at);
-    let rate = dot(&gradient, &posture.omega) - travel;
+    let rate = dot(&gradient, &coordinates.omega) - travel;
     GapRate { gradient, travel, rate }
 }
 
@@ -327,13 +327,13 @@ fn alone<const W: usize>(
     wall: usize,
     GapRate { gradient, travel, rate }: &GapRate<W>,
 ) -> (ImpulseJump<W>, Vec<Digits<W>>) {
-    let (t, posture) = (motion.state.t, motion.state_posture());
-    let at = [&posture.phi[..], &posture.omega[..]];
-    let (response, pulls) = motion.keeper.response(&motion.mechanism, t, at, gradient);
+    let (t, coordinates) = (motion.state.t, motion.state_coordinates());
+    let at = [&coordinates.phi[..], &coordinates.omega[..]];
+    let (response, pulls) = motion.projection.response(&motion.mechanism, t, at, gradient);
     let restitution = motion.mechanism.walls[wall].1;
     let impulse = -(Digits::ONE + restitution) * *rate / dot(gradient, &response);
     let change = response.iter().map(|&a| a * impulse).collect();
-    let work = impulse * (*travel + work_of_rows(&motion.mechanism, t, &posture, &pulls));
+    let work = impulse * (*travel + work_of_rows(&motion.mechanism, t, &coordinates, &pulls));
     (ImpulseJump { change, work, walls: 1 }, pulls)
 }
 
@@ -342,11 +342,11 @@ fn alone<const W: usize>(
 pub(super) fn work_of_rows<const W: usize>(
     mechanism: &ExactMechanism<Digits<W>>,
     t: Digits<W>,
-    posture: &DigitsCoordinates<W>,
+    coordinates: &DigitsCoordinates<W>,
     impulses: &[Digits<W>],
 ) -> Digits<W> {
-    let z = mechanism.elements(&posture.phi);
-    let at = ConstraintArguments { phi: &posture.phi, z: &z, omega: &posture.omega };
+    let z = mechanism.elements(&coordinates.phi);
+    let at = ConstraintArguments { phi: &coordinates.phi, z: &z, omega: &coordinates.omega };
     let rows = mechanism.constraints.iter().zip(impulses);
     rows.fold(Digits::ZERO, |work, (row, &impulse)| work - impulse * travel_rate(row, t, at))
 }
@@ -366,8 +366,8 @@ fn jumped<const W: usize>(
     motion: &mut DigitsMotion<W>,
     ImpulseJump { change, work, walls }: &ImpulseJump<W>,
 ) {
-    let (posture, limbs) = (motion.state_posture(), motion.precision.limbs);
-    let (phi, omega) = (&posture.phi, &posture.omega);
+    let (coordinates, limbs) = (motion.state_coordinates(), motion.precision.limbs);
+    let (phi, omega) = (&coordinates.phi, &coordinates.omega);
     let z = motion.mechanism.elements(phi);
     let after: Vec<_> = omega.iter().zip(change).map(|(&w, &change)| (w + change).shortened(limbs)).collect();
     let energy = |omega: &[Digits<W>]| {

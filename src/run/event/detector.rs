@@ -9,8 +9,8 @@ use crate::dynamics::compile::Laws;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::friction::FrictionWatch;
-use crate::run::inside::{Inside, StepWatcher};
-use crate::run::magnitude::changes;
+use crate::run::observer::{Inside, StepWatcher};
+use crate::run::rounding::changes;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

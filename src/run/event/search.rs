@@ -6,7 +6,7 @@
 use super::detector::{EventDetector, EventMemory, Owner, SAME};
 use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
-use crate::run::inside::Inside;
+use crate::run::observer::Inside;
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root, sign};
 
 /// Degrees of the interpolants.

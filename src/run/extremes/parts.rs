@@ -5,8 +5,8 @@
 //! outputs are, and the first of their zeros ends the part; within it the outputs are evaluated on these
 //! branches up to both ends.
 
-use super::super::inside::Inside;
-use super::super::magnitude::{changes, last_digits};
+use super::super::observer::Inside;
+use super::super::rounding::{changes, last_digits};
 use super::{DEGREES, DOUBTS, ExtremesDetector, RESOLVED, has_grown, rounding_of};
 use crate::dynamics::{Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};

@@ -16,7 +16,7 @@
 //! seeds.  The motion stays what it was: its value is expanded again
 //! for every block of lanes.
 
-use super::super::inside::Step;
+use super::super::observer::Step;
 use super::super::trust::Ground;
 use super::neighbours::Neighbours;
 use super::variation::plain;

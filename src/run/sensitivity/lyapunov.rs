@@ -21,7 +21,7 @@ use super::{SensitivityError, SensitivityRequest, Study, stopped};
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{Mechanism, Motion};
 use crate::run::driver::Pause;
-use crate::run::inside::Step;
+use crate::run::observer::Step;
 use crate::run::running::Outcome;
 use crate::scene::{Scene, Template};
 use serde::Serialize;

@@ -17,7 +17,7 @@
 //! parameters).
 
 use super::super::contact::{ContactDriver, JumpLog};
-use super::super::inside::{Observer, ObserverAdapter, Step};
+use super::super::observer::{Observer, ObserverAdapter, Step};
 use super::super::trust::Ground;
 use super::collocation::{Collocation, STAGES};
 use super::crossing::SetNumbers;

@@ -8,7 +8,7 @@
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::event::{EventDetector, EventMemory};
 use crate::run::extremes::{Extremes, ExtremesDetector};
-use crate::run::inside::{Inside, StepWatcher};
+use crate::run::observer::{Inside, StepWatcher};
 use crate::run::plan::Plan;
 use crate::stepping::taylor::batch::TakenStep;
 use std::sync::Arc;

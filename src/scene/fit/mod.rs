@@ -2,7 +2,7 @@
 //! agrees with their laws, every coordinate has an equation, and nothing begins where its force or its side
 //! is undefined.
 
-mod posture;
+mod configuration;
 mod start;
 
 pub(super) use start::written_starts;
@@ -53,9 +53,9 @@ pub(super) fn fitted(
     }
     let (start, said) = start::starts(&scene, places, given, whole)?;
     if whole {
-        let posture = hanging.posture(&start);
-        posture::springs(&posture, &scene.springs, places.springs)?;
-        posture::walls(&posture, &scene, places.walls)?;
+        let configuration = hanging.configuration(&start);
+        configuration::springs(&configuration, &scene.springs, places.springs)?;
+        configuration::walls(&configuration, &scene, places.walls)?;
     }
     Ok(Scene { start, given: said, ..scene })
 }

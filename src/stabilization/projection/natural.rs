@@ -1,5 +1,6 @@
 //! The projection of a few bodies with loops in natural coordinates: linear rows by constant matrices, then
-//! the unit lengths, both levels with one set of factors ([`keeper`](crate::dynamics::natural::keeper)).
+//! the unit lengths, both levels with one set of factors
+//! ([`projection`](crate::dynamics::natural::projection)).
 //!
 //! ```text
 //! z -> z - dz:   q -= atan(z × dz / (1 - z·dz));
@@ -16,7 +17,7 @@ use crate::arithmetic::sum::two_sum;
 use crate::dynamics::State;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::ReducedMatrices;
-use crate::dynamics::natural::keeper::{CLOSE, NaturalKeeper};
+use crate::dynamics::natural::projection::{CLOSE, LaneProjection};
 
 /// Turns up to this \[rad\] are their sines' series.
 const SMALL: f64 = 1e-4;
@@ -34,7 +35,7 @@ pub enum NaturalProjection {
 /// Constants, and elements and rates of the state faced last.
 #[derive(Clone, Debug)]
 pub struct NaturalScratch<const B: usize> {
-    keeper: NaturalKeeper<B>,
+    projection: LaneProjection<B>,
     z: [Row<B>; 2],
     rate: Row<B>,
     /// What rates count as at least \[rad/s\].
@@ -75,7 +76,7 @@ impl NaturalProjection {
 impl<const B: usize> NaturalScratch<B> {
     fn new(reduced: &ReducedMatrices, unit: f64) -> Self {
         let zero = [[[0.0; 4]; B]; 2];
-        Self { keeper: NaturalKeeper::new(reduced), z: zero, rate: [[0.0; 4]; B], unit }
+        Self { projection: LaneProjection::new(reduced), z: zero, rate: [[0.0; 4]; B], unit }
     }
 }
 
@@ -123,9 +124,9 @@ impl<const B: usize> Code for ProjectNatural<'_, B> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Option<[f64; 2]> {
-        let Self { bench: NaturalScratch { keeper, z, rate, unit }, state, z: elements } = self;
+        let Self { bench: NaturalScratch { projection, z, rate, unit }, state, z: elements } = self;
         let n = elements.len();
-        let moved = keeper.project_back::<L>(z);
+        let moved = projection.project_back::<L>(z);
         // What is not a number is not sound.
         let is_sound = moved.least >= NEAR && moved.left <= CLOSE;
         if !is_sound {
@@ -136,7 +137,7 @@ impl<const B: usize> Code for ProjectNatural<'_, B> {
             let w = L::of(rate[b]);
             (v[0][b], v[1][b]) = (L::of(z[1][b]).mul(w).neg().array(), L::of(z[0][b]).mul(w).array());
         }
-        let slowed = keeper.project_rates_back::<L>(z, &mut v);
+        let slowed = projection.project_rates_back::<L>(z, &mut v);
         let mut changes = [[0.0; 2]; MOST];
         let (mut most, mut fastest) = ([0.0_f64; 2], *unit);
         for (i, change) in changes[..n].iter_mut().enumerate() {

@@ -30,7 +30,7 @@ use crate::arithmetic::{Complex, sincos};
 use crate::dynamics::force::action::Applied;
 use crate::dynamics::looped::NEAR;
 use crate::dynamics::natural::ReducedMatrices;
-use crate::dynamics::natural::keeper::NaturalKeeper;
+use crate::dynamics::natural::projection::LaneProjection;
 use crate::dynamics::{Mechanism, State};
 use std::f64::consts::TAU;
 
@@ -49,7 +49,7 @@ pub struct LoopedKernel<const B: usize> {
     longest: f64,
     unit: f64,
     /// W, S and V, and the linear rows.
-    keeper: NaturalKeeper<B>,
+    projection: LaneProjection<B>,
     /// Gravity and constant forces, and the share of the latter \[N·m\].
     weight: [Row<B>; 2],
     applied: Vec<Complex<f64>>,
@@ -113,7 +113,7 @@ impl<const B: usize> LoopedKernel<B> {
             log_tolerance: libm::log2(tolerance),
             longest: 30.0 + libm::log2(mechanism.units.time),
             unit: mechanism.units.time,
-            keeper: NaturalKeeper::new(reduced),
+            projection: LaneProjection::new(reduced),
             weight,
             applied,
             torque,
@@ -147,9 +147,9 @@ fn begin<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, state: &State) 
         (looped.z[0][0][b], looped.z[0][1][b]) = (c.array(), s.array());
         (looped.z[1][0][b], looped.z[1][1][b]) = (s.mul(w).neg().array(), c.mul(w).array());
     }
-    let LoopedKernel { keeper, z, spread, across, projected, .. } = looped;
-    let least = keeper.unit_vectors::<L>(&z[0]);
-    let NaturalKeeper { columns, schur, minv_jt, .. } = keeper;
+    let LoopedKernel { projection, z, spread, across, projected, .. } = looped;
+    let least = projection.unit_vectors::<L>(&z[0]);
+    let LaneProjection { columns, schur, minv_jt, .. } = projection;
     for j in 0..n {
         let mut sum = [[L::ZERO; B]; 2];
         for i in 0..n {
@@ -224,8 +224,16 @@ fn forces<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, m: usize) -> [
 #[inline(always)]
 fn order<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, m: usize) {
     let mut f = forces::<L, B>(looped, m);
-    let LoopedKernel { count, z, mu, keeper: NaturalKeeper { schur, .. }, spread, across, projected, .. } =
-        looped;
+    let LoopedKernel {
+        count,
+        z,
+        mu,
+        projection: LaneProjection { schur, .. },
+        spread,
+        across,
+        projected,
+        ..
+    } = looped;
     let n = *count;
     let mut q = [L::ZERO; B];
     for b in 0..B {
@@ -359,8 +367,8 @@ pub fn go<L: Lanes, const B: usize>(looped: &mut LoopedKernel<B>, state: &mut St
         }
     }
     // V and S⁻¹ of the step's start have served: the next step makes its own.
-    looped.keeper.project_back::<L>(&mut z);
-    looped.keeper.project_rates_back::<L>(&z, &mut v);
+    looped.projection.project_back::<L>(&mut z);
+    looped.projection.project_rates_back::<L>(&z, &mut v);
     let half = sum::<L, B>(looped, 0.5 * h)[0];
     let half = [store(half[0]), store(half[1])];
     let n = looped.count;

@@ -6,7 +6,7 @@ use crate::arithmetic::{DoubleDouble, Scalar};
 use crate::dynamics::{Motion, Time};
 use crate::run::build::{Problem, build};
 use crate::run::contact::ContactDriver;
-use crate::run::inside::{Observer, ObserverAdapter, Step};
+use crate::run::observer::{Observer, ObserverAdapter, Step};
 use crate::run::plan::Plan;
 use crate::run::running::Outcome;
 use crate::stepping::StepError;

@@ -1,11 +1,11 @@
-//! The matrices of a posture in every lane, and the way back onto all rows: see
-//! [`keeper`](crate::dynamics::natural::keeper).
+//! The matrices of a configuration in every lane, and the way back onto all rows: see
+//! [`projection`](crate::dynamics::natural::projection).
 
 use super::{PAIR, Pair, ZERO, put};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::looped::NEAR;
-use crate::dynamics::natural::keeper::CLOSE;
+use crate::dynamics::natural::projection::CLOSE;
 use crate::dynamics::natural::{LinearRow, ReducedMatrices};
 use crate::stepping::taylor::batch::{load, store};
 

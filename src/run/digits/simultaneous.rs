@@ -10,8 +10,8 @@
 //! quarters is zero.  Walls whose point does not approach have no restitution.
 
 use super::evidence::gradient;
-use super::keep::largest;
 use super::motion::DigitsMotion;
+use super::projection::largest;
 use super::resting::Unheld;
 use super::wall::{GapRate, ImpulseJump, distance, gap_rate, work_of_rows};
 use crate::arithmetic::digits::Digits;
@@ -101,14 +101,14 @@ impl<const W: usize> Meeting<W> {
             let what = format!("more than {MOST} walls are met at one moment: {names}");
             return Err(motion.stop(Cause::Unsuited, 0.0, &what, "leave out walls that others imply"));
         }
-        let (t, posture) = (motion.state().t, motion.state_posture());
+        let (t, coordinates) = (motion.state().t, motion.state_coordinates());
         // Points that stay on walls take part as all others that touch; friction elsewhere does not.
-        let Unheld { mechanism, mut keeper } = Unheld::of(motion)?;
+        let Unheld { mechanism, mut projection } = Unheld::of(motion)?;
         let frictions: Vec<Option<&CompiledFriction<Digits<W>>>> = (self.walls.iter())
             .map(|&wall| mechanism.frictions.iter().find(|friction| friction.normal == Normal::Contact(wall)))
             .collect();
-        let z = mechanism.elements(&posture.phi);
-        let nothing = vec![Digits::ZERO; posture.omega.len()];
+        let z = mechanism.elements(&coordinates.phi);
+        let nothing = vec![Digits::ZERO; coordinates.omega.len()];
         let along = frictions.iter().map(|friction| {
             friction.map_or_else(|| nothing.clone(), |friction| gradient(&friction.tangent, &z))
         });
@@ -116,7 +116,7 @@ impl<const W: usize> Meeting<W> {
         let gradients: Vec<Vec<_>> = self.gaps.iter().map(|gap| gap.gradient.clone()).chain(along).collect();
         let mut respond = |gradient: &Vec<Digits<W>>| match gradient.iter().all(Digits::is_zero) {
             true => (nothing.clone(), vec![Digits::ZERO; mechanism.constraints.len()]),
-            false => keeper.response(&mechanism, t, [&posture.phi, &posture.omega], gradient),
+            false => projection.response(&mechanism, t, [&coordinates.phi, &coordinates.omega], gradient),
         };
         let (responses, pulls): (Vec<Vec<_>>, Vec<Vec<_>>) = gradients.iter().map(&mut respond).unzip();
         let known = frictions.iter().flatten();
@@ -126,7 +126,7 @@ impl<const W: usize> Meeting<W> {
                 .flat_map(|row| responses.iter().map(|other| dot(row, other)))
                 .collect(),
             velocity: (self.gaps.iter().map(|gap| gap.rate))
-                .chain(gradients[self.walls.len()..].iter().map(|along| dot(along, &posture.omega)))
+                .chain(gradients[self.walls.len()..].iter().map(|along| dot(along, &coordinates.omega)))
                 .collect(),
             restitution: (self.walls.iter().enumerate())
                 .map(|(i, &wall)| if self.is_met(i) { mechanism.walls[wall].1 } else { Digits::ZERO })
@@ -160,7 +160,7 @@ impl<const W: usize> Meeting<W> {
         let work = travels.fold(Digits::ZERO, |work, (gap, &impulse)| work + gap.travel * impulse);
         let least = largest(normal) + self.rounding;
         let pressing = normal.iter().filter(|impulse| impulse.log2() > least).count();
-        let work = work + work_of_rows(&mechanism, t, &posture, &sum(&pulls));
+        let work = work + work_of_rows(&mechanism, t, &coordinates, &sum(&pulls));
         Ok(ImpulseJump { change: sum(&responses), work, walls: pressing as u64 })
     }
 }

@@ -1,17 +1,17 @@
 //! What acts on a motion in many digits changes: events switch parts and set parameters, formulas come to
 //! their corners.
 //!
-//! What closes does so plastically, as in all methods (`run/latch.rs`): its points have to meet, a motor and
-//! a lock without an angle go on from where they are, and the energy lost is booked with the event.
+//! What closes does so plastically, as in all methods (`run/closing.rs`): its points have to meet, a motor
+//! and a lock without an angle go on from where they are, and the energy lost is booked with the event.
 
 use super::branches::BranchConditions;
 use super::confirm::Probe;
+use super::coordinates::DigitsCoordinates;
 use super::events::EventWatch;
 use super::friction;
 use super::functions::Functions;
-use super::keep::DigitsKeeper;
 use super::motion::{DigitsMotion, LongState, coordinates_of};
-use super::posture::DigitsCoordinates;
+use super::projection::DigitsProjection;
 use super::resting::{self, Unheld};
 use super::wall;
 use crate::arithmetic::digits::Digits;
@@ -58,7 +58,7 @@ impl<const W: usize> DigitsMotion<W> {
 
     /// Lets an event take effect that changes what acts.
     pub(super) fn change(&mut self, event: usize) -> Result<(), StepError> {
-        let DigitsCoordinates { phi, omega, .. } = self.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = self.state_coordinates();
         let acting = self.mechanism.after(event, self.state.t, &phi, &omega);
         self.let_act(acting)?;
         self.settle_modes_again()
@@ -66,7 +66,7 @@ impl<const W: usize> DigitsMotion<W> {
 
     /// Goes on with other parts acting, or on other branches; what that does to the energy is booked.
     fn let_act(&mut self, mut acting: Acting<Digits<W>>) -> Result<(), StepError> {
-        let before = (self.state_posture(), self.energy());
+        let before = (self.state_coordinates(), self.energy());
         let walls: Vec<_> = self
             .mechanism
             .walls
@@ -109,7 +109,7 @@ impl<const W: usize> DigitsMotion<W> {
         if closing.is_empty() { self.let_go(&gone) } else { self.release(&gone) }?;
         let kept = self.kept(&closing);
         self.close(&closing)?;
-        let after = self.state_posture();
+        let after = self.state_coordinates();
         let apart = |(a, b): (&Digits<W>, &Digits<W>)| (*a - *b).log2() - a.log2().max(0.0);
         let moved = |a: &[Digits<W>], b: &[Digits<W>]| a.iter().zip(b).map(apart).fold(f64::MIN, f64::max);
         let turned = moved(&before.0.phi, &after.phi).max(moved(&before.0.omega, &after.omega));
@@ -134,7 +134,7 @@ impl<const W: usize> DigitsMotion<W> {
         let coordinates = coordinates_of(&mechanism);
         if coordinates != self.coordinates {
             // A point that stays on its wall needs all coordinates.
-            let DigitsCoordinates { phi, omega, .. } = self.state_posture();
+            let DigitsCoordinates { phi, omega, .. } = self.state_coordinates();
             self.coordinates = coordinates;
             let none = [vec![false; phi.len()], vec![false; phi.len()]];
             (self.state.u, self.state.rate) = self.independent(&phi, &omega, &none);
@@ -146,7 +146,7 @@ impl<const W: usize> DigitsMotion<W> {
         self.probe = Probe::of(&mechanism, self.coordinates);
         self.watch = std::mem::take(&mut self.watch).renewed([&self.mechanism, &mechanism], order);
         self.branches = BranchConditions::new(Functions::new(&mechanism.conditions, order));
-        self.keeper = DigitsKeeper::new(&mechanism, self.precision);
+        self.projection = DigitsProjection::new(&mechanism, self.precision);
         self.mechanism = mechanism;
         Ok(())
     }
@@ -173,8 +173,8 @@ impl<const W: usize> DigitsMotion<W> {
     }
 
     fn residuals_and_rates(&mut self) -> Vec<[Digits<W>; 2]> {
-        let DigitsCoordinates { phi, omega, .. } = self.state_posture();
-        self.keeper.residuals(&self.mechanism, self.state.t, &phi, &omega)
+        let DigitsCoordinates { phi, omega, .. } = self.state_coordinates();
+        self.projection.residuals(&self.mechanism, self.state.t, &phi, &omega)
     }
 
     /// log2 of the largest residual, or rate of one, of rows that were in force before.
@@ -200,11 +200,11 @@ impl<const W: usize> DigitsMotion<W> {
                 return Err(self.stop(Cause::Unsuited, 0.0, &what, "let the event be where it meets"));
             }
         }
-        let Unheld { mechanism, mut keeper } = loop {
+        let Unheld { mechanism, mut projection } = loop {
             let mut unheld = Unheld::but_held(self)?;
             let LongState { t, u, rate, .. } = &self.state;
             let mut after = rate.clone();
-            let (work, impulses) = unheld.keeper.close(&unheld.mechanism, *t, u, &mut after);
+            let (work, impulses) = unheld.projection.close(&unheld.mechanism, *t, u, &mut after);
             let most = impulses.iter().map(Digits::log2).fold(f64::NEG_INFINITY, f64::max);
             // A point that its wall would have to pull is let go.
             match resting::pulled(self, &impulses, most) {
@@ -218,7 +218,7 @@ impl<const W: usize> DigitsMotion<W> {
             }
         };
         let LongState { t, u, rate, .. } = &mut self.state;
-        keeper.project(&mechanism, *t, u, rate)?;
+        projection.project(&mechanism, *t, u, rate)?;
         // The rows of what sticks, which may slide now, come last.
         let rows = mechanism.structure.constraints.len();
         let rates = self.residuals_and_rates().into_iter().take(rows).map(|[_, rate]| rate.abs()).enumerate();
@@ -241,7 +241,7 @@ impl<const W: usize> DigitsMotion<W> {
 
     /// Kinetic and potential energy of the state \[J\].
     pub(super) fn energy(&self) -> Digits<W> {
-        let DigitsCoordinates { phi, omega, .. } = self.state_posture();
+        let DigitsCoordinates { phi, omega, .. } = self.state_coordinates();
         let z = self.mechanism.elements(&phi);
         let [kinetic, potential] = self.mechanism.energy(&phi, &omega, &z);
         kinetic + potential

@@ -20,9 +20,9 @@ const SWEEPS: usize = 6;
 /// Violation of the lengths that one iteration is enough for.
 pub const CLOSE: f64 = 1e-9;
 
-/// Constants of the mechanism, and its matrices at a posture; lanes beyond the last body are zero.
+/// Constants of the mechanism, and its matrices at a configuration; lanes beyond the last body are zero.
 #[derive(Clone, Debug)]
-pub struct NaturalKeeper<const B: usize> {
+pub struct LaneProjection<const B: usize> {
     /// W.
     pub columns: LaneColumns<B>,
     /// The linear rows.
@@ -52,7 +52,7 @@ pub struct Moved<const B: usize> {
     pub left: f64,
 }
 
-impl<const B: usize> NaturalKeeper<B> {
+impl<const B: usize> LaneProjection<B> {
     /// Of a mechanism's matrices; there must be room, and no translational coordinates.
     pub fn new(reduced: &ReducedMatrices) -> Self {
         let n = reduced.free.len();

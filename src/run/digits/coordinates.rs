@@ -20,8 +20,8 @@ pub struct DigitsCoordinates<const W: usize> {
 }
 
 impl<const W: usize> DigitsMotion<W> {
-    /// Independent coordinates and rates of a posture at t = 0, from the first of the bodies they move whose
-    /// value is given.
+    /// Independent coordinates and rates of a motion at t = 0, from the first of the bodies they move
+    /// whose value is given.
     pub(super) fn independent(
         &self,
         phi: &[Digits<W>],
@@ -51,7 +51,7 @@ impl<const W: usize> DigitsMotion<W> {
     }
 
     /// All coordinates at the last step's end.
-    pub(super) fn state_posture(&self) -> DigitsCoordinates<W> {
+    pub(super) fn state_coordinates(&self) -> DigitsCoordinates<W> {
         let LongState { t, u, rate, work, jump_energy, lost, .. } = &self.state;
         let (phi, omega) = self.bodies(*t, u, rate);
         DigitsCoordinates { phi, omega, work: [*work, *jump_energy], lost: *lost }

@@ -14,17 +14,17 @@ pub(super) struct BarPositions {
 
 impl Hanging {
     /// Where everything is at `start`.
-    pub fn posture(&self, start: &[Start]) -> BarPositions {
+    pub fn configuration(&self, start: &[Start]) -> BarPositions {
         let bars =
             start.iter().map(|start| ([0.0; 2], [libm::cos(start.phi), libm::sin(start.phi)], 0.0)).collect();
-        let mut posture = BarPositions { bars };
+        let mut configuration = BarPositions { bars };
         for HungBar { bar, from, own } in &self.order {
-            let (hinge, way) = posture.at(*from);
-            let [c, s] = posture.bars[*bar].1;
+            let (hinge, way) = configuration.at(*from);
+            let [c, s] = configuration.bars[*bar].1;
             let origin = [hinge[0] - (c * own[0] - s * own[1]), hinge[1] - (s * own[0] + c * own[1])];
-            posture.bars[*bar] = (origin, [c, s], way + own[0].abs() + own[1].abs());
+            configuration.bars[*bar] = (origin, [c, s], way + own[0].abs() + own[1].abs());
         }
-        posture
+        configuration
     }
 }
 
@@ -41,9 +41,13 @@ impl BarPositions {
 }
 
 /// Refuses a spring without a direction.
-pub(super) fn springs(posture: &BarPositions, springs: &[Spring], places: &[At]) -> Result<(), SceneError> {
+pub(super) fn springs(
+    configuration: &BarPositions,
+    springs: &[Spring],
+    places: &[At],
+) -> Result<(), SceneError> {
     for (Spring { name, between: [a, b], free_length, damping, .. }, at) in springs.iter().zip(places) {
-        let ((from, way_from), (to, way_to)) = (posture.at(*a), posture.at(*b));
+        let ((from, way_from), (to, way_to)) = (configuration.at(*a), configuration.at(*b));
         let length = libm::hypot(to[0] - from[0], to[1] - from[1]);
         if (*free_length > 0.0 || *damping > 0.0) && length <= SAME * (way_from + way_to) {
             let (part, hint) = match *free_length > 0.0 {
@@ -59,16 +63,16 @@ pub(super) fn springs(posture: &BarPositions, springs: &[Spring], places: &[At])
 }
 
 /// Refuses a wall whose point starts behind it.
-pub(super) fn walls(posture: &BarPositions, scene: &Scene, places: &[At]) -> Result<(), SceneError> {
+pub(super) fn walls(configuration: &BarPositions, scene: &Scene, places: &[At]) -> Result<(), SceneError> {
     for (wall, at) in scene.walls.iter().zip(places) {
         let Wall { name, bar, point, on, through, normal, law, aim, .. } = wall;
         // What a formula of places comes to is known when the scene is compiled.
         if scene.is_inactive(name) || aim.is_some() {
             continue;
         }
-        let (position, way) = posture.at(Place { bar: Some(*bar), point: *point });
-        let (origin, way_there) = posture.at(Place { bar: *on, point: *through });
-        let [c, s] = on.map_or([1.0, 0.0], |bar| posture.bars[bar].1);
+        let (position, way) = configuration.at(Place { bar: Some(*bar), point: *point });
+        let (origin, way_there) = configuration.at(Place { bar: *on, point: *through });
+        let [c, s] = on.map_or([1.0, 0.0], |bar| configuration.bars[bar].1);
         let turned = [c * normal[0] - s * normal[1], s * normal[0] + c * normal[1]];
         let travel = law.as_ref().map_or(0.0, |law| law.at_start().phi);
         let gap = (position[0] - origin[0]) * turned[0] + (position[1] - origin[1]) * turned[1] - travel;

@@ -25,7 +25,7 @@ const LEAST_PIVOT: f64 = 1e-6;
 
 /// Room for the constraints.
 #[derive(Clone, Debug)]
-pub struct DigitsKeeper<const W: usize> {
+pub struct DigitsProjection<const W: usize> {
     rows: usize,
     jacobian: Vec<Digits<W>>,
     minv_jt: Vec<Digits<W>>,
@@ -41,7 +41,7 @@ pub struct DigitsKeeper<const W: usize> {
     no_freedom: f64,
 }
 
-impl<const W: usize> DigitsKeeper<W> {
+impl<const W: usize> DigitsProjection<W> {
     /// For a mechanism.
     pub fn new(mechanism: &ExactMechanism<Digits<W>>, precision: Precision) -> Self {
         let (r, n) = (mechanism.constraints.len(), mechanism.structure.coordinates());
@@ -222,8 +222,8 @@ impl<const W: usize> DigitsKeeper<W> {
         }
     }
 
-    /// Lets rows take hold at a posture: changes the rates to the nearest in kinetic energy that all of them
-    /// allow, and returns the work of motors \[J\] and the impulses sigma.
+    /// Lets rows take hold at a position: changes the rates to the nearest in kinetic energy that all of
+    /// them allow, and returns the work of motors \[J\] and the impulses sigma.
     ///
     /// ```text
     /// M (w⁺ - w⁻) + Gᵀ sigma = 0,   G w⁺ = s'(t)         work = -sigma · s'
@@ -248,7 +248,7 @@ impl<const W: usize> DigitsKeeper<W> {
     }
 
     /// The change of the rates by an impulse of one along `gradient`, the constraints kept, and the impulses
-    /// sigma of these; all at a posture.  Where the constraints leave no freedom along `gradient`, what is
+    /// sigma of these; all at a position.  Where the constraints leave no freedom along `gradient`, what is
     /// left of the change is rounding, and zero is returned:
     ///
     /// ```text
