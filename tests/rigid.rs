@@ -186,6 +186,67 @@ fn the_model_is_no_better_than_it_says() {
     }
 }
 
+/// A ball of 1 kg on a rope of 1 m and so many N/m, let go beside the point it hangs from, which is drawn at
+/// a height \[m\].
+fn rope(stiffness: f64, height: f64, model: &str) -> Scene {
+    let text = format!(
+        r#"{{"name": "rope", "gravity": [0, -9.81],
+        "bars": [{{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.01, "length": 1}}],
+        "springs": [{{"name": "rope", "between": [{{"body": "ground", "point": [0, {height:?}]}},
+                                                 {{"body": "ball", "point": [0, 0]}}],
+                     "stiffness": {stiffness:?}, "free_length": 1, "model": "{model}"}}],
+        "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [1, {height:?}], "velocity": [0, 0]}}}},
+        "until": 1.5, "every": 0.05}}"#
+    );
+    driftless::scene::parse_scene(&text, "rope.json", &[]).expect("a scene")
+}
+
+fn planned(scene: &Scene, method: &str) -> Result<Plan, driftless::run::RequestRefusal> {
+    let request = Request { method: Some(method.parse().expect("a method")), ..Request::default() };
+    Plan::new(scene, &Mechanism::new(scene).expect("a mechanism"), &request)
+}
+
+#[test]
+fn where_a_rope_is_drawn_does_not_matter() {
+    // At the bottom the rope carries 3 m g, and is longer by 3 m g / k.
+    for (stiffness, stretch) in [(1e4, 2.943e-3), (1e6, 2.943e-5), (1e8, 2.943e-7)] {
+        for height in [-1000.0, -10.0, 0.0, 1.0, 10.0, 1000.0] {
+            let scene = rope(stiffness, height, "rigid");
+            let said = planned(&scene, "taylor").expect("a plan").model_error.expect("an error of the model");
+            assert!((0.5..3.0).contains(&(said / stretch)), "{height} m: {said:e} of {stretch:e}");
+            let step = |scene: &Scene| planned(scene, "gauss6").expect("a plan").step;
+            assert_eq!(step(&scene), step(&rope(stiffness, 0.0, "rigid")), "{height} m");
+        }
+    }
+}
+
+#[test]
+fn a_rope_too_soft_for_a_rod_is_refused() {
+    for stiffness in [0.05, 1.0, 20.0] {
+        let refusal = planned(&rope(stiffness, 0.0, "rigid"), "taylor").expect_err("a rope that gives way");
+        assert!(refusal.to_string().contains("the rigid spring `rope`"), "{refusal}");
+    }
+    assert!(planned(&rope(1e3, 0.0, "rigid"), "taylor").is_ok());
+}
+
+#[test]
+fn the_error_of_the_model_grows_with_the_motion() {
+    for stiffness in [1e5, 1e6, 1e7] {
+        let scene = rope(stiffness, 0.0, "rigid");
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
+        let (start, plan) = (mechanism.start(&scene), planned(&scene, "taylor").expect("a plan"));
+        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run");
+        let run = run.trusted(Level::Auto, &start);
+        let trust =
+            driftless::run::integrate(run, &mut |_| Ok(())).expect("an outcome").trust.expect("asked for");
+        let elastic = whole_path(&rope(stiffness, 0.0, "elastic"), MethodId::Taylor, 1e-12);
+        let rigid = whole_path(&scene, MethodId::Taylor, 1e-12);
+        let error = elastic.iter().zip(&rigid).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let said = trust.error_estimate.expect("an estimate");
+        assert!((1.0 / 3.0..10.0).contains(&(said / error)), "{said:e} of {error:e}");
+    }
+}
+
 #[test]
 fn the_energy_with_its_potential_is_kept() {
     let outcome =

@@ -59,8 +59,9 @@ pub struct Mechanism {
     pub torsions: Vec<Torsion>,
     /// The fast vibration of the rigid spring, where it carries energy.
     pub vibration: Option<Vibration>,
-    /// The slowest vibration of a rigid spring at the start, whether it carries energy or not \[rad/s\].
-    pub rigid_rate: Option<f64>,
+    /// The rigid spring of the slowest vibration at the start, whether that carries energy or not, and its
+    /// rate \[rad/s\].
+    pub slowest_rod: Option<(String, f64)>,
     /// Applied forces and torques.
     pub actions: Vec<AppliedAction>,
     /// Forces from outside the crate.
@@ -278,7 +279,7 @@ impl Mechanism {
             springs,
             torsions,
             vibration: None,
-            rigid_rate: None,
+            slowest_rod: None,
             constraints: rows,
             motors: scene.motors.len(),
             contacts,
@@ -354,7 +355,8 @@ impl Mechanism {
                 .started(self, spring.free_length, &z, &omega)
             })
             .collect();
-        self.rigid_rate = started.iter().map(|vibration| vibration.frequency).reduce(f64::min);
+        let rods = started.iter().map(|vibration| (vibration.name.clone(), vibration.frequency));
+        self.slowest_rod = rods.reduce(|least, other| if other.1 < least.1 { other } else { least });
         // What rounding puts into a spring is nothing; not a number counts as energy.
         let most =
             started.into_iter().reduce(|most, other| if other.energy > most.energy { other } else { most });

@@ -78,7 +78,14 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
                     rough(trust.at)
                 ),
             );
-            page.entry("", &format!("trusted over the whole run, {} s", rough(trust.at)));
+            let how_far = match trust.is_beyond_model() {
+                true => format!(
+                    "not trusted to {HORIZON:e} rad: the model is off by more at {} s",
+                    rough(trust.at)
+                ),
+                false => format!("trusted over the whole run, {} s", rough(trust.at)),
+            };
+            page.entry("", &how_far);
         }
         (None, None) => {
             let why = trust.why.as_deref().unwrap_or("nothing was to be compared");
@@ -107,7 +114,8 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
         page.entry(
             "model",
             &format!(
-                "springs taken for rods: off by about {} rad, which no reference solution sees",
+                "springs taken for rods: off by about {} rad, more where errors grow, which no reference \
+                    solution sees",
                 magnitude(error)
             ),
         );

@@ -31,8 +31,8 @@ pub struct FastMode {
     pub periods: f64,
     /// About how many steps the method takes to follow it; zero where it need not.
     pub steps: f64,
-    /// Energy in it over the energy scale.
-    pub energy_share: f64,
+    /// Energy in it over the energy scale, where it is a spring's.
+    pub energy_share: Option<f64>,
 }
 
 impl FastMode {
@@ -118,17 +118,17 @@ impl FastMode {
             plain(until)
         );
         Some(match method {
-            MethodId::Radau(_) if share > EXCITED => {
+            MethodId::Radau(_) if share > Some(EXCITED) => {
                 format!(
-                    "{oscillates}; {method} takes its energy away, {} of the scale, wherever its steps are \
-                        longer than a period",
-                    order(share)
+                    "{oscillates}; {method} takes its energy away{}, wherever its steps are longer than a \
+                        period",
+                    share.map_or(String::new(), |share| format!(", {} of the scale", order(share)))
                 )
             }
             _ => format!(
-                "{oscillates}, about {}; energy in it {} of the scale",
+                "{oscillates}, about {}{}",
                 steps(self.steps),
-                order(share)
+                share.map_or(String::new(), |share| format!("; energy in it {} of the scale", order(share)))
             ),
         })
     }

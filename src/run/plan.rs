@@ -11,7 +11,7 @@ pub(super) use self::pairing::check_forces_of_joints;
 pub(super) use self::pairing::usual;
 
 use self::pairing::{check_vibration, pair};
-use self::rates::{fastest_rate, fixed_step, model_error};
+use self::rates::{fastest_rate, fixed_step, model_error, rate_about_rods};
 use super::choice::{Choice, Prefer, choose, least_tolerance, usual_tolerance};
 use super::custom::Custom;
 use super::fast::{self, FastMode};
@@ -156,7 +156,8 @@ impl Plan {
         };
         check_tolerances(request, method, extended)?;
         let stabilization = pair(mechanism, method, request, &mut notes)?;
-        check_vibration(mechanism, method, rate, &mut notes)?;
+        let about_rods = rate_about_rods(scene, mechanism);
+        check_vibration(mechanism, method, about_rods.unwrap_or(rate), &mut notes)?;
         let (mut step, mut tolerance) = (None, None);
         if method.is_adaptive() {
             let relative =
@@ -209,7 +210,7 @@ impl Plan {
             rows: rows as u64,
             why,
             stiffness,
-            model_error: model_error(mechanism, rate, &mut notes),
+            model_error: model_error(mechanism, about_rods, &mut notes),
             notes,
             integrator: None,
         })

@@ -179,7 +179,12 @@ pub(super) fn check_vibration(
     rate: f64,
     notes: &mut Vec<String>,
 ) -> Result<(), RequestRefusal> {
-    let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else { return Ok(()) };
+    let Some(Vibration { name, energy, frequency, .. }) = &mechanism.vibration else {
+        return match &mechanism.slowest_rod {
+            Some((name, frequency)) if *frequency < rate => Err(too_soft(name, *frequency, 1.0, rate)),
+            _ => Ok(()),
+        };
+    };
     if !matches!(
         method,
         MethodId::Dopri5 | MethodId::Dop853 | MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_)
@@ -193,16 +198,7 @@ pub(super) fn check_vibration(
         ));
     }
     if *frequency < SEPARATE * rate {
-        let reason = format!(
-            "it vibrates at {} rad/s, not {SEPARATE} times as fast as all else, up to {} rad/s",
-            about(*frequency),
-            about(rate)
-        );
-        return Err(mismatch(
-            format!("the rigid spring `{name}`"),
-            &reason,
-            "leave its `model` out: it is soft enough to be resolved",
-        ));
+        return Err(too_soft(name, *frequency, SEPARATE, rate));
     }
     let share = energy / mechanism.energy_scale;
     notes.push(format!(
@@ -213,6 +209,21 @@ pub(super) fn check_vibration(
         about(*frequency)
     ));
     Ok(())
+}
+
+/// A rigid spring that would not vibrate so many times as fast as all else \[rad/s\].
+fn too_soft(name: &str, frequency: f64, times: f64, rate: f64) -> RequestRefusal {
+    let often = if times > 1.0 { format!("{times} times ") } else { String::new() };
+    let reason = format!(
+        "it vibrates at {} rad/s, not {often}as fast as all else, up to {} rad/s",
+        about(frequency),
+        about(rate)
+    );
+    mismatch(
+        format!("the rigid spring `{name}`"),
+        &reason,
+        "leave its `model` out: it is soft enough to be resolved",
+    )
 }
 
 /// Dry friction asks for the forces of joints.

@@ -235,7 +235,7 @@ fn is_alike(one: &Mechanism, other: &Mechanism) -> bool {
     let plain = |mechanism: &Mechanism, from: &Mechanism| Mechanism {
         assembly: from.assembly.clone(),
         energy_scale: from.energy_scale,
-        rigid_rate: from.rigid_rate,
+        slowest_rod: from.slowest_rod.clone(),
         ..mechanism.clone()
     };
     plain(one, other) == *other

@@ -40,11 +40,13 @@ pub use distance::DistanceMetric;
 pub(super) use error_estimator::{ErrorEstimator, SavedEstimator};
 pub use flow::{Flow, FlowState, flow};
 pub use inputs::{Input, Inputs};
+use measured::LAST_DIGIT;
 pub(super) use measured::crossing;
 pub use tangent::TangentFlow;
 pub(super) use tangent::{Ground, eliminate};
 
 use serde::{Deserialize, Serialize};
+use std::f64::consts::TAU;
 use std::fmt;
 use std::str::FromStr;
 
@@ -201,13 +203,20 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// The same of a model with an error of its own \[rad\], which the reference solution shares.
+    /// The same of a model with an error of its own \[rad\], which the reference solution shares, and which
+    /// grows as that of the scene's numbers.
     pub(in crate::run) fn with_model(mut self, error: Option<f64>) -> Self {
         self.model_error = error;
         if let (Some(estimate), Some(model)) = (&mut self.error_estimate, error) {
-            *estimate = estimate.max(model);
+            let growth = self.input_error.map_or(1.0, |error| (error / LAST_DIGIT).max(1.0));
+            *estimate = estimate.max((model * growth).min(TAU));
         }
         self
+    }
+
+    /// True where the model alone may be off by more than [`HORIZON`] at the end.
+    pub fn is_beyond_model(&self) -> bool {
+        self.model_error.is_some() && self.horizon.is_none() && self.error_estimate > Some(HORIZON)
     }
 
     /// Why the reference solution was cut short, where all was to be spent on it.
