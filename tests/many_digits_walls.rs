@@ -1,6 +1,7 @@
 //! Impacts at several walls at one moment in many digits, against closed forms in integer arithmetic.
 
-use super::many_digits::{begun, fixed, last, near, number, one, over, source, times};
+use super::many_digits::{begun, fixed, last, near, number, one, over, pi, source, times};
+use driftless::arithmetic::Real;
 use driftless::run::digits::{DigitsPair, LongError, PairProgress, Precision, ShownRow, forecast};
 use driftless::stepping::StepError;
 use num_bigint::BigInt;
@@ -186,4 +187,73 @@ fn runs_side_by_side_keep_their_rows_up_to_a_stop() {
     assert!(times.len() == 3 && (times[2] - (std::f64::consts::FRAC_PI_6 - 0.1)).abs() < 1e-15, "{times:?}");
     assert!(rows.iter().all(|(_, digits)| digits.is_some_and(|digits| digits > 22.0)), "{rows:?}");
     assert!(pair.up_to_stop().is_empty());
+}
+
+/// A flywheel, whose rates do not depend on its angle, between a stop at -pi/6 and the same at 7 pi/6.
+fn flywheel(omega: &str, spring: &str) -> String {
+    format!(
+        r#"{{"name": "flywheel", "gravity": [0, 0], "bars": [{{"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.25, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "wheel", "point": [0, 0]}}]}}],
+        {spring} "walls": [{{"name": "stop", "body": "wheel", "point": [1, 0], "line": {{"through": [0, -0.5], "normal": [0, 1]}}, "restitution": 1}}],
+        "start": {{"wheel": {{"phi": 0.5, "omega": {omega}}}}}, "until": 4, "every": 4}}"#
+    )
+}
+
+/// From stop to stop it turns by 4 pi/3.
+#[test]
+fn a_free_flywheel_meets_its_stop_on_both_sides() {
+    for (omega, digits) in [("5", 30), ("25", 30), ("25", 60)] {
+        let mut run = begun(&source(&flywheel(omega, ""), &[], "3", "3"), digits);
+        let row = run.row(1, &mut || false).expect("a row").expect("no pause");
+        let (stop, way) = (pi() / 6, pi() * 4 / 3);
+        let turned = fixed("0.5") + &stop + fixed(omega) * 3;
+        let met = &turned / &way;
+        let beyond = &turned - &met * &way;
+        let is_back = &met % 2 == BigInt::from(1);
+        let phi = if is_back { way - beyond } else { beyond } - stop;
+        let places = digits as u32 - 3;
+        near(&number(row.bodies[0][0]), &phi, places);
+        near(&number(row.bodies[0][1]), &if is_back { -fixed(omega) } else { fixed(omega) }, places);
+        assert_eq!(BigInt::from(run.counts()[1]), met);
+    }
+}
+
+/// phi = R cos(w t - d), w² = 20, goes back where it is -pi/6.
+#[test]
+fn a_flywheel_on_a_torsion_spring_goes_back_at_its_stop() {
+    let spring = r#""torsion_springs": [{"name": "s", "body": "wheel", "stiffness": 5, "free_angle": 0}],"#;
+    let w = 20_f64.sqrt();
+    for (omega, digits) in [(3.0, 30), (5.0, 30), (7.0, 60), (3.0, 120)] {
+        let (size, late) = (f64::hypot(0.5, omega / w), f64::atan2(omega / w, 0.5));
+        let turn = (-std::f64::consts::FRAC_PI_6 / size).acos();
+        let (first, period) = ((late + turn) / w, 2.0 * turn / w);
+        let met = ((4.0 - first) / period).floor();
+        let phi = size * (w * (4.0 - first - met * period) - turn).cos();
+        let mut run = begun(&source(&flywheel(&omega.to_string(), spring), &[], "4", "4"), digits);
+        let row = run.row(1, &mut || false).expect("a row").expect("no pause");
+        assert_eq!(run.counts()[1], met as u64 + 1);
+        let found = row.bodies[0][0].value();
+        assert!((found - phi).abs() < 1e-13, "{found} and not {phi} of {omega} rad/s");
+    }
+}
+
+/// A ball comes down at 0.5 m/s, and is met by a wall that moves by 0.6 sin(40 t) m just before its ninth peak.
+#[test]
+fn a_wall_that_moves_fast_meets_a_ball_where_its_law_says() {
+    let met = (8.25 * std::f64::consts::TAU - 0.3) / 40.0;
+    let height = 0.6 * (40.0 * met).sin();
+    let speed = 48.0 * (40.0 * met).cos() + 0.5;
+    let text = format!(
+        r#"{{"name": "ball", "gravity": [0, 0], "bars": [{{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}}],
+        "walls": [{{"name": "wall", "body": "ball", "point": [0, 0], "line": {{"through": [0, 0], "normal": [0, 1]}}, "restitution": 1,
+            "law": {{"start": 0, "rate": 0, "sines": [{{"amplitude": 0.6, "frequency": 40, "phase": 0}}]}}}}],
+        "start": {{"ball": {{"phi": 0, "omega": 0, "origin": [0, {}], "velocity": [0, -0.5]}}}}, "until": 9, "every": 9}}"#,
+        height + 0.5 * met
+    );
+    for digits in [30, 60] {
+        let row = last(&source(&text, &[], "2", "2"), digits);
+        let [y, v] = [3, 5].map(|k| row.bodies[0][k].value());
+        assert!((v - speed).abs() < 1e-11, "{v} and not {speed}");
+        assert!((y - height - speed * (2.0 - met)).abs() < 1e-11, "{y}");
+    }
 }

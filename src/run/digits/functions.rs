@@ -1,7 +1,9 @@
 //! Functions of a motion in many digits, as series: those of events, and the conditions of formulas.
 
 use super::motion::DigitsMotion;
-use super::polynomial::JUDGES;
+use super::polynomial::{CANCELS, JUDGES};
+use super::wall::in_shares;
+use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::force::UserForce;
 use crate::dynamics::series::FormulaSeries;
@@ -44,7 +46,8 @@ impl<const W: usize> Functions<W> {
         }
     }
 
-    /// The part of a step \[s\] within which they converge as far as log2 of the tolerance says.
+    /// The part of a step \[s\] within which they converge as far as log2 of the tolerance says, and their terms
+    /// do not cancel.
     pub fn allows(&self, wanted: f64, tolerance: f64) -> f64 {
         if wanted.is_nan() {
             return wanted;
@@ -68,14 +71,53 @@ impl<const W: usize> Functions<W> {
                 }
                 step = least;
             }
-            step
+            sums_up(powers, step)
         };
         self.powers.iter().fold(wanted, shortened)
     }
+}
+
+/// The part of a step in which the terms of a function do not cancel.
+fn sums_up<const W: usize>(powers: &[Digits<W>], mut step: f64) -> f64 {
+    for _ in 0..ROUNDS {
+        let shares = in_shares(powers, 1.0, step);
+        let largest = shares.iter().fold(0.0, |most: f64, share| most.max(share.abs()));
+        if !step.is_finite() || largest <= libm::exp2(CANCELS) * magnitude(&shares) {
+            break;
+        }
+        step *= 0.75;
+    }
+    step
 }
 
 /// About the largest magnitude of a function whose powers are in shares of a step.
 pub(super) fn magnitude(shares: &[f64]) -> f64 {
     let curve = PowerSeries { powers: shares, end: 1.0 };
     (0..=LOOKS).map(|k| curve.at(k as f64 / LOOKS as f64)[0].abs()).fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// sin(60 t) to many digits converges far beyond where doubles know what its terms sum up to.
+    #[test]
+    fn a_step_is_no_longer_than_doubles_can_sum_a_function_up() {
+        let mut power = Digits::<8>::ONE;
+        let powers = (0..900_u64).map(|m| {
+            if m > 0 {
+                power = (power * Digits::whole(60)).over_whole(m);
+            }
+            [Digits::ZERO, power, Digits::ZERO, -power][m as usize % 4]
+        });
+        let functions = Functions { series: Vec::new(), powers: vec![powers.collect()] };
+        let step = functions.allows(10.0, -2700.0);
+        assert!(step > 0.1, "{step}");
+        let shares = in_shares(&functions.powers[0], 1.0, step);
+        let curve = PowerSeries { powers: &shares, end: 1.0 };
+        for share in [0.25, 0.5, 0.75, 1.0] {
+            let off = curve.at(share)[0] - libm::sin(60.0 * share * step);
+            assert!(off.abs() < 1e-11, "{off:e} at {share} of {step} s");
+        }
+    }
 }

@@ -5,6 +5,8 @@
 //!     h = (tolerance / |w_k|)^(1/k), least over the last five powers k
 //! ```
 //!
+//! So are those of the gaps of walls.
+//!
 //! The series is that of all methods ([`Series`]), over numbers of `W` limbs; the m-th power is kept to as
 //! many limbs as it weighs.  A step's length is a double, so that time is a sum of such and exact, and output
 //! times are read off the steps.  Angles are not wrapped: turns cost no digits worth the name.  Rows that are
@@ -85,6 +87,8 @@ pub struct DigitsMotion<const W: usize> {
     pub(super) watch: EventWatch<W>,
     /// The branches of formulas.
     pub(super) branches: BranchConditions<W>,
+    /// Powers of the gaps of walls that may be met; none of the others.
+    pub(super) gaps: Vec<Vec<Digits<W>>>,
     /// The step the series is to make, where it is that of the state: its length \[s\], and what it ends with
     /// at a wall.
     step: Option<(Digits<W>, Option<Ends>)>,
@@ -124,6 +128,7 @@ impl<const W: usize> DigitsMotion<W> {
             probe: Probe::of(&mechanism, coordinates),
             watch: EventWatch::new(&mechanism, precision.order),
             branches: BranchConditions::new(Functions::new(&mechanism.conditions, precision.order)),
+            gaps: Vec::new(),
             step: None,
             radius: None,
             longest: until,
@@ -175,6 +180,7 @@ impl<const W: usize> DigitsMotion<W> {
             branches: self.branches.clone(),
             zeros: self.zeros.clone(),
             kept: self.kept.clone(),
+            gaps: Vec::new(),
             step: None,
             ..*self
         }
@@ -381,6 +387,7 @@ impl<const W: usize> DigitsMotion<W> {
     fn expand_once(&mut self) -> f64 {
         let LongState { t, u, rate, .. } = &self.state;
         self.series.expand_terms(&self.mechanism.terms(), *t, u, &self.zeros, rate);
+        self.gaps = wall::gaps(self);
         self.wanted()
     }
 

@@ -6,11 +6,16 @@ use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::{Digits, sum_of_products};
 use crate::arithmetic::sum::larger;
 use crate::dynamics::friction::FrictionMode;
+use crate::dynamics::impact::Contact;
 
 /// log2 of the part of the tolerance, over the energy scale, that work may be off by in a step.
 const WORK: f64 = 10.0;
 /// Powers the step is taken from: by symmetry some of them may vanish.
 pub(super) const JUDGES: usize = 5;
+/// log2 of how many times larger terms may be than what they sum up to, where zeros are told in doubles.
+pub(super) const CANCELS: f64 = 12.0;
+/// The first power of a gap that constant accelerations do not have.
+const BENDS: usize = 3;
 
 impl<const W: usize> DigitsMotion<W> {
     /// log2 of the largest of power k of the rates.
@@ -41,7 +46,24 @@ impl<const W: usize> DigitsMotion<W> {
         if self.mechanism.structure.has_work_integral() {
             least = allows(least, &self.series.power);
         }
-        libm::exp2(allows(least, self.series.lost()).min(self.holds_allow()))
+        libm::exp2(allows(least, self.series.lost()).min(self.holds_allow()).min(self.gaps_allow()))
+    }
+
+    /// log2 of the step at which the last powers of the gaps of walls fall below the tolerance, over the lengths
+    /// of their contacts, and in which their terms do not cancel.  Where rates do not depend on angles, as in
+    /// free flight, gaps alone tell how fast bodies turn; so do they of the laws that walls move by.
+    fn gaps_allow(&self) -> f64 {
+        let allows = |(powers, contact): (&Vec<Digits<W>>, &Contact)| {
+            let unit = libm::log2(contact.length);
+            let last = powers.len().saturating_sub(JUDGES);
+            let allowed = |(k, power): (usize, &Digits<W>)| {
+                let tolerance = if k < last { CANCELS } else { self.precision.tolerance() };
+                (tolerance + unit - power.log2()) / k as f64
+            };
+            let least = powers.iter().enumerate().skip(BENDS).map(allowed);
+            least.filter(|least| !least.is_nan()).fold(f64::INFINITY, f64::min)
+        };
+        self.gaps.iter().zip(&self.mechanism.structure.contacts).map(allows).fold(f64::INFINITY, f64::min)
     }
 
     /// log2 of the step at which the last powers fall below the tolerance of the forces that hold: on points
@@ -77,11 +99,16 @@ impl<const W: usize> DigitsMotion<W> {
     pub(super) fn is_enough(&self, step: f64) -> bool {
         let (kept, first) = (&self.kept, self.size(0).max(0.0));
         let log_step = libm::log2(step);
-        let far = |m: usize| {
-            let weight = self.size(m) - first + m as f64 * log_step;
+        let far = |m: usize, size: f64| {
+            let weight = size + m as f64 * log_step;
             weight - 64.0 * (kept[m] - 1) as f64 > self.precision.tolerance()
         };
-        !(0..=self.precision.order).any(far)
+        let far_gap = |(powers, contact): (&Vec<Digits<W>>, &Contact)| {
+            let unit = libm::log2(contact.length);
+            powers.iter().enumerate().skip(1).any(|(m, power)| far(m, power.log2() - unit))
+        };
+        !(0..=self.precision.order).any(|m| far(m, self.size(m) - first))
+            && !self.gaps.iter().zip(&self.mechanism.structure.contacts).any(far_gap)
     }
 
     /// Coordinates, rates, and the work done and the energy lost in friction since the state's time at a time

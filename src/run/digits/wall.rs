@@ -58,18 +58,17 @@ pub fn first<const W: usize>(
             found = Some((ends, time));
         }
     };
-    for (wall, (row, _)) in motion.mechanism.walls.iter().enumerate() {
-        if motion.is_off(row) || motion.state().acting.held.contains(&wall) {
+    for (wall, ((row, _), powers)) in motion.mechanism.walls.iter().zip(&motion.gaps).enumerate() {
+        if powers.is_empty() {
             continue;
         }
-        let powers = gap(&motion.series, motion.state.t, row);
         let length = motion.mechanism.structure.contacts[wall].length;
-        let shares = in_shares(&powers, 1.0 / length, step);
+        let shares = in_shares(powers, 1.0 / length, step);
         if is_near(&shares) {
-            match resting::passage(motion, wall, &powers, step) {
+            match resting::passage(motion, wall, powers, step) {
                 TouchPassage::Nothing => {}
                 TouchPassage::At(time) => comes(Ends::Met(wall), time),
-                TouchPassage::Sinks if resting::is_struck(motion, wall, &powers) => {
+                TouchPassage::Sinks if resting::is_struck(motion, wall, powers) => {
                     comes(Ends::Met(wall), Digits::ZERO);
                 }
                 TouchPassage::Sinks => rests = rests.or(Some(wall)),
@@ -86,7 +85,7 @@ pub fn first<const W: usize>(
                 return Err(motion.stop(Cause::Unsuited, 0.0, &what, hint));
             }
         };
-        comes(Ends::Met(wall), refined(motion, &powers, Digits::of(from)));
+        comes(Ends::Met(wall), refined(motion, powers, Digits::of(from)));
     }
     for (place, &wall) in motion.state().acting.held.iter().enumerate() {
         match resting::pressure_ends(motion, place, step) {
@@ -121,6 +120,15 @@ pub(super) fn in_shares<const W: usize>(powers: &[Digits<W>], factor: f64, step:
         share
     };
     powers.iter().map(share).collect()
+}
+
+/// Powers of the gaps of walls that may be met in a motion where its series is; none of the others.
+pub(super) fn gaps<const W: usize>(motion: &DigitsMotion<W>) -> Vec<Vec<Digits<W>>> {
+    let of_wall = |(wall, (row, _)): (usize, &(ConstraintEquation<Digits<W>>, Digits<W>))| {
+        let is_met = !motion.is_off(row) && !motion.state.acting.held.contains(&wall);
+        if is_met { gap(&motion.series, motion.state.t, row) } else { Vec::new() }
+    };
+    motion.mechanism.walls.iter().enumerate().map(of_wall).collect()
 }
 
 /// Powers of the gap of a wall \[m/s^m\] in a motion from this time on.
