@@ -49,6 +49,37 @@ fn a_horizon_is_proved_or_the_exit_code_says_so() {
     assert!(other.stderr.contains("cannot be used with"));
 }
 
+/// For a tenth of a second in 200 a flywheel stands on a steep hill, so that errors grow by more than 60 digits
+/// between two looks at them: runs begin again, whatever they leave of their tables.
+#[test]
+fn a_proof_that_begins_again_is_written_as_any_other() {
+    let program = Program::with_scenes(&[]);
+    for (steepness, checkpoints, least) in [(963_333, "", 2), (653_333, " --checkpoint-every 0", 1)] {
+        program.write(
+            "hill.json",
+            &format!(
+                r#"{{"name": "hill", "gravity": [0, 0], "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+                "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+                "parameters": {{"steepness": "0 N*m"}},
+                "torques": [{{"name": "hill", "body": "b", "torque": "steepness*sin(3*b.phi - 1)"}}],
+                "events": [{{"name": "on", "when": "t - 195", "set": {{"steepness": "{steepness} N*m"}}}},
+                    {{"name": "off", "when": "t - 195.1", "set": {{"steepness": "0 N*m"}}}}],
+                "start": {{"b": {{"phi": "1/3", "omega": 0}}}}, "until": 200, "every": 5}}"#
+            ),
+        );
+        let ran = program.run(&format!("run hill.json --trusted-until 200 --force{checkpoints}")).exits(0);
+        assert!(ran.stderr.matches("begun again").count() >= least, "{}", ran.stderr);
+        let folder = "output/hill/taylor-trusted";
+        let table = program.read(&format!("{folder}/trajectory.csv"));
+        assert_eq!(table.lines().count(), 42, "{table}");
+        let hash = driftless::run::files::sha256(&table);
+        assert!(program.read(&format!("{folder}/run.json")).contains(&hash));
+        assert!(
+            program.files().iter().all(|file| !file.contains("unfinished") && !file.contains("checkpoint"))
+        );
+    }
+}
+
 #[test]
 fn what_makes_no_sense_is_refused_and_leaves_no_files() {
     let program = Program::with_scenes(&["free"]);

@@ -211,10 +211,15 @@ impl<'a> DigitsTask<'a> {
             }
             self.attempt += 1;
             let precisions = self.again(&pair, &summary)?;
-            // The table begins anew: its rows get as many digits as the others.
+            // The table begins anew, where the old one was: its rows get as many digits as the others.
+            drop(table);
             table = self.begin(&folder, &precisions)?;
             summary = report::Summary::default();
             pair = DigitsPair::new(&self.source, &precisions)?;
+            if checkpoints.has_any() {
+                // The one there is speaks of the old table.
+                self.save(&pair, &mut table, &summary, &folder, &mut checkpoints)?;
+            }
         }
         summary.wall_s = begin.elapsed().as_secs_f64();
         self.publish(&pair, table, summary, &mut folder, checkpoints)
