@@ -487,3 +487,43 @@ fn a_walkers_leg_is_found_from_guesses_far_off() {
     println!("of 100 starts off by up to 0.2, 0.35, 0.7 rad in all angles {counts:?} are found");
     assert!(counts[0] == 100 && counts[1] >= 70 && counts[2] >= 35 && single >= 3, "{counts:?}");
 }
+
+/// A gear and a rack give what they drive from the angle of a bar, however far that is.
+#[test]
+fn what_gears_and_racks_give_is_found_however_large_it_is() {
+    for ratio in [-3e6, -4500.0, -150.0, -45.5, 2.5, 40.0, 51.0, 150.0, 1e4, 7e7] {
+        let text = format!(
+            r#"{{"name": "geared", "gravity": [0, 0], "bars": [
+                {{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}},
+                {{"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}},
+                {{"name": "block", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.25}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}},
+                    {{"body": "bar", "point": [0, 0]}}]}},
+                {{"name": "B", "between": [{{"body": "ground", "point": [1, 0]}},
+                    {{"body": "wheel", "point": [0, 0]}}]}}],
+            "sliders": [{{"name": "S", "point": {{"body": "block", "point": [0, 0]}},
+                "rail": {{"body": "ground", "point": [0, 2], "direction": [3, 4]}}, "angle": "locked"}}],
+            "motors": [{{"name": "gear", "body": "wheel", "law": "{ratio:?}*bar.phi"}},
+                {{"name": "rack", "slider": "S", "law": "{ratio:?}*bar.phi + 0.5"}}],
+            "start": {{"bar": {{"phi": 1.25, "omega": 2}}, "block": {{"phi": 0}}}}, "until": 1, "every": 1}}"#
+        );
+        let scene = parse_scene(&text, "geared", &[]).expect("a scene");
+        let mechanism = compiled(&scene);
+        assert!(mechanism.assembly.changes.is_empty(), "{ratio}: {:?}", mechanism.assembly.changes);
+        let start = mechanism.start(&scene);
+        let [phi, omega] = [&start.phi, &start.omega].map(|of| of.iter().map(|x| x.hi).collect::<Vec<f64>>());
+        assert_eq!((start.unwrapped(0), omega[0]), (1.25, 2.0));
+        let travel = 1.25 * ratio + 0.5;
+        let expected =
+            [(start.unwrapped(1), 1.25 * ratio), (phi[3], 0.6 * travel), (phi[4], 2.0 + 0.8 * travel)];
+        for (k, (found, expected)) in expected.into_iter().enumerate() {
+            assert!(
+                (found - expected).abs() <= 1e-15 * (1.0 + expected.abs()) * 2.0,
+                "{ratio} {k}: {found} {expected}"
+            );
+        }
+        for (found, expected) in [omega[1], omega[3], omega[4]].into_iter().zip([2.0, 1.2, 1.6]) {
+            assert!((found - ratio * expected).abs() <= 1e-14 * ratio.abs(), "{ratio}: {found}");
+        }
+    }
+}

@@ -22,6 +22,8 @@ const NOISE: f64 = 1e-9;
 const GONE: f64 = 1e-25;
 /// The longest step \[rad, or sizes of the mechanism\].
 const LONGEST: f64 = 0.5;
+/// After so many iterations coordinates on which the rows depend linearly go as far as they must.
+const SHORT: usize = 60;
 /// So many iterations are given to make the violations smaller.
 const SLOW: usize = 4;
 /// A row that is left by this is kept \[rad, or levers\].
@@ -220,9 +222,14 @@ impl AssemblyProblem<'_> {
                 break;
             }
             let mut step = matrix.solver(NOISE).solve(&left);
-            let longest = largest(&step);
-            let mut share = if longest > LONGEST { LONGEST / longest } else { 1.0 };
+            let mut longest = largest(&step);
             step.iter_mut().zip(&columns).for_each(|(step, &k)| *step *= self.unit[k]);
+            if longest > LONGEST && iteration >= SHORT {
+                let far = self.equations::<f64>(&moved(q, &step, &columns, 1.0), rows, held, &columns).1;
+                let turned = (0..columns.len()).filter(|&c| !matrix.has_same_column(&far, c));
+                longest = turned.fold(0.0, |most, c| most.max((step[c] / self.unit[columns[c]]).abs()));
+            }
+            let mut share = if longest > LONGEST { LONGEST / longest } else { 1.0 };
             let mut better = None;
             for _ in 0..12 {
                 let trial = moved(q, &step, &columns, share);
@@ -403,6 +410,14 @@ impl RowMatrix {
     fn push(&mut self, full: &[f64], columns: &[usize]) {
         self.entries.extend(columns.iter().map(|&k| full[k]));
         self.rows += 1;
+    }
+
+    /// True where a column is that of another matrix, to rounding.
+    fn has_same_column(&self, other: &Self, column: usize) -> bool {
+        (0..self.rows).all(|i| {
+            let [here, there] = [self, other].map(|matrix| matrix.row(i)[column]);
+            (here - there).abs() <= 1e-12 * here.abs()
+        })
     }
 }
 
