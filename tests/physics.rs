@@ -28,6 +28,7 @@ mod batch_couplings;
 mod batch_loops;
 mod benchmarks;
 mod bounces_beside_friction;
+mod branches_of_motion;
 mod breaking_away;
 mod chains;
 mod contact;

@@ -17,6 +17,7 @@
 
 mod drive;
 mod extremes;
+mod independence;
 mod transmission;
 mod travel;
 mod walk;

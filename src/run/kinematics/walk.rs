@@ -1,21 +1,21 @@
 //! One position after another: predicted from rates and accelerations, solved by projection.
 
+mod fold;
+mod step;
+
+use super::independence::{Independence, determinant, size};
 use super::transmission::Transmission;
 use super::{FOUND, KinematicsError, Limit, Position};
-use crate::arithmetic::{Complex, Scalar};
+use crate::arithmetic::Complex;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion, State, Time};
 use crate::scene::Scene;
 use crate::stabilization::projection::project;
-use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// What a row may be off by, in its own size.
 const KEPT: f64 = 1e-11;
-/// The solution may differ from what was predicted by this \[rad, units of length\], and by this share of the
-/// way there: else it may be on another branch.
-const APART: [f64; 2] = [0.02, 0.1];
 /// Rates that grew by more than this make a fold of the end of a range.
 const STEEP: f64 = 1e3;
 /// Bodies within this of one line are in line at a dead centre \[rad\].
@@ -24,8 +24,6 @@ pub(super) const IN_LINE: f64 = 1e-4;
 const NEARLY_IN_LINE: f64 = 1e-2;
 /// Branches of laws that are tried at a position.
 const BRANCHES: usize = 4;
-/// Up to so many coordinates the sign of det G is watched.
-const WATCHED: usize = 40;
 
 /// A position that was solved, from which others can be: nothing of the scratch space that solved it.
 #[derive(Clone)]
@@ -44,9 +42,11 @@ pub(super) struct SolvedPosition {
 pub(super) struct DriveWalk {
     mechanism: Arc<Mechanism>,
     kernel: Kernel<f64>,
+    /// For what is evaluated beside the state.
+    beside: Kernel<f64>,
     state: State,
     alpha: Vec<f64>,
-    /// The state before a step, and what the step predicts.
+    /// The state before a step, and what the step predicts: coordinates, then rates.
     before: State,
     predicted: Vec<f64>,
     row: usize,
@@ -55,8 +55,10 @@ pub(super) struct DriveWalk {
     transmissions: Vec<Transmission>,
     /// The hinges between two bodies of two hinges each.
     lines: Vec<Transmission>,
-    /// The largest rate there was.
+    /// The largest rate there was, but beside limits.
     usual: f64,
+    /// True at a position that was solved as one beside a limit.
+    is_beside_limit: bool,
 }
 
 impl SolvedPosition {
@@ -91,8 +93,9 @@ impl DriveWalk {
         let mut walk = Self {
             mechanism: Arc::clone(mechanism),
             kernel: Kernel::new(mechanism),
+            beside: Kernel::new(mechanism),
             before: state.clone(),
-            predicted: vec![0.0; n],
+            predicted: vec![0.0; 2 * n],
             state,
             alpha: vec![0.0; n],
             row,
@@ -100,9 +103,10 @@ impl DriveWalk {
             transmissions: transmissions.to_vec(),
             lines: lines.to_vec(),
             usual: 0.0,
+            is_beside_limit: false,
         };
         walk.settle().map_err(|(row, left)| KinematicsError::Start { row, left })?;
-        walk.usual = walk.fastest();
+        walk.usual = walk.usual_rate();
         Ok(walk)
     }
 
@@ -120,6 +124,7 @@ impl DriveWalk {
                 self.state.unwind();
             }
             self.kernel = Kernel::new(&next);
+            self.beside = Kernel::new(&next);
             self.mechanism = Arc::new(next);
             return Ok(true);
         }
@@ -139,6 +144,7 @@ impl DriveWalk {
         self.kernel.accelerate::<0>(mechanism, self.state.time, phi, omega, Bias::default());
         mechanism.share_multipliers(self.state.time, &mut self.kernel, phi, omega);
         self.alpha.copy_from_slice(&self.kernel.load);
+        self.is_beside_limit = self.solve_beside_limit();
     }
 
     /// Solves the rows at both levels, then accelerations and multipliers.
@@ -170,6 +176,17 @@ impl DriveWalk {
         (0..self.alpha.len()).map(|k| self.pace(k)).fold(0.0, f64::max)
     }
 
+    /// The rate of the drive, in its unit.
+    fn drive_rate(&self) -> f64 {
+        let is_angle = self.mechanism.constraints[self.row].is_angle();
+        self.law[1].abs() / if is_angle { 1.0 } else { self.mechanism.units.length }
+    }
+
+    /// The largest rate where it is as elsewhere; beside a limit the drive's.
+    fn usual_rate(&self) -> f64 {
+        if self.is_beside_limit { self.drive_rate() } else { self.fastest() }
+    }
+
     /// The coordinate whose rate that is; none where there are no coordinates.
     fn fastest_coordinate(&self) -> Option<usize> {
         (0..self.alpha.len()).max_by(|&a, &b| self.pace(a).total_cmp(&self.pace(b)))
@@ -181,7 +198,7 @@ impl DriveWalk {
     }
 
     fn size(&self, k: usize) -> f64 {
-        if k < self.mechanism.bodies.len() { 1.0 } else { self.mechanism.units.length }
+        size(&self.mechanism, k)
     }
 
     /// Coordinate `k` with its turns.
@@ -202,45 +219,6 @@ impl DriveWalk {
         self.stand();
     }
 
-    /// Steps to another time; false, and still here, where the solution there is not on this branch for
-    /// certain.
-    fn step(&mut self, t: f64) -> bool {
-        let (n, h) = (self.alpha.len(), t - self.state.time.hi);
-        // The parabola must not turn back within the step: eight times as far from a fold as this is, it
-        // would come to the other branch.
-        if self.fastest_coordinate().is_some_and(|k| (0.5 * h * self.alpha[k]).abs() > self.omega(k).abs()) {
-            return false;
-        }
-        self.before.clone_from(&self.state);
-        self.state.time = Time::of(t);
-        for k in 0..n {
-            let (omega, alpha) = (self.state.y[n + k], self.alpha[k]);
-            self.state.y[k] += h * (omega + 0.5 * h * alpha);
-            self.state.y[n + k] += h * alpha;
-        }
-        self.state.low.fill(0.0);
-        for k in 0..n {
-            self.predicted[k] = self.coordinate(k);
-        }
-        if self.settle().is_ok() && self.is_as_predicted() {
-            return true;
-        }
-        self.state.clone_from(&self.before);
-        self.stand();
-        false
-    }
-
-    /// True where the solution is near what was predicted.
-    fn is_as_predicted(&self) -> bool {
-        let (mut apart, mut way) = (0.0_f64, 0.0_f64);
-        for (k, predicted) in self.predicted.iter().enumerate() {
-            let (here, size) = (self.coordinate(k), self.size(k));
-            apart = apart.max((here - predicted).abs() / size);
-            way = way.max((here - coordinate(&self.before, k)).abs() / size);
-        }
-        apart <= APART[0] && apart <= APART[1] * way + 1e-12
-    }
-
     /// Goes to a time, in smaller steps where it must.
     ///
     /// # Errors
@@ -249,12 +227,16 @@ impl DriveWalk {
         let mut step = to - self.state.time.hi;
         let smallest = FOUND * step.abs().max(to.abs());
         let mut ends = Vec::new();
+        let mut here = self.independence();
         while self.state.time.hi != to {
+            let reach = self.reach(here.as_ref());
             let left = to - self.state.time.hi;
+            step = step.clamp(-reach, reach);
             let next = if step.abs() >= left.abs() { to } else { self.state.time.hi + step };
             let end = self.end();
-            if self.step(next) {
+            if let Ok(there) = self.step(next, here.as_ref()) {
                 ends.extend(end);
+                here = there;
                 step *= 2.0;
             } else if step.abs() <= smallest {
                 return Err(self.limit(&ends));
@@ -262,7 +244,7 @@ impl DriveWalk {
                 step = 0.5 * (next - self.state.time.hi);
             }
         }
-        self.usual = self.usual.max(self.fastest());
+        self.usual = self.usual.max(self.usual_rate());
         Ok(())
     }
 
@@ -270,7 +252,8 @@ impl DriveWalk {
     /// there, dt/dq = 1/q' and d²t/dq² = -q''/q'³, with its vertex at t + q'/(2 q'').  Nothing where a row is
     /// left out, and accelerations with it.
     fn end(&self) -> Option<[f64; 2]> {
-        if (0..self.mechanism.constraints.len()).any(|r| self.kernel.is_left_out(r)) {
+        let is_known = || !(0..self.mechanism.constraints.len()).any(|r| self.kernel.is_left_out(r));
+        if !self.is_beside_limit && !is_known() {
             return None;
         }
         let k = self.fastest_coordinate()?;
@@ -318,7 +301,10 @@ impl DriveWalk {
                 share.clamp(1e-9, 1.0 - 1e-9)
             };
             self.restore(&below);
-            self.go(a + share * (b - a)).ok()?;
+            // Beside a crossing there may be no way to there; what is known of the place stays.
+            if self.go(a + share * (b - a)).is_err() {
+                break;
+            }
             let value = of(self);
             if value == 0.0 {
                 return Some(self.position());
@@ -359,16 +345,23 @@ impl DriveWalk {
 
     /// The sign of det G, as a number; none where G is not square.
     pub fn orientation(&self) -> Option<f64> {
+        let is_square = self.mechanism.constraints.len() == self.alpha.len();
+        if is_square { determinant(&self.mechanism, &self.kernel) } else { None }
+    }
+
+    /// det G and its rate.
+    fn independence(&mut self) -> Option<Independence> {
         let n = self.alpha.len();
-        let mechanism = &*self.mechanism;
-        if mechanism.constraints.len() != n || n > WATCHED {
-            return None;
-        }
-        let mut matrix = DMatrix::<f64>::zeros(n, n);
-        for r in 0..n {
-            self.kernel.fold_gradient(r, (), |(), k, g| matrix[(r, k)] = g * self.size(k));
-        }
-        Some(matrix.lu().determinant())
+        let (mechanism, kernel, time) = (&*self.mechanism, &mut self.beside, self.state.time);
+        let value = determinant(mechanism, &self.kernel)?;
+        let (phi, omega) = self.state.y[..2 * n].split_at(n);
+        let fastest = (0..n).map(|k| (omega[k] / size(mechanism, k)).abs()).fold(0.0, f64::max);
+        Independence::new(value, fastest, |ahead| {
+            let there: Vec<f64> = phi.iter().zip(omega).map(|(phi, omega)| phi + ahead * omega).collect();
+            kernel.place(mechanism, &there);
+            kernel.rows_at(mechanism, time, &there, omega);
+            determinant(mechanism, kernel)
+        })
     }
 
     /// Hinges at which two bodies are in line.
