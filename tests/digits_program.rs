@@ -49,8 +49,8 @@ fn a_horizon_is_proved_or_the_exit_code_says_so() {
     assert!(other.stderr.contains("cannot be used with"));
 }
 
-/// For a tenth of a second in 200 a flywheel stands on a steep hill, so that errors grow by more than 60 digits
-/// between two looks at them: runs begin again, whatever they leave of their tables.
+/// For a tenth of a second in 200 a flywheel stands on a steep hill, so that errors grow by more than 60
+/// digits between two looks at them: runs begin again, whatever they leave of their tables.
 #[test]
 fn a_proof_that_begins_again_is_written_as_any_other() {
     let program = Program::with_scenes(&[]);

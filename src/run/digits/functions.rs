@@ -3,7 +3,6 @@
 use super::motion::DigitsMotion;
 use super::polynomial::{CANCELS, JUDGES};
 use super::wall::in_shares;
-use crate::arithmetic::Scalar;
 use crate::arithmetic::digits::Digits;
 use crate::dynamics::force::UserForce;
 use crate::dynamics::series::FormulaSeries;
@@ -46,8 +45,8 @@ impl<const W: usize> Functions<W> {
         }
     }
 
-    /// The part of a step \[s\] within which they converge as far as log2 of the tolerance says, and their terms
-    /// do not cancel.
+    /// The part of a step \[s\] within which they converge as far as log2 of the tolerance says, and their
+    /// terms do not cancel.
     pub fn allows(&self, wanted: f64, tolerance: f64) -> f64 {
         if wanted.is_nan() {
             return wanted;
@@ -99,6 +98,7 @@ pub(super) fn magnitude(shares: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::Scalar;
 
     /// sin(60 t) to many digits converges far beyond where doubles know what its terms sum up to.
     #[test]

@@ -49,9 +49,10 @@ impl<const W: usize> DigitsMotion<W> {
         libm::exp2(allows(least, self.series.lost()).min(self.holds_allow()).min(self.gaps_allow()))
     }
 
-    /// log2 of the step at which the last powers of the gaps of walls fall below the tolerance, over the lengths
-    /// of their contacts, and in which their terms do not cancel.  Where rates do not depend on angles, as in
-    /// free flight, gaps alone tell how fast bodies turn; so do they of the laws that walls move by.
+    /// log2 of the step at which the last powers of the gaps of walls fall below the tolerance, over the
+    /// lengths of their contacts, and in which their terms do not cancel.  Where rates do not depend on
+    /// angles, as in free flight, gaps alone tell how fast bodies turn; so do they of the laws that walls
+    /// move by.
     fn gaps_allow(&self) -> f64 {
         let allows = |(powers, contact): (&Vec<Digits<W>>, &Contact)| {
             let unit = libm::log2(contact.length);
