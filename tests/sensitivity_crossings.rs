@@ -42,6 +42,55 @@ fn a_block_that_stops_is_derived_by_its_friction() {
     );
 }
 
+/// Without a load a joint with dry friction turns freely: the angle at T moves by T for each rad/s at the start,
+/// whatever its friction is.
+#[test]
+fn what_rests_without_a_load_is_derived_by_its_start_rate() {
+    let scene = |with: &str| {
+        format!(
+            r#"{{"name": "flywheel", "gravity": [0, 0], "until": 2, "every": 2,
+            "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.25, "length": 1}},
+                {{"name": "d", "mass": 1.5, "centre": [0.3, 0], "inertia": 0.1, "length": 1}}],
+            "hinges": [
+                {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}],
+                  "friction": {{"radius": 0.03, "kinetic": 0.2, "static": 0.5}}}},
+                {{"name": "D", "between": [{{"body": "ground", "point": [2, 0]}}, {{"body": "d", "point": [0, 0]}}]}}],
+            "start": {{"b": {{"phi": 0.5, "omega": 0}}, "d": {{"phi": -2, "omega": -2.25}}}}{with}}}"#
+        )
+    };
+    let numbers: [(&str, f64); 3] =
+        [("start.b.omega", 2.0), ("start.b.phi", 1.0), ("hinges.A.friction.kinetic", 0.0)];
+    assert_slopes(&scene(""), "b.phi", 2.0, &numbers);
+    // A load that comes later holds the neighbours where they have come to.
+    let push =
+        r#", "forces": [{"name": "push", "body": "b", "point": [0, 0], "force": ["if(t < 1, 0, 3)", 0]}]"#;
+    let held = derived(&template(&scene(push)), &["b.phi"], &["start.b.omega"], 2.0);
+    let lost = held.lost.expect("it is loaded");
+    assert!(lost.contains("A sticks") && lost.contains("until it has a load"), "{lost}");
+    assert!(held.measures[0].slopes.is_empty());
+}
+
+/// A start of v slides by |v| v/(2 mu g); beside a force that moves it from rest one of -v loses
+/// (F - mu m g)/(F + mu m g) of what one of v gains.
+#[test]
+fn what_rests_under_a_load_has_no_derivative_by_its_start_rate() {
+    for force in [0.0, 10.0] {
+        let scene = format!(
+            r#"{{"name": "block", "gravity": [0, -10], "until": 1, "every": 1, {BLOCK},
+            "forces": [{{"name": "pull", "body": "block", "point": [0, 0], "force": [{force}, 0]}}],
+            "start": {{"block": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}}}}}"#
+        );
+        let found = derived(&template(&scene), &["block.x"], &["start.block.velocity[0]"], 1.0);
+        let why = found.measures[0].why.clone().expect("there is none");
+        assert!(
+            why.contains("no derivative by start.block.velocity[0]: rail is at rest under dry friction"),
+            "{why}"
+        );
+        let others = ["bars.block.mass", "start.block.origin[0]", "sliders.rail.friction.kinetic"];
+        assert_eq!(derived(&template(&scene), &["block.x"], &others, 1.0).lost, None);
+    }
+}
+
 /// A force c t moves a block at rest from t1 = mu0 m g/c on: x = (mu0 - mu) g s²/2 + c s³/(6 m), s = t - t1.
 #[test]
 fn a_block_that_breaks_away_is_derived_by_both_coefficients() {

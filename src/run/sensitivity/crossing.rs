@@ -84,9 +84,10 @@ impl Variation {
             if let Some(off) = off(jumps) {
                 self.off = off;
             }
-            self.follow(&last.mechanism)?;
-            engage(&mut self.engaged, [&before, &last.mechanism]);
-            self.hold(&last.mechanism);
+            let now = self.loosened(&last.mechanism);
+            self.follow(&now)?;
+            engage(&mut self.engaged, [&before, &now]);
+            self.hold(&now);
         }
         self.keep(&last.after);
         Ok(())

@@ -16,6 +16,7 @@
 //!                                                               dy/dp + y' dt/dp
 //! ```
 
+mod at_rest;
 mod collocation;
 mod crossing;
 mod expanded;
@@ -312,6 +313,8 @@ impl Study {
         let mut variation = self.variation(0)?;
         let mut driver = self.driver(&mut outcome, Some(variation.jumps.clone()))?;
         let begin = driver.motion();
+        let numbers: Vec<&str> = self.inputs.iter().map(|input| input.path.as_str()).collect();
+        variation.loosen(driver.holding(), &begin, &numbers);
         variation.begin(&begin);
         let mut recorder = SensitivityRecorder { times, next: 0, asked: &asked, seen: Vec::new() };
         if recorder.next() == Some(0.0) {

@@ -55,6 +55,8 @@ pub(in crate::run) struct Variation {
     pub(super) compiled: Arc<Mechanism>,
     /// Motors and locks that engaged on the way, by row.
     pub(super) engaged: Vec<usize>,
+    /// Places with friction that stick, and are open beside the motion.
+    pub(super) loose: Vec<usize>,
     /// Whether several walls were met at once.
     pub met_several: bool,
     /// The series of the columns, where they have such.
@@ -137,6 +139,7 @@ impl Variation {
             set: SetNumbers { numbers, is_set, slopes: Vec::new() },
             compiled: Arc::clone(mechanism),
             engaged: Vec::new(),
+            loose: Vec::new(),
             met_several: false,
             jacobian: Jacobian::new(mechanism),
             ground: None,
@@ -387,13 +390,17 @@ impl Observer for VariationObserver<'_, '_> {
             }
             let motion = step.at(time);
             variation.keep(motion);
-            look.at(variation, motion, time);
+            variation.watch_loose(motion);
+            if variation.lost.is_none() {
+                look.at(variation, motion, time);
+            }
         }
         if variation.lost.is_some() || !variation.advance(step, end) {
             return ControlFlow::Break(());
         }
         let motion = step.at(end);
         variation.keep(motion);
+        variation.watch_loose(motion);
         look.stepped(variation, motion, end);
         ControlFlow::Continue(())
     }
