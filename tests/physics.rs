@@ -84,6 +84,7 @@ mod many_digits_resting;
 mod many_digits_switched;
 #[cfg(feature = "digits")]
 mod many_digits_walls;
+mod many_turns;
 mod metamorphic;
 mod modes;
 mod moving_walls;

@@ -36,6 +36,23 @@ impl ContactDriver {
         outcome: &mut Outcome,
         monitor: Option<&mut dyn Monitor>,
     ) -> Result<(), StepError> {
+        let many_turns = [
+            self.events.as_ref().is_some_and(|events| events.halvings.is_too_much()),
+            self.extremes.as_ref().is_some_and(|extremes| extremes.halvings.is_too_much()),
+        ];
+        if many_turns.contains(&true) {
+            return Err(StepError {
+                cause: Cause::Unresolved,
+                method: outcome.plan.method.to_string(),
+                t: self.motion().time.hi,
+                step: 0.0,
+                what:
+                    "in the step that ends here a body turns too often for events and outputs to be looked \
+                    for in each turn"
+                        .into(),
+                hint: "end the run earlier with --until, or leave its events and outputs out".into(),
+            });
+        }
         let Some(events) = &mut self.events else { return Ok(()) };
         if let Some(name) = events.take_undefined() {
             return Err(StepError {

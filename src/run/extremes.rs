@@ -8,6 +8,7 @@
 
 mod parts;
 
+use super::halvings::Halvings;
 use super::observer::{Inside, StepWatcher};
 use super::rounding::changes;
 use crate::arithmetic::DoubleDouble;
@@ -42,7 +43,8 @@ const DIGITS: f64 = 16.0;
 const CONSTANT: f64 = 1e-14;
 /// Steps until the next one is tried to be passed over, after one that was not.
 const WAITS: u8 = 1;
-/// Halvings of a step that no interpolant resolves: an output may have corners.
+/// Halvings of a step that no interpolant resolves: an output may have corners.  Of parts with many turns
+/// there are more.
 const HALVINGS: u32 = 6;
 /// Of these the first ones, in whose halves it is asked whether it may be rounding instead.
 const DOUBTS: u32 = 2;
@@ -153,6 +155,7 @@ pub(super) struct ExtremesDetector {
     scratch: OutputScratch,
     /// The branches their formulas are evaluated on; none: those that hold at each place.
     branches: Vec<bool>,
+    pub halvings: Halvings,
     pub memory: ExtremesMemory,
 }
 
@@ -166,6 +169,7 @@ impl ExtremesDetector {
             coordinates: Default::default(),
             scratch: OutputScratch::default(),
             branches: Vec::new(),
+            halvings: Halvings::default(),
             memory: ExtremesMemory { found: vec![Found::default(); count], ..ExtremesMemory::default() },
         })
     }
@@ -308,7 +312,8 @@ impl ExtremesDetector {
         if !is_resolved && depth <= DOUBTS && self.has_more_rounding(inside, begin + 0.5 * span) {
             return self.look(inside, begin, span, depth);
         }
-        if !is_resolved && depth < HALVINGS {
+        let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
+        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS]) {
             self.look(inside, begin, 0.5 * span, depth + 1);
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
         }
@@ -431,11 +436,12 @@ impl StepWatcher for ExtremesDetector {
         if self.memory.rounding.is_empty() {
             self.memory.rounding = rounding_of(&self.changes(inside.at(begin)));
         }
+        self.halvings.begin();
         match self.condition_count() {
             0 => self.look_at(inside, begin, span),
             _ => self.look_at_parts(inside, begin, span),
         }
-        None
+        self.halvings.is_too_much().then_some(end)
     }
 }
 

@@ -51,6 +51,7 @@ pub mod fit;
 pub mod flip;
 #[doc(hidden)]
 pub mod friction;
+mod halvings;
 mod impact_monitor;
 pub mod kinematics;
 pub mod methods;

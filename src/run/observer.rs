@@ -155,12 +155,11 @@ impl Watchers<'_, '_, '_> {
 impl StepWatcher for Watchers<'_, '_, '_> {
     fn step(&mut self, inside: &mut dyn Inside) -> Option<Time> {
         let cut = self.events.as_mut().and_then(|events| events.step(inside));
-        if let Some(extremes) = &mut self.extremes {
-            match cut {
-                Some(end) => extremes.step(&mut Shortened { inside, end }),
-                None => extremes.step(inside),
-            };
-        }
+        let cut = match (&mut self.extremes, cut) {
+            (Some(extremes), Some(end)) => extremes.step(&mut Shortened { inside, end }).or(cut),
+            (Some(extremes), None) => extremes.step(inside),
+            (None, cut) => cut,
+        };
         let Some(observer) = self.observer.as_mut().filter(|watching| watching.observer.wants_steps()) else {
             return cut;
         };

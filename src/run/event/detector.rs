@@ -9,6 +9,7 @@ use crate::dynamics::compile::Laws;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::friction::FrictionWatch;
+use crate::run::halvings::Halvings;
 use crate::run::observer::{Inside, StepWatcher};
 use crate::run::rounding::changes;
 use serde::{Deserialize, Serialize};
@@ -71,6 +72,8 @@ pub(in crate::run) struct EventDetector {
     pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
     pub(super) undefined: Option<usize>,
+    /// Parts of the last step that were halved.
+    pub halvings: Halvings,
     /// Events since somebody last took them.
     found: Vec<EventRecord>,
     count: u64,
@@ -110,6 +113,7 @@ impl EventDetector {
             closers,
             tolerance: 0.0,
             undefined: None,
+            halvings: Halvings::default(),
             found,
             count: 0,
         };
@@ -241,7 +245,7 @@ impl EventDetector {
     }
 
     /// Which passages of an event count; of a condition those that leave its present side.
-    fn counts(&self, event: usize, rises: bool) -> bool {
+    pub(super) fn counts(&self, event: usize, rises: bool) -> bool {
         let direction = match self.owner(event) {
             Owner::Scene(laws, number) => laws.formulas.events[number].direction,
             Owner::Condition(laws, number) => return laws.modes[number] != rises,
@@ -387,8 +391,9 @@ impl StepWatcher for EventDetector {
             self.measure(inside.at(begin));
         }
         let (mut passages, before) = (Vec::new(), (self.memory.sides.clone(), self.memory.still.clone()));
+        self.halvings.begin();
         self.passages(inside, begin, span, 0, &mut passages);
-        if self.undefined.is_some() {
+        if self.undefined.is_some() || self.halvings.is_too_much() {
             return Some(end);
         }
         self.memory.woken.clear();

@@ -6,6 +6,7 @@
 use super::detector::{EventDetector, EventMemory, Owner, SAME};
 use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
+use crate::run::halvings::turns;
 use crate::run::observer::Inside;
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root, sign};
 
@@ -18,8 +19,11 @@ const SHARE: f64 = 0.1;
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: the function has
 /// no zero there, whatever its other digits are.
 const CERTAIN: f64 = 1e-3;
-/// Halvings of a step whose event functions no interpolant resolves.
+/// Halvings of a step whose event functions no interpolant resolves; of parts with many turns there are more.
 const HALVINGS: u32 = 4;
+/// Turns of a part of a step that is not searched beyond what cuts the step short before it, and of which
+/// small shares are straight.
+const MANY_TURNS: f64 = 8.0;
 /// Steps of the secant method at most.
 const ROUNDS: usize = 6;
 /// Share of a step over which the slope of an event function is taken, and which corrections of its zero
@@ -130,9 +134,14 @@ impl EventDetector {
         let is_resolved =
             |(event, curve): (usize, &Chebyshev)| is_enough(event, curve) || !curve.most().is_finite();
         let are_resolved: Vec<bool> = curves.iter().enumerate().map(is_resolved).collect();
-        if are_resolved.contains(&false) && depth < HALVINGS {
-            self.passages(inside, begin, 0.5 * span, depth + 1, all);
-            return self.passages(inside, begin + 0.5 * span, 0.5 * span, depth + 1, all);
+        let (angles, part, depths) = (self.mechanism.bodies.len(), (begin, span), [depth, HALVINGS]);
+        if are_resolved.contains(&false) && self.halvings.asks(inside, angles, part, depths) {
+            let (half, middle, before) = (0.5 * span, begin + 0.5 * span, all.len());
+            self.passages(inside, begin, half, depth + 1, all);
+            if !self.is_cut_before(inside, (middle, half), &all[before..]) {
+                self.passages(inside, middle, half, depth + 1, all);
+            }
+            return;
         }
         let is_last = (inside.span().1 - (begin + span)).hi <= SAME * span;
         for (event, curve) in curves.iter().enumerate() {
@@ -159,6 +168,22 @@ impl EventDetector {
                 None => self.of_event(inside, &part, event, all),
             }
         }
+    }
+
+    /// True for a part of a step with many turns before which one of these passages cuts the step short.
+    fn is_cut_before(&self, inside: &mut dyn Inside, part: (Time, f64), all: &[Passage]) -> bool {
+        let (begin, end) = inside.span();
+        let same = SAME * (end - begin).hi;
+        let has_just_happened = |passage: &Passage| {
+            let mut last = self.memory.last.iter();
+            last.any(|(event, t)| *event == passage.event && (passage.t - *t).hi <= same)
+        };
+        let cuts = |passage: &Passage| {
+            let is_before = (part.0 - passage.t).hi > 2.0 * same;
+            is_before && self.counts(passage.event, passage.rises) && self.changes_run(passage.event)
+        };
+        turns(inside, self.mechanism.bodies.len(), part) > MANY_TURNS
+            && all.iter().any(|passage| cuts(passage) && !has_just_happened(passage))
     }
 
     /// Passages of a condition that is in this mode.
@@ -331,17 +356,26 @@ impl EventDetector {
         self.memory.sides[event] = side;
     }
 
+    /// The length of a step of which small shares are straight \[s\]: of a step with many turns as long as so
+    /// many take.
+    fn straight(&self, inside: &mut dyn Inside) -> f64 {
+        let (begin, end) = inside.span();
+        let span = (end - begin).hi;
+        span / (turns(inside, self.mechanism.bodies.len(), (begin, span)) / MANY_TURNS).max(1.0)
+    }
+
     /// Where a passage near `near` is on the dense output, between the ends of the step.
     pub(super) fn polished(&self, inside: &mut dyn Inside, event: usize, near: Time) -> Time {
         let (begin, end) = inside.span();
+        let span = self.straight(inside);
         let mut at = |t: Time| self.values(inside.at(t))[event];
-        let shift = SAME * (end - begin).hi;
+        let shift = SAME * span;
         let (mut before, mut t) =
             (if (near - begin).hi > shift { near + -shift } else { near + shift }, near);
         let (mut value_before, mut value) = (at(before), at(t));
         for _ in 0..ROUNDS {
             let change = value * (t - before).hi / (value - value_before);
-            if value == 0.0 || !change.is_finite() || change.abs() > 1e-3 * (end - begin).hi {
+            if value == 0.0 || !change.is_finite() || change.abs() > SLOPE * span {
                 break;
             }
             (before, value_before) = (t, value);
@@ -371,7 +405,7 @@ impl EventDetector {
     /// the slope of the dense output.
     fn landed(&self, inside: &mut dyn Inside, event: usize, mut t: Time) -> Time {
         let (begin, end) = inside.span();
-        let span = (end - begin).hi;
+        let span = self.straight(inside);
         let beside = if (t - begin).hi > SLOPE * span { t + -SLOPE * span } else { t + SLOPE * span };
         let mut slope = None;
         for _ in 0..ROUNDS {

@@ -5,6 +5,7 @@
 //! outputs are, and the first of their zeros ends the part; within it the outputs are evaluated on these
 //! branches up to both ends.
 
+use super::super::halvings::turns;
 use super::super::observer::Inside;
 use super::super::rounding::{changes, last_digits};
 use super::{DEGREES, DOUBTS, ExtremesDetector, RESOLVED, has_grown, rounding_of};
@@ -12,12 +13,15 @@ use crate::dynamics::{Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use std::sync::Arc;
 
-/// Parts of a step looked at, and changes in it of conditions that no interpolant resolves; what is left then
-/// is looked at with the branches that hold at each place.
+/// Parts of a step looked at, in each turn of it where that is more, and changes in it of conditions that no
+/// interpolant resolves; what is left then is looked at with the branches that hold at each place.
 const PARTS: usize = 10_000;
+const IN_A_TURN: usize = 64;
 const UNRESOLVED: usize = 32;
-/// Share of a step after its beginning, or a change, at which the branches of a part are taken.
+/// Share of a step, or of as much of it as so many turns take, after its beginning, or a change, at which the
+/// branches of a part are taken.
 const LATER: f64 = 1e-6;
+const TURNS: f64 = 16.0;
 /// Shares of a part by which its ends are moved inwards, until all outputs are finite there: beyond a change
 /// a root may have no value.
 const INWARDS: [f64; 7] = [0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5];
@@ -81,11 +85,13 @@ impl ExtremesDetector {
         let (parts, zeros) = (vec![(0.0, 1.0, 0)], vec![false; self.condition_count()]);
         let mut ahead = PendingStep { begin, span, parts, first: 0.0, zeros, unresolved: UNRESOLVED };
         let mut from = if span > 0.0 { 0.0 } else { 1.0 };
-        for _ in 0..PARTS {
+        let turns = turns(inside, self.mechanism.bodies.len(), (begin, span));
+        let later = LATER / (turns / TURNS).max(1.0);
+        for _ in 0..PARTS.max(IN_A_TURN.saturating_mul(turns as usize)) {
             if from >= 1.0 || ahead.unresolved == 0 {
                 break;
             }
-            ahead.first = f64::min(from + LATER, 1.0);
+            ahead.first = f64::min(from + later, 1.0);
             ahead.zeros.fill(false);
             self.take_branches(inside, &ahead);
             if self.memory.still.is_empty() {
@@ -262,7 +268,8 @@ impl ExtremesDetector {
         if !is_resolved && depth <= DOUBTS && self.have_more_rounding(inside.at(ahead.time(place(0.5)))) {
             return self.search(inside, ahead, [low, high], depth);
         }
-        if !is_resolved && depth < HALVINGS {
+        let (angles, part) = (self.mechanism.bodies.len(), (ahead.time(low), (high - low) * ahead.span));
+        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS]) {
             return PartZeros::TooMuch;
         }
         let is_zero = |k: usize| curves[k].most() <= still[k];

@@ -19,6 +19,18 @@ impl EventDetector {
         self.undefined.take().map(|number| self.events[number].name().into())
     }
 
+    /// True where an event is known to do more than to be recorded.
+    pub fn changes_run(&self, event: usize) -> bool {
+        match self.owner(event) {
+            Owner::Condition(..) | Owner::Friction(..) => true,
+            Owner::Outside(_) => false,
+            Owner::Scene(laws, number) => {
+                let said = &laws.formulas.events[number];
+                said.stop || !said.off.is_empty() || !said.on.is_empty() || said.parameters().next().is_some()
+            }
+        }
+    }
+
     /// The value of the function of the event of this name.
     pub fn value_of(&self, name: &str, motion: &Motion) -> Option<f64> {
         let event = (0..self.functions()).find(|&event| self.name(event) == name)?;
