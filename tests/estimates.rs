@@ -149,7 +149,7 @@ fn of_any_kind(seed: u64, dice: &mut Dice) -> Option<(Scene, Vec<&'static str>)>
         has(mechanism.has_closed_loops(), "loops and sliders"),
         has(mechanism.coordinates() > mechanism.bodies.len(), "floating bodies"),
         has(!scene.motors.is_empty() || !scene.drives.is_empty(), "motors"),
-        has(mechanism.vibration.is_some() || mechanism.rigid_rate.is_some(), "rigid springs"),
+        has(mechanism.vibration.is_some() || mechanism.slowest_rod.is_some(), "rigid springs"),
         has(!scene.springs.is_empty() || !scene.torsion_springs.is_empty(), "springs"),
     ]
     .into_iter()

@@ -411,14 +411,6 @@ impl RowMatrix {
         self.entries.extend(columns.iter().map(|&k| full[k]));
         self.rows += 1;
     }
-
-    /// True where a column is that of another matrix, to rounding.
-    fn has_same_column(&self, other: &Self, column: usize) -> bool {
-        (0..self.rows).all(|i| {
-            let [here, there] = [self, other].map(|matrix| matrix.row(i)[column]);
-            (here - there).abs() <= 1e-12 * here.abs()
-        })
-    }
 }
 
 fn moved(q: &[DoubleDouble], step: &[f64], columns: &[usize], share: f64) -> Vec<DoubleDouble> {

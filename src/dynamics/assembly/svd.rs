@@ -77,6 +77,14 @@ impl RowMatrix {
         };
         (upright, (0..few).map(|i| (0..many).map(|k| entry(i, k)).collect()).collect())
     }
+
+    /// True where a column is that of another matrix, to rounding.
+    pub fn has_same_column(&self, other: &Self, column: usize) -> bool {
+        (0..self.rows).all(|i| {
+            let [here, there] = [self, other].map(|matrix| matrix.row(i)[column]);
+            (here - there).abs() <= 1e-12 * here.abs()
+        })
+    }
 }
 
 /// Rotates pairs of vectors until all are orthogonal, and tells every rotation.
