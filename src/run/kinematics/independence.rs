@@ -11,8 +11,8 @@
 //! J. M. Ortega, W. C. Rheinboldt, *Iterative Solution of Nonlinear Equations in Several Variables* (1970),
 //! section 12.6.
 
-use crate::dynamics::Mechanism;
 use crate::dynamics::kernel::Kernel;
+use crate::dynamics::{Mechanism, Time};
 use nalgebra::DMatrix;
 
 /// From as far as this a crossing is passed in one step \[rad, units of length\].
@@ -30,8 +30,6 @@ pub(super) struct Independence {
     value: f64,
     /// D' \[1/s\].
     rate: f64,
-    /// True where D is the same to the last bit on either side: gears and racks alone.
-    pub is_constant: bool,
 }
 
 impl Independence {
@@ -42,8 +40,7 @@ impl Independence {
             return None;
         }
         let [before, after] = [beside(-ahead)?, beside(ahead)?];
-        let rate = (after - before) / (2.0 * ahead);
-        Some(Self { value, rate, is_constant: before == value && value == after })
+        Some(Self { value, rate: (after - before) / (2.0 * ahead) })
     }
 
     /// The longest step from here, with the largest rate there is.
@@ -72,6 +69,33 @@ pub(super) fn jacobian(mechanism: &Mechanism, kernel: &Kernel<f64>) -> DMatrix<f
         kernel.fold_gradient(r, (), |(), k, g| matrix[(r, k)] = g * size(mechanism, k));
     }
     matrix
+}
+
+/// Places at which G is compared, so far from a position \[rad, units of length\].
+const PLACES: [f64; 2] = [0.3, -1.1];
+/// Share of an entry of G that is rounding.
+const SAME: f64 = 1e-12;
+
+/// Which coordinates G depends on by any of its entries, or is not known not to; those of gears and racks
+/// alone it does not.
+pub(super) fn in_jacobian(mechanism: &Mechanism, kernel: &mut Kernel<f64>, phi: &[f64]) -> Vec<bool> {
+    let n = mechanism.coordinates();
+    let omega = vec![0.0; n];
+    let mut at = |phi: &[f64]| {
+        kernel.place(mechanism, phi);
+        kernel.rows_at(mechanism, Time::default(), phi, &omega);
+        jacobian(mechanism, kernel)
+    };
+    let here = at(phi);
+    let is_in = |k: usize| {
+        PLACES.iter().any(|place| {
+            let mut beside = phi.to_vec();
+            beside[k] += place * size(mechanism, k);
+            let there = at(&beside);
+            !here.iter().zip(there.iter()).all(|(a, b)| (a - b).abs() <= SAME * a.abs())
+        })
+    };
+    (0..n).map(is_in).collect()
 }
 
 /// D of the rows that were evaluated last; none of too many coordinates, or of fewer rows.

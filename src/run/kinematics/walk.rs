@@ -3,7 +3,7 @@
 mod fold;
 mod step;
 
-use super::independence::{Independence, determinant, size};
+use super::independence::{Independence, determinant, in_jacobian, size};
 use super::transmission::Transmission;
 use super::{FOUND, KinematicsError, Limit, Position};
 use crate::arithmetic::Complex;
@@ -59,6 +59,8 @@ pub(super) struct DriveWalk {
     usual: f64,
     /// True at a position that was solved as one beside a limit.
     is_beside_limit: bool,
+    /// Which coordinates G depends on.
+    is_in_jacobian: Vec<bool>,
 }
 
 impl SolvedPosition {
@@ -104,7 +106,9 @@ impl DriveWalk {
             lines: lines.to_vec(),
             usual: 0.0,
             is_beside_limit: false,
+            is_in_jacobian: vec![true; n],
         };
+        walk.look_at_jacobian();
         walk.settle().map_err(|(row, left)| KinematicsError::Start { row, left })?;
         walk.usual = walk.usual_rate();
         Ok(walk)
@@ -126,9 +130,16 @@ impl DriveWalk {
             self.kernel = Kernel::new(&next);
             self.beside = Kernel::new(&next);
             self.mechanism = Arc::new(next);
+            self.look_at_jacobian();
             return Ok(true);
         }
         Ok(false)
+    }
+
+    /// Finds which coordinates the Jacobian of the mechanism depends on.
+    fn look_at_jacobian(&mut self) {
+        let phi = &self.state.y[..self.alpha.len()];
+        self.is_in_jacobian = in_jacobian(&self.mechanism, &mut self.beside, phi);
     }
 
     /// At a state that was solved, where its branches were found.
@@ -174,6 +185,12 @@ impl DriveWalk {
     /// The largest rate, positions in units of length.
     fn fastest(&self) -> f64 {
         (0..self.alpha.len()).map(|k| self.pace(k)).fold(0.0, f64::max)
+    }
+
+    /// The largest rate of what G depends on.
+    fn fastest_of_jacobian(&self) -> f64 {
+        let in_jacobian = (0..self.alpha.len()).filter(|&k| self.is_in_jacobian[k]);
+        in_jacobian.map(|k| self.pace(k)).fold(0.0, f64::max)
     }
 
     /// The rate of the drive, in its unit.
@@ -355,7 +372,8 @@ impl DriveWalk {
         let (mechanism, kernel, time) = (&*self.mechanism, &mut self.beside, self.state.time);
         let value = determinant(mechanism, &self.kernel)?;
         let (phi, omega) = self.state.y[..2 * n].split_at(n);
-        let fastest = (0..n).map(|k| (omega[k] / size(mechanism, k)).abs()).fold(0.0, f64::max);
+        let fastest = self.is_in_jacobian.iter().enumerate().filter(|(_, is_in)| **is_in);
+        let fastest = fastest.map(|(k, _)| (omega[k] / size(mechanism, k)).abs()).fold(0.0, f64::max);
         Independence::new(value, fastest, |ahead| {
             let there: Vec<f64> = phi.iter().zip(omega).map(|(phi, omega)| phi + ahead * omega).collect();
             kernel.place(mechanism, &there);

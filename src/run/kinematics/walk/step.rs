@@ -4,11 +4,12 @@ use super::{DriveWalk, coordinate};
 use crate::arithmetic::Scalar;
 use crate::dynamics::Time;
 use crate::run::kinematics::independence::{ACROSS, Independence};
+use std::sync::Arc;
 
 /// The solution may differ from what was predicted by this \[rad, units of length\], and by this share of the
 /// way there: else it may be on another branch.
 const APART: [f64; 2] = [0.02, 0.1];
-/// No coordinate goes farther in one step \[rad, units of length\], unless G is constant.
+/// No coordinate that G depends on goes farther in one step \[rad, units of length\].
 const LONGEST: f64 = 0.25;
 
 impl DriveWalk {
@@ -23,7 +24,8 @@ impl DriveWalk {
         if self.fastest_coordinate().is_some_and(|k| (0.5 * h * self.alpha[k]).abs() > self.omega(k).abs()) {
             return Err(());
         }
-        let is_across = h.abs() * self.fastest() <= 2.01 * ACROSS;
+        let is_across = h.abs() * self.fastest_of_jacobian() <= 2.01 * ACROSS;
+        let branch = Arc::clone(&self.mechanism);
         self.before.clone_from(&self.state);
         self.state.time = Time::of(t);
         for k in 0..n {
@@ -36,7 +38,7 @@ impl DriveWalk {
             self.predicted[k] = self.coordinate(k);
             self.predicted[n + k] = self.omega(k);
         }
-        if self.settle().is_ok() && self.is_as_predicted(h) {
+        if self.settle().is_ok() && self.is_as_predicted(h, Arc::ptr_eq(&branch, &self.mechanism)) {
             let there = self.independence();
             if is_across || here.zip(there.as_ref()).is_none_or(|(here, there)| there.follows(here, h)) {
                 return Ok(there);
@@ -48,14 +50,15 @@ impl DriveWalk {
     }
 
     /// True where the solution, a step of `h` on, is near what was predicted, and so are its rates: these
-    /// differ by three times as much over the step where positions differ by a term in h³.  The drive's value
-    /// is rounded, and with it how far others are that are faster.
-    fn is_as_predicted(&self, h: f64) -> bool {
+    /// differ by three times as much over the step where positions differ by a term in h³, unless laws came to
+    /// a corner, at which rates jump.  What G does not depend on goes with the others.  The drive's value is
+    /// rounded, and with it how far others are that are faster.
+    fn is_as_predicted(&self, h: f64, is_same_branch: bool) -> bool {
         let n = self.alpha.len();
         let (mut apart, mut way) = (0.0_f64, 0.0_f64);
-        for k in 0..n {
+        for k in (0..n).filter(|&k| self.is_in_jacobian[k]) {
             let (here, size) = (self.coordinate(k), self.size(k));
-            let turned = h * (self.omega(k) - self.predicted[n + k]) / 3.0;
+            let turned = if is_same_branch { h * (self.omega(k) - self.predicted[n + k]) / 3.0 } else { 0.0 };
             apart = apart.max((here - self.predicted[k]).abs().max(turned.abs()) / size);
             way = way.max((here - coordinate(&self.before, k)).abs() / size);
         }
@@ -65,12 +68,7 @@ impl DriveWalk {
 
     /// The longest step that may be tried from here, where this is known of the position.
     pub(super) fn reach(&self, here: Option<&Independence>) -> f64 {
-        let fastest = self.fastest();
-        let of_determinant = here.map_or(f64::INFINITY, |here| here.reach(fastest));
-        if here.is_some_and(|here| here.is_constant) {
-            f64::INFINITY
-        } else {
-            of_determinant.min(LONGEST / fastest)
-        }
+        let fastest = self.fastest_of_jacobian();
+        here.map_or(f64::INFINITY, |here| here.reach(fastest)).min(LONGEST / fastest)
     }
 }
