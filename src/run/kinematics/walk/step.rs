@@ -50,15 +50,16 @@ impl DriveWalk {
     }
 
     /// True where the solution, a step of `h` on, is near what was predicted, and so are its rates: these
-    /// differ by three times as much over the step where positions differ by a term in h³, unless laws came to
-    /// a corner, at which rates jump.  What G does not depend on goes with the others.  The drive's value is
-    /// rounded, and with it how far others are that are faster.
+    /// differ by three times as much over the step where positions differ by a term in h³, unless laws came
+    /// to a corner, at which rates jump.  What G does not depend on goes with the others.  The drive's value
+    /// is rounded, and with it how far others are that are faster.
     fn is_as_predicted(&self, h: f64, is_same_branch: bool) -> bool {
         let n = self.alpha.len();
         let (mut apart, mut way) = (0.0_f64, 0.0_f64);
         for k in (0..n).filter(|&k| self.is_in_jacobian[k]) {
             let (here, size) = (self.coordinate(k), self.size(k));
-            let turned = if is_same_branch { h * (self.omega(k) - self.predicted[n + k]) / 3.0 } else { 0.0 };
+            let turned = h * (self.omega(k) - self.predicted[n + k]) / 3.0;
+            let turned = if is_same_branch { turned } else { 0.0 };
             apart = apart.max((here - self.predicted[k]).abs().max(turned.abs()) / size);
             way = way.max((here - coordinate(&self.before, k)).abs() / size);
         }
