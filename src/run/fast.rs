@@ -100,7 +100,7 @@ impl FastMode {
         if !self.is_stiff() {
             return None;
         }
-        let (name, rate, share) = (self.name(), estimate(self.rate), self.energy_share);
+        let (name, rate) = (self.name(), estimate(self.rate));
         if !self.swings() {
             let cost = if self.steps > 0.0 {
                 format!("; {method} follows it in about {}", steps(self.steps))
@@ -117,19 +117,17 @@ impl FastMode {
             estimate(self.periods),
             plain(until)
         );
-        Some(match method {
-            MethodId::Radau(_) if share > Some(EXCITED) => {
+        let followed = format!("{oscillates}, about {}", steps(self.steps));
+        Some(match (method, self.energy_share) {
+            (MethodId::Radau(_), Some(share)) if share > EXCITED => {
                 format!(
-                    "{oscillates}; {method} takes its energy away{}, wherever its steps are longer than a \
-                        period",
-                    share.map_or(String::new(), |share| format!(", {} of the scale", order(share)))
+                    "{oscillates}; {method} takes its energy away, {} of the scale, wherever its steps are \
+                        longer than a period",
+                    order(share)
                 )
             }
-            _ => format!(
-                "{oscillates}, about {}{}",
-                steps(self.steps),
-                share.map_or(String::new(), |share| format!("; energy in it {} of the scale", order(share)))
-            ),
+            (_, Some(share)) => format!("{followed}; energy in it {} of the scale", order(share)),
+            (_, None) => followed,
         })
     }
 }

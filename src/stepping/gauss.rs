@@ -235,7 +235,8 @@ impl Gauss {
     fn follow<F: OdeSystem + ?Sized>(&self, problem: &mut F, state: &State) -> Result<(), StepError> {
         let Some(found) = problem.stiffness(state.time, &state.y) else { return Ok(()) };
         let radians = found.radians(self.scratch.step.abs());
-        if radians <= RESOLVED || found.is_damped() || found.share.is_none_or(|share| share <= EXCITED) {
+        let Some(share) = found.share else { return Ok(()) };
+        if radians <= RESOLVED || found.is_damped() || share <= EXCITED {
             return Ok(());
         }
         let whose =
@@ -248,7 +249,7 @@ impl Gauss {
             what: format!(
                 "{whose} oscillates at {} rad/s, {radians:.1} rad a step, with {} of the energy scale",
                 estimate(found.fastest),
-                order(found.share.unwrap_or_default())
+                order(share)
             ),
             hint: format!("a step of {} s follows it", estimate(1.0 / found.fastest)),
         })

@@ -22,7 +22,7 @@ const OVERLAP: f64 = 1e-9;
 
 /// What a function does in a step.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum TouchPassage<const W: usize> {
+pub(super) enum FirstPassage<const W: usize> {
     /// It stays positive, or near zero.
     Nothing,
     /// It passes from positive to negative, about here \[s\].
@@ -38,7 +38,7 @@ pub(super) fn passage<const W: usize>(
     unit: f64,
     step: f64,
     least: f64,
-) -> TouchPassage<W> {
+) -> FirstPassage<W> {
     let (mut scale, length) = (Digits::of(1.0 / unit), Digits::of(step));
     let in_shares = |power: &Digits<W>| {
         let share = *power * scale;
@@ -46,7 +46,7 @@ pub(super) fn passage<const W: usize>(
         share
     };
     let mut shares: Vec<Digits<W>> = powers.iter().map(in_shares).collect();
-    let Some(first) = shares.first_mut() else { return TouchPassage::Nothing };
+    let Some(first) = shares.first_mut() else { return FirstPassage::Nothing };
     let mut has_opened = *first > Digits::ZERO && first.log2() > least;
     let size = if has_opened { first.log2() } else { least };
     if !has_opened {
@@ -56,7 +56,7 @@ pub(super) fn passage<const W: usize>(
     let reach = |(m, share): (usize, &Digits<W>)| (size - share.log2()) / m as f64 - 1.0;
     let begin = shares.iter().enumerate().skip(1).map(reach).fold(f64::INFINITY, f64::min);
     if begin >= 0.0 || begin.is_nan() {
-        return TouchPassage::Nothing;
+        return FirstPassage::Nothing;
     }
     let windows = (-begin / f64::from(WINDOW)).floor() as i32;
     let mut from = libm::exp2(begin + f64::from(WINDOW * windows));
@@ -67,17 +67,17 @@ pub(super) fn passage<const W: usize>(
             let level = libm::exp2(least + scale);
             let (opens, sinks) = (root(&curve, level, from, 1.0), root(&curve, -level, from, 1.0));
             match (opens, sinks) {
-                (opens, Some(sink)) if opens.is_none_or(|open| sink < open) => return TouchPassage::Sinks,
+                (opens, Some(sink)) if opens.is_none_or(|open| sink < open) => return FirstPassage::Sinks,
                 (Some(open), _) => (has_opened, from) = (true, open),
                 _ => {}
             }
         }
         if has_opened && let Some(zero) = root(&curve, 0.0, from, 1.0) {
-            return TouchPassage::At(Digits::of(zero).ldexp(-WINDOW * window) * length);
+            return FirstPassage::At(Digits::of(zero).ldexp(-WINDOW * window) * length);
         }
         from = libm::exp2(f64::from(-WINDOW)) * (1.0 - OVERLAP);
     }
-    TouchPassage::Nothing
+    FirstPassage::Nothing
 }
 
 /// Powers in shares of a window that is 2^`log_window` of the step, as doubles of ordinary size, and log2 of
@@ -106,7 +106,7 @@ mod tests {
     #[test]
     fn a_rebound_of_any_height_above_the_least_comes_down_where_it_should() {
         for v in [0.5, 1e-8, 1e-16, 1e-30] {
-            let TouchPassage::At(t) = passage(&powers(&[0.0, v, -5.0, 1e-3]), 1.0, 0.125, -400.0) else {
+            let FirstPassage::At(t) = passage(&powers(&[0.0, v, -5.0, 1e-3]), 1.0, 0.125, -400.0) else {
                 panic!("no passage");
             };
             let t = t.value();
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn what_is_lower_than_the_least_sinks() {
-        let sinks = |of: &[f64]| matches!(passage(&powers(of), 2.0, 0.5, -100.0), TouchPassage::Sinks);
+        let sinks = |of: &[f64]| matches!(passage(&powers(of), 2.0, 0.5, -100.0), FirstPassage::Sinks);
         assert!(sinks(&[0.0, 1e-16, -5.0]));
         assert!(sinks(&[-1e-40, 0.0, 0.0, -1.0]));
         assert!(sinks(&[1e-40, -1.0, 3.0]));
@@ -127,12 +127,12 @@ mod tests {
 
     #[test]
     fn a_small_gap_that_is_approached_closes() {
-        let TouchPassage::At(t) = passage(&powers(&[1e-25, -1e-5, 1.0]), 1.0, 1.0, -110.0) else {
+        let FirstPassage::At(t) = passage(&powers(&[1e-25, -1e-5, 1.0]), 1.0, 1.0, -110.0) else {
             panic!("no passage");
         };
         assert!((t.value() - 1e-20).abs() < 1e-30);
         // One that turns back before it does not.
         let turns = passage(&powers(&[1e-25, -1e-13, 1.0]), 1.0, 1.0, -110.0);
-        assert!(matches!(turns, TouchPassage::Nothing));
+        assert!(matches!(turns, FirstPassage::Nothing));
     }
 }

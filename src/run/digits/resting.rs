@@ -16,7 +16,7 @@
 
 use super::super::contact::DRIVEN;
 use super::coordinates::DigitsCoordinates;
-use super::first_passage::{self, TouchPassage};
+use super::first_passage::{self, FirstPassage};
 use super::friction::Flown;
 use super::motion::{DigitsMotion, LongState};
 use super::projection::DigitsProjection;
@@ -131,13 +131,13 @@ pub fn passage<const W: usize>(
     wall: usize,
     powers: &[Digits<W>],
     step: f64,
-) -> TouchPassage<W> {
+) -> FirstPassage<W> {
     let (length, least) = (motion.mechanism.structure.contacts[wall].length, least(motion, wall));
     let found = first_passage::passage(powers, length, step, least);
-    let TouchPassage::At(near) = found else { return found };
+    let FirstPassage::At(near) = found else { return found };
     let is_open = powers[0] > Digits::ZERO && powers[0].log2() - libm::log2(length) > least;
     // Where it begins on its wall, what is left of the gap is rounding.
-    TouchPassage::At(refined(motion, if is_open { powers } else { &powers[1..] }, near))
+    FirstPassage::At(refined(motion, if is_open { powers } else { &powers[1..] }, near))
 }
 
 /// True where a point comes from its wall, or goes there, so slowly that it stays: by the powers of its gap.
@@ -168,9 +168,9 @@ pub fn pressure_ends<const W: usize>(motion: &DigitsMotion<W>, place: usize, ste
         return Released::Pulled;
     }
     match first_passage::passage(&powers, unit, step, least) {
-        TouchPassage::Nothing => Released::Not,
-        TouchPassage::At(near) => Released::After(refined(motion, &powers, near)),
-        TouchPassage::Sinks => Released::After(Digits::ZERO),
+        FirstPassage::Nothing => Released::Not,
+        FirstPassage::At(near) => Released::After(refined(motion, &powers, near)),
+        FirstPassage::Sinks => Released::After(Digits::ZERO),
     }
 }
 

@@ -9,7 +9,7 @@
 //! What begins near zero, as a velocity does where sliding begins, is followed on all scales of time (module
 //! `touch`).  A place that motors hold at rest slides as soon as they move it.
 
-use super::first_passage::{self, TouchPassage};
+use super::first_passage::{self, FirstPassage};
 use super::friction::SURE;
 use super::functions::LEAVES;
 use super::motion::DigitsMotion;
@@ -106,10 +106,10 @@ fn passes<const W: usize>(
     }
     let is_open = powers[0] > Digits::ZERO && first > least;
     match first_passage::passage(powers, unit, step, least) {
-        TouchPassage::Nothing => None,
+        FirstPassage::Nothing => None,
         // Where it begins at zero, what is left of that is rounding.
-        TouchPassage::At(near) => Some(refined(motion, if is_open { powers } else { &powers[1..] }, near)),
-        TouchPassage::Sinks => Some(Digits::ZERO),
+        FirstPassage::At(near) => Some(refined(motion, if is_open { powers } else { &powers[1..] }, near)),
+        FirstPassage::Sinks => Some(Digits::ZERO),
     }
 }
 

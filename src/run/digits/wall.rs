@@ -11,7 +11,7 @@
 
 use super::super::contact::DRIVEN;
 use super::coordinates::DigitsCoordinates;
-use super::first_passage::TouchPassage;
+use super::first_passage::FirstPassage;
 use super::friction_impact;
 use super::motion::DigitsMotion;
 use super::resting::{self, Released, Unheld};
@@ -66,12 +66,12 @@ pub fn first<const W: usize>(
         let shares = in_shares(powers, 1.0 / length, step);
         if is_near(&shares) {
             match resting::passage(motion, wall, powers, step) {
-                TouchPassage::Nothing => {}
-                TouchPassage::At(time) => comes(Ends::Met(wall), time),
-                TouchPassage::Sinks if resting::is_struck(motion, wall, powers) => {
+                FirstPassage::Nothing => {}
+                FirstPassage::At(time) => comes(Ends::Met(wall), time),
+                FirstPassage::Sinks if resting::is_struck(motion, wall, powers) => {
                     comes(Ends::Met(wall), Digits::ZERO);
                 }
-                TouchPassage::Sinks => rests = rests.or(Some(wall)),
+                FirstPassage::Sinks => rests = rests.or(Some(wall)),
             }
             continue;
         }

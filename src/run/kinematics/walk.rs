@@ -204,7 +204,7 @@ impl DriveWalk {
         if self.is_beside_limit { self.drive_rate() } else { self.fastest() }
     }
 
-    /// The coordinate whose rate that is; none where there are no coordinates.
+    /// The coordinate of the largest rate; none where there are no coordinates.
     fn fastest_coordinate(&self) -> Option<usize> {
         (0..self.alpha.len()).max_by(|&a, &b| self.pace(a).total_cmp(&self.pace(b)))
     }
@@ -368,12 +368,10 @@ impl DriveWalk {
 
     /// det G and its rate.
     fn independence(&mut self) -> Option<Independence> {
-        let n = self.alpha.len();
+        let (n, fastest) = (self.alpha.len(), self.fastest_of_jacobian());
         let (mechanism, kernel, time) = (&*self.mechanism, &mut self.beside, self.state.time);
         let value = determinant(mechanism, &self.kernel)?;
         let (phi, omega) = self.state.y[..2 * n].split_at(n);
-        let fastest = self.is_in_jacobian.iter().enumerate().filter(|(_, is_in)| **is_in);
-        let fastest = fastest.map(|(k, _)| (omega[k] / size(mechanism, k)).abs()).fold(0.0, f64::max);
         Independence::new(value, fastest, |ahead| {
             let there: Vec<f64> = phi.iter().zip(omega).map(|(phi, omega)| phi + ahead * omega).collect();
             kernel.place(mechanism, &there);

@@ -45,10 +45,10 @@ impl DriveWalk {
                 .enumerate()
                 .for_each(|(k, (phi, step))| *phi -= step * size(mechanism, k));
         }
-        let factors = jacobian(mechanism, kernel).lu();
+        let gradients = jacobian(mechanism, kernel);
+        let (least, factors) = (gradients.singular_values().min(), gradients.lu());
         let drive = DVector::from_fn(n, |r, _| -kernel.rows[r].drive);
         let Some(rates) = factors.solve(&drive) else { return false };
-        let least = jacobian(mechanism, kernel).singular_values().min();
         if rates.amax().is_nan() || rates.amax() * least <= FAST * drive_rate {
             return false;
         }
