@@ -471,3 +471,57 @@ fn loads_are_those_of_the_branches_at_each_position() {
     }
     assert!(beyond > 5 && found.limits.is_empty());
 }
+
+/// A crank that turns the first bar of the crank-rocker by a law, with a wheel geared to it by a ratio.
+fn driven_by_law(law: &str, ratio: f64) -> Scene {
+    let text = format!(
+        r#"{{"name": "driven_by_law", "gravity": [0, 0],
+            "bars": [{{"name": "a", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1}},
+                     {{"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1}},
+                     {{"name": "crank", "length": {A}, "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+                     {{"name": "coupler", "length": {B}, "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+                     {{"name": "rocker", "length": {C}, "mass": 1, "centre": [0, 0], "inertia": 0.1}}],
+            "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [2, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                       {{"name": "W", "between": [{{"body": "ground", "point": [3, 0]}}, {{"body": "wheel", "point": [0, 0]}}]}},
+                       {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "crank", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "crank", "point": [{A}, 0]}}, {{"body": "coupler", "point": [0, 0]}}]}},
+                       {{"name": "C", "between": [{{"body": "coupler", "point": [{B}, 0]}}, {{"body": "rocker", "point": [{C}, 0]}}]}},
+                       {{"name": "D", "between": [{{"body": "ground", "point": [{D}, 0]}}, {{"body": "rocker", "point": [0, 0]}}]}}],
+            "motors": [{{"name": "cam", "body": "crank", "law": "{law}"}},
+                       {{"name": "gear", "body": "wheel", "law": "{ratio}*a.phi"}}],
+            "start": {{"a": {{"phi": 0}}, "coupler": {{"phi": 0.6}}, "rocker": {{"phi": 1.9}}}},
+            "until": 1, "every": 1}}"#
+    );
+    parse_scene(&text, "scene.json", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// At a corner of a law rates jump and motion goes on, wherever positions lie.
+#[test]
+fn corners_of_laws_are_no_limits() {
+    for (k, depth, count) in [(3, 0.45, 12), (5, 0.45, 100), (7, 0.45, 100), (9, 0.2, 12), (2, 0.3, 7)] {
+        let scene = driven_by_law(&format!("0.9 - {depth}*abs(sin({k}*a.phi))"), 1.0);
+        let found = over(&scene, "a", count);
+        assert!(found.limits.is_empty(), "{k}: {:?}", found.limits);
+        assert_eq!(found.positions.len(), count + 1);
+        for Position { drive, phi, .. } in &found.positions {
+            let crank = 0.9 - depth * (f64::from(k) * drive).sin().abs();
+            let [coupler, rocker] = closed(crank);
+            let off = [phi[2] - crank, phi[3] - coupler, phi[4] - rocker].map(f64::abs);
+            assert!(off.iter().all(|off| *off < 1e-9), "{k}: {drive} {off:?}");
+        }
+    }
+}
+
+/// A wheel geared to the drive goes round thousands of times while the mechanism goes through its range.
+#[test]
+fn wheels_of_large_ratios_go_with_the_rest() {
+    let found = over(&driven_by_law("a.phi", 1e4), "a", 24);
+    assert!(found.limits.is_empty() && found.positions.len() == 25);
+    for Position { drive, phi, omega, .. } in &found.positions {
+        let [coupler, rocker] = closed(*drive);
+        assert!(
+            (phi[1] - 1e4 * drive).abs() < 1e-7 && (omega[1] - 1e4 * omega[0]).abs() < 1e-7 * omega[1].abs()
+        );
+        assert!((phi[3] - coupler).abs() < 1e-9 && (phi[4] - rocker).abs() < 1e-9, "{drive}: {phi:?}");
+    }
+}

@@ -38,7 +38,9 @@ impl DriveWalk {
             self.predicted[k] = self.coordinate(k);
             self.predicted[n + k] = self.omega(k);
         }
-        if self.settle().is_ok() && self.is_as_predicted(h, Arc::ptr_eq(&branch, &self.mechanism)) {
+        let is_settled = self.settle().is_ok();
+        let is_at_corner = !Arc::ptr_eq(&branch, &self.mechanism);
+        if is_settled && self.is_as_predicted(h, is_at_corner, is_across) {
             let there = self.independence();
             if is_across || here.zip(there.as_ref()).is_none_or(|(here, there)| there.follows(here, h)) {
                 return Ok(there);
@@ -50,17 +52,23 @@ impl DriveWalk {
     }
 
     /// True where the solution, a step of `h` on, is near what was predicted, and so are its rates: these
-    /// differ by three times as much over the step where positions differ by a term in h³, unless laws came
-    /// to a corner, at which rates jump.  What G does not depend on goes with the others.  The drive's value
-    /// is rounded, and with it how far others are that are faster.
-    fn is_as_predicted(&self, h: f64, is_same_branch: bool) -> bool {
+    /// differ by three times as much over the step where positions differ by a term in h³.  Where laws came to
+    /// a corner rates jump, and on a step as short as that across a crossing positions may differ by as much
+    /// as that is.  What G does not depend on goes with the others.  The drive's value is rounded, and with it
+    /// how far others are that are faster.
+    fn is_as_predicted(&self, h: f64, is_at_corner: bool, is_across: bool) -> bool {
         let n = self.alpha.len();
         let (mut apart, mut way) = (0.0_f64, 0.0_f64);
         for k in (0..n).filter(|&k| self.is_in_jacobian[k]) {
             let (here, size) = (self.coordinate(k), self.size(k));
-            let turned = h * (self.omega(k) - self.predicted[n + k]) / 3.0;
-            let turned = if is_same_branch { turned } else { 0.0 };
-            apart = apart.max((here - self.predicted[k]).abs().max(turned.abs()) / size);
+            let off = (here - self.predicted[k]).abs();
+            let jump = (h * (self.omega(k) - self.predicted[n + k])).abs();
+            let off = match (is_at_corner, is_across) {
+                (false, _) => off.max(jump / 3.0),
+                (true, false) => off,
+                (true, true) => off - jump,
+            };
+            apart = apart.max(off / size);
             way = way.max((here - coordinate(&self.before, k)).abs() / size);
         }
         let rounding = 1e-12 + 1e-15 * self.fastest() / self.drive_rate();
