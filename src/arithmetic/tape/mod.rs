@@ -252,34 +252,39 @@ impl Tape {
 
     /// Calls `then` with the results of all operations; up to 64 of them, of plain numbers 256, need no
     /// allocation.
+    ///
+    /// Operations are compiled once for a kind of numbers and inputs, wherever results are kept.
     #[inline]
     pub fn results<S: Scalar, R>(&self, input: impl Fn(u32) -> S, then: impl FnOnce(&[S]) -> R) -> R {
-        match self.len() {
-            0..=16 => self.few::<S, R, 16>(input, then),
-            17..=32 => self.few::<S, R, 32>(input, then),
-            33..=64 => self.few::<S, R, 64>(input, then),
-            // Long scalars, such as dual numbers of many unknowns, would take much of a thread's stack.
-            65..=256 if size_of::<S>() <= 16 => self.few::<S, R, 256>(input, then),
-            count => {
-                let mut slots = vec![S::ZERO; count];
-                self.write(input, &mut slots[..]);
-                then(&slots)
+        let (mut few, mut some, mut many, mut more);
+        let slots: &mut [S] = match self.len() {
+            0..=16 => {
+                few = [S::ZERO; 16];
+                &mut few
             }
-        }
-    }
-
-    #[inline]
-    fn few<S: Scalar, R, const N: usize>(&self, input: impl Fn(u32) -> S, then: impl FnOnce(&[S]) -> R) -> R {
-        let mut slots = [S::ZERO; N];
-        self.write(input, &mut slots);
-        then(&slots)
+            17..=64 => {
+                some = [S::ZERO; 64];
+                &mut some
+            }
+            // Long scalars, such as dual numbers of many unknowns, would take much of a thread's stack.
+            65..=256 if size_of::<S>() <= 16 => {
+                many = [S::ZERO; 256];
+                &mut many
+            }
+            count => {
+                more = vec![S::ZERO; count];
+                &mut more
+            }
+        };
+        self.write(input, slots);
+        then(slots)
     }
 
     /// Writes the results of all operations, of which there are [`Tape::len`].
     #[inline]
-    fn write<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut (impl SlotStore<S> + ?Sized)) {
+    fn write<S: Scalar>(&self, input: impl Fn(u32) -> S, slots: &mut [S]) {
         for (i, operation) in self.operations.iter().enumerate() {
-            let of = |slot: Slot| slots.at(slot as usize);
+            let of = |slot: Slot| slots[slot as usize];
             let result = match *operation {
                 Operation::Input(number) => input(number),
                 Operation::Constant(value) => S::of(value),
@@ -296,50 +301,18 @@ impl Tape {
                 Operation::Power(a, b) => of(a).power_above_zero(of(b)),
                 Operation::Sine(a) => {
                     let (sin, cos) = of(a).sin_cos();
-                    slots.put(i + 1, cos);
+                    slots[i + 1] = cos;
                     sin
                 }
                 Operation::HyperbolicTangent(a) => {
                     let tangent = of(a).tanh();
-                    slots.put(i + 1, S::ONE - tangent * tangent);
+                    slots[i + 1] = S::ONE - tangent * tangent;
                     tangent
                 }
                 Operation::Beside => continue,
             };
-            slots.put(i, result);
+            slots[i] = result;
         }
-    }
-}
-
-/// Where results of operations are written.
-trait SlotStore<S> {
-    fn at(&self, slot: usize) -> S;
-    fn put(&mut self, slot: usize, value: S);
-}
-
-impl<S: Copy> SlotStore<S> for [S] {
-    #[inline(always)]
-    fn at(&self, slot: usize) -> S {
-        self[slot]
-    }
-
-    #[inline(always)]
-    fn put(&mut self, slot: usize, value: S) {
-        self[slot] = value;
-    }
-}
-
-/// A power of two, so that no number of a slot needs a check.
-impl<S: Copy, const N: usize> SlotStore<S> for [S; N] {
-    #[inline(always)]
-    fn at(&self, slot: usize) -> S {
-        const { assert!(N.is_power_of_two()) };
-        self[slot & (N - 1)]
-    }
-
-    #[inline(always)]
-    fn put(&mut self, slot: usize, value: S) {
-        self[slot & (N - 1)] = value;
     }
 }
 
