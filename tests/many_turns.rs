@@ -134,3 +134,76 @@ fn extremes_and_means_of_every_turn_count() {
         assert!((other.mean - part).abs() < 1e-11 && other.min[0] == 0.25, "{method}: {other:?} {part:?}");
     }
 }
+
+/// An encoder gives 50 lines a turn: its formula swings in a step while the wheel hardly turns.
+#[test]
+fn an_event_of_a_formula_that_swings_is_found_in_every_swing() {
+    let (lines, rate, until) = (50.0, TAU, 10.0);
+    let events = format!(r#""events": [{{"name": "e", "when": "sin({lines:?}*b.phi)"}}]"#);
+    let scene = wheel(rate, until, &events);
+    let first = ((START * lines / PI).ceil() * PI / lines - START) / rate;
+    for request in requests() {
+        let outcome = through(&scene, &request);
+        let times: Vec<f64> = outcome.events.iter().map(|event| event.t).collect();
+        assert_eq!(times.len(), 1000, "{:?}", request.method);
+        for (k, t) in times.iter().enumerate() {
+            let expected = first + k as f64 * PI / (lines * rate);
+            assert!((t - expected).abs() < 1e-12, "{:?}: {t:?} and not {expected:?}", request.method);
+        }
+    }
+}
+
+/// A torque that acts on every other tooth gives the work of the teeth that have passed, and never drives back.
+#[test]
+fn a_law_that_is_switched_in_every_swing_does_the_work_of_each() {
+    let (teeth, torque, inertia) = (100.0, 0.02, 0.125);
+    for (formula, share) in [("if(sin(100*b.phi) > 0, 1, 0)", 0.5), ("max(0, sin(100*b.phi))", 1.0 / PI)] {
+        let torques = format!(r#""torques": [{{"name": "q", "body": "b", "torque": "{torque}*{formula}"}}]"#);
+        let scene = wheel(TAU, 1.0, &torques);
+        for request in requests().into_iter().take(3) {
+            let outcome = through(&scene, &request);
+            let (phi, omega) = (outcome.last.phi[0], outcome.last.omega[0]);
+            // From the middle of a gap on: whole pitches, and what has passed of the last one.
+            let done = |phi: f64| {
+                let pitch = TAU / teeth;
+                let (whole, rest) = ((phi / pitch).floor(), phi.rem_euclid(pitch));
+                let part = match share {
+                    0.5 => rest.min(0.5 * pitch),
+                    _ => (1.0 - (teeth * rest.min(0.5 * pitch)).cos()) / teeth,
+                };
+                whole * share * pitch + part
+            };
+            let expected = (TAU * TAU + 2.0 * torque * (done(phi) - done(START)) / inertia).sqrt();
+            assert!(
+                (omega - expected).abs() < 1e-6,
+                "{formula} by {:?}: {omega:?} and not {expected:?}",
+                request.method
+            );
+        }
+    }
+}
+
+/// Where a formula has no value nothing happens; its zeros are those of what it is written with.
+#[test]
+fn events_of_formulas_without_a_value_somewhere_are_those_of_the_rest() {
+    let rate = 3.0;
+    let formulas = [
+        ("sqrt(b.phi) - 0.1", vec![(0.01 - START) / rate]),
+        ("sqrt(0.25 - b.phi^2) - 0.4", vec![(-0.3 - START) / rate, (0.3 - START) / rate]),
+        ("log(t/(1 s)) + 1", vec![(-1.0_f64).exp()]),
+        ("1/(t/(1 s)) - 4", vec![0.25]),
+        ("1/(b.phi - 0.5)", vec![]),
+        ("tan(b.phi)", vec![-START / rate]),
+    ];
+    for (formula, expected) in formulas {
+        let scene = wheel(rate, 0.9, &format!(r#""events": [{{"name": "e", "when": "{formula}"}}]"#));
+        for request in requests() {
+            let outcome = through(&scene, &request);
+            let times: Vec<f64> = outcome.events.iter().map(|event| event.t).collect();
+            assert_eq!(times.len(), expected.len(), "{formula} by {:?}: {times:?}", request.method);
+            for (t, expected) in times.iter().zip(&expected) {
+                assert!((t - expected).abs() < 1e-10, "{formula} by {:?}: {t:?}", request.method);
+            }
+        }
+    }
+}

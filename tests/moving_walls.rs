@@ -304,3 +304,40 @@ fn a_point_that_leaves_a_turning_wall_slowly_is_let_go_once() {
         }
     }
 }
+
+/// A table that shakes thousands of times within a step of the ball's flight is met at the first moment at
+/// which it reaches the ball, by a step's dense output that is looked at in every period.
+#[test]
+fn a_table_that_shakes_fast_is_met_in_its_first_period_that_reaches_the_ball() {
+    let (mut faster, height) = (0, 0.03);
+    for (k, w) in [900.0, 3915.3, 7000.0, 21_000.0, 40_298.0].into_iter().enumerate() {
+        for amplitude in [2.49e-3, 7.5e-3] {
+            let phase = 0.7 + 1.1 * k as f64;
+            let gap = |t: f64| height - 0.5 * G * t * t - amplitude * (w * t + phase).sin();
+            let step = 0.01 / w;
+            let mut to = step;
+            while gap(to) > 0.0 {
+                to += step;
+            }
+            let mut from = to - step;
+            for _ in 0..60 {
+                let middle = 0.5 * (from + to);
+                if gap(middle) > 0.0 { from = middle } else { to = middle }
+            }
+            let law = format!(r#""{amplitude:?}*sin({w:?}*t/(1 s) + {phase:?})*(1 m)""#);
+            let scene = ball(&law, 0.5, [height, 0.0], to * (1.0 + 1e-4), "");
+            for (method, tolerance) in [
+                (MethodId::Dp5, 1e-7),
+                (MethodId::Dp8, 1e-9),
+                (MethodId::Radau(5), 1e-9),
+                (MethodId::Taylor, 1e-9),
+            ] {
+                let outcome = finished(&scene, &adaptive(method, tolerance));
+                let first = outcome.impacts.first().unwrap_or_else(|| panic!("{method} at {w} rad/s: none"));
+                near(first.t, to, 1e-11, &format!("{method} at {w} rad/s"));
+                faster += 1;
+            }
+        }
+    }
+    println!("{faster} first impacts at tables that shake fast");
+}

@@ -265,7 +265,7 @@ fn a_corner_that_touches_without_a_force_takes_part_in_the_impact_of_another() {
             (MethodId::Taylor, 1e-12),
             (MethodId::Dp8, 1e-10),
             (MethodId::Dp8, 1e-11),
-            (MethodId::Radau(9), 1e-11),
+            (MethodId::Radau(5), 1e-11),
         ] {
             let last = done(&PINNED.text(turn, "2"), &adaptive(method, tolerance)).last;
             let off = last.phi[0] - turn - expected.phi[0];

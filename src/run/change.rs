@@ -36,19 +36,19 @@ impl ContactDriver {
         outcome: &mut Outcome,
         monitor: Option<&mut dyn Monitor>,
     ) -> Result<(), StepError> {
-        let many_turns = [
+        let too_many = [
             self.events.as_ref().is_some_and(|events| events.halvings.is_too_much()),
             self.extremes.as_ref().is_some_and(|extremes| extremes.halvings.is_too_much()),
         ];
-        if many_turns.contains(&true) {
+        if too_many.contains(&true) {
             return Err(StepError {
                 cause: Cause::Unresolved,
                 method: outcome.plan.method.to_string(),
                 t: self.motion().time.hi,
                 step: 0.0,
                 what:
-                    "in the step that ends here a body turns too often for events and outputs to be looked \
-                    for in each turn"
+                    "in the step that ends here a body turns, or a formula swings, too often for events and \
+                    outputs to be looked for in each turn and swing"
                         .into(),
                 hint: "end the run earlier with --until, or leave its events and outputs out".into(),
             });

@@ -1,11 +1,12 @@
 //! Events of scenes and from outside the crate: conditions on the motion, and what happens where they come
 //! true.
 //!
-//! The module `detector` looks for them in every step, `search` locates them on its dense output; `branches`
-//! are those of laws that an event changes.
+//! The module `detector` looks for them in every step, `search` finds them on its dense output, `located`
+//! says exactly where; `branches` are those of laws that an event changes.
 
 mod branches;
 mod detector;
+mod located;
 mod search;
 
 #[cfg(feature = "digits")]

@@ -5,9 +5,10 @@
 //! its interpolation.  Where the dense output comes so near to zero that it does not know the side, the step
 //! is repeated to end at the minimum, and what is looked at then has the accuracy of a step, too.
 
+mod opaque;
+
 use super::search::{
-    Chebyshev, Crossing, Curve, IntervalBounds, ROUNDING, TOUCH, crossing, doubtful, interpolated, root,
-    shift, value,
+    Crossing, Curve, IntervalBounds, ROUNDING, TOUCH, crossing, doubtful, root, shift, value,
 };
 use super::{Statistics, finest};
 use crate::dynamics::{Along, OdeSystem, State};
@@ -19,12 +20,6 @@ const LANDINGS: usize = 12;
 const ZERO: f64 = 1e-15;
 /// Times a step is repeated to end at a minimum.
 const ROUNDS: usize = 4;
-/// Degrees of interpolants of event functions that nothing bounds.
-const DEGREES: [usize; 4] = [8, 16, 32, 64];
-/// Halvings of a step in which they do not suffice.
-const HALVINGS: u32 = 6;
-/// Share of its largest value that such an interpolant may be off.
-const RESOLVED: f64 = 1e-10;
 /// Room for a dense output's powers.
 const WIDEST: usize = 10;
 
@@ -283,52 +278,6 @@ impl SearchScratch {
         if self.opaque.is_empty() { found } else { self.opaquely(field, state, h, found) }
     }
 
-    /// The first of the events whose functions are known by their values alone, or what was found before.
-    fn opaquely<F: OdeSystem + ?Sized>(
-        &mut self,
-        field: &mut F,
-        state: &State,
-        h: f64,
-        mut found: FirstEvent,
-    ) -> FirstEvent {
-        let Self { dense, room, gaps, opaque, .. } = self;
-        gaps.resize(field.events(), 0.0);
-        let [y, slope] = room.get_mut();
-        let mut at = |share: f64, row: &mut Vec<f64>| {
-            dense.at(share, y, slope);
-            field.gaps(state.time + share * h, y, gaps);
-            row.extend(opaque.iter().map(|&event| gaps[event]));
-        };
-        // What stays that far from zero need not be known better.
-        let is_enough = |_: usize, curve: &Chebyshev, _: Option<&Chebyshev>| {
-            curve.tail() <= RESOLVED * curve.most() || curve.least() > 10.0 * curve.tail()
-        };
-        let mut parts = vec![(0.0, 1.0, 0)];
-        while let Some((begin, span, depth)) = parts.pop() {
-            if begin >= found.end(1.0) {
-                break;
-            }
-            let looked_at = interpolated(&DEGREES, |share, row| at(begin + share * span, row), is_enough);
-            let curves = &looked_at.curves;
-            // A law of time may be faster than the motion.
-            let is_finite = curves.iter().all(|curve| curve.most().is_finite());
-            if depth < HALVINGS && is_finite && !looked_at.is_resolved {
-                let half = 0.5 * span;
-                parts.extend([(begin + half, half, depth + 1), (begin, half, depth + 1)]);
-                continue;
-            }
-            for (curve, &event) in curves.iter().zip(&*opaque) {
-                let end = ((found.end(1.0) - begin) / span).min(1.0);
-                match crossing(curve, end) {
-                    Crossing::At(share) => found = FirstEvent::At(event, begin + share * span),
-                    Crossing::Inside(share) => found = FirstEvent::Inside(begin + share * span),
-                    Crossing::Nothing => {}
-                }
-            }
-        }
-        found
-    }
-
     /// Repeats the step so that it ends where the event function is zero to rounding.  Where the function
     /// opens at the end of the step first made, the passage lies before, or is one of the longer step's dense
     /// output alone: that step is left, whose own dense output knows more.
@@ -373,9 +322,10 @@ impl SearchScratch {
             (before, gap_before) = (best, gap);
             // Where it opens again the passage lies behind.
             *(if gap > 0.0 && (known.is_none() || slope < 0.0) { &mut low } else { &mut high }) = best;
-            let moved = best - gap / slope;
-            let moved = if moved > low && moved < high { moved } else { 0.5 * (low + high) };
-            if (moved - best).abs() <= f64::EPSILON * best {
+            let newton = best - gap / slope;
+            let moved = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            // Where Newton's method stays at an end of the bracket, time has no moment between.
+            if (newton - best).abs().min((moved - best).abs()) <= f64::EPSILON * best {
                 break;
             }
             best = moved;

@@ -397,15 +397,20 @@ impl StepWatcher for EventDetector {
             return Some(end);
         }
         self.memory.woken.clear();
-        // In the order of their times for each function.
         let all = passages.clone();
         passages.retain(|passage| self.counts(passage.event, passage.rises));
         for passage in passages.iter_mut().filter(|passage| passage.t > begin && !passage.jumps) {
-            passage.t = self.polished(inside, passage.event, passage.t);
+            passage.t = self.polished(inside, passage);
         }
         let due = std::mem::take(&mut self.memory.due).into_iter();
         let due = due.filter(|&(event, rises)| self.counts(event, rises));
-        passages.extend(due.map(|(event, rises)| Passage { t: begin, event, rises, jumps: true }));
+        passages.extend(due.map(|(event, rises)| Passage {
+            t: begin,
+            part: span,
+            event,
+            rises,
+            jumps: true,
+        }));
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for (number, &Passage { t, event, .. }) in passages.iter().enumerate() {
             let is_friction = matches!(self.owner(event), Owner::Friction(..));

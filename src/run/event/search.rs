@@ -8,7 +8,7 @@ use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
 use crate::run::halvings::turns;
 use crate::run::observer::Inside;
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root, sign};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root, sign, swings};
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
@@ -19,16 +19,13 @@ const SHARE: f64 = 0.1;
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: the function has
 /// no zero there, whatever its other digits are.
 const CERTAIN: f64 = 1e-3;
-/// Halvings of a step whose event functions no interpolant resolves; of parts with many turns there are more.
-const HALVINGS: u32 = 4;
+/// Halvings of a step whose event functions no interpolant resolves; of parts with many turns or swings there
+/// are more, and of those with a place beyond which a function has no value.
+pub(super) const HALVINGS: u32 = 4;
+const BORDERS: u32 = 20;
 /// Turns of a part of a step that is not searched beyond what cuts the step short before it, and of which
 /// small shares are straight.
-const MANY_TURNS: f64 = 8.0;
-/// Steps of the secant method at most.
-const ROUNDS: usize = 6;
-/// Share of a step over which the slope of an event function is taken, and which corrections of its zero
-/// keep to.
-const SLOPE: f64 = 1e-3;
+pub(super) const MANY_TURNS: f64 = 8.0;
 /// Share of a step in which an event function leaves zero that was kept there by a joint.
 const LEAVES: f64 = 1e-5;
 /// Share of the largest value, of a condition within the step, of an event so far, up to which a function is
@@ -52,6 +49,8 @@ const INSTANT: f64 = 8.0 * f64::EPSILON;
 #[derive(Clone)]
 pub(super) struct Passage {
     pub t: Time,
+    /// The length of the part of the step it was found in \[s\].
+    pub part: f64,
     pub event: usize,
     pub rises: bool,
     /// True where the function jumps past zero.
@@ -59,15 +58,15 @@ pub(super) struct Passage {
 }
 
 /// A function in a part of a step.
-struct StepPart<'a> {
-    begin: Time,
+pub(super) struct StepPart<'a> {
+    pub begin: Time,
     /// How long it lasts \[s\].
-    span: f64,
+    pub span: f64,
     /// Its interpolant.
-    curve: &'a Chebyshev,
+    pub curve: &'a Chebyshev,
     /// Its values at the nodes, from the last to the first, and where these are, in shares of the part.
-    values: &'a [f64],
-    places: &'a [f64],
+    pub values: &'a [f64],
+    pub places: &'a [f64],
     /// True where the interpolant is as good as the function.
     is_resolved: bool,
     /// True where the step ends with it.
@@ -75,6 +74,13 @@ struct StepPart<'a> {
 }
 
 impl StepPart<'_> {
+    /// The largest magnitude the function can have, where it has values.
+    pub fn most(&self) -> f64 {
+        let most = self.curve.most();
+        let finite = self.values.iter().map(|value| value.abs()).filter(|value| value.is_finite());
+        if most.is_finite() { most } else { finite.fold(0.0, f64::max) }
+    }
+
     /// The values at the first two nodes.
     fn first(&self) -> [f64; 2] {
         [self.values[self.values.len() - 1], self.values[self.values.len() - 2]]
@@ -83,7 +89,7 @@ impl StepPart<'_> {
 
 /// What the last coefficients of an interpolant may be over its largest value, beside a method of this
 /// tolerance.
-fn resolved(tolerance: f64) -> f64 {
+pub(super) fn resolved(tolerance: f64) -> f64 {
     RESOLVED.max(SHARE * tolerance)
 }
 
@@ -131,11 +137,24 @@ impl EventDetector {
         };
         let Interpolants { curves, values, nodes: Nodes { places, .. }, .. } =
             interpolated(&DEGREES, at, |event, curve, _| is_enough(event, curve));
-        let is_resolved =
-            |(event, curve): (usize, &Chebyshev)| is_enough(event, curve) || !curve.most().is_finite();
+        let has_borders = |event: usize| {
+            let is_of_scene = matches!(self.owner(event), Owner::Scene(..));
+            is_of_scene && values[event].iter().any(|value| value.is_finite())
+        };
+        let is_resolved = |(event, curve): (usize, &Chebyshev)| match curve.most().is_finite() {
+            true => is_enough(event, curve),
+            false => !has_borders(event),
+        };
         let are_resolved: Vec<bool> = curves.iter().enumerate().map(is_resolved).collect();
-        let (angles, part, depths) = (self.mechanism.bodies.len(), (begin, span), [depth, HALVINGS]);
-        if are_resolved.contains(&false) && self.halvings.asks(inside, angles, part, depths) {
+        let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
+        let unresolved = || (0..curves.len()).filter(|&event| !are_resolved[event]);
+        let swing = || {
+            let size = |event: usize| self.memory.largest[event].max(curves[event].most());
+            unresolved().any(|event| swings(&values[event], size(event)))
+        };
+        let has_border = unresolved().any(|event| !curves[event].most().is_finite());
+        let depths = [depth, if has_border { BORDERS } else { HALVINGS }];
+        if unresolved().next().is_some() && self.halvings.asks(inside, angles, part, depths, swing) {
             let (half, middle, before) = (0.5 * span, begin + 0.5 * span, all.len());
             self.passages(inside, begin, half, depth + 1, all);
             if !self.is_cut_before(inside, (middle, half), &all[before..]) {
@@ -154,7 +173,12 @@ impl EventDetector {
                 self.undefined.get_or_insert(number);
                 continue;
             }
-            let is_resolved = are_resolved[event];
+            let (is_resolved, is_finite) = (are_resolved[event], curve.most().is_finite());
+            if is_resolved && !is_finite && matches!(self.owner(event), Owner::Scene(..)) {
+                // It has no value here.
+                self.memory.sides[event] = 0;
+                continue;
+            }
             let part = StepPart { begin, span, curve, values: &values[event], places, is_resolved, is_last };
             let mode = match self.owner(event) {
                 Owner::Condition(laws, number) => Some(laws.modes[number]),
@@ -170,7 +194,8 @@ impl EventDetector {
         }
     }
 
-    /// True for a part of a step with many turns before which one of these passages cuts the step short.
+    /// True for a part of a step with many turns or swings before which one of these passages cuts the step
+    /// short.
     fn is_cut_before(&self, inside: &mut dyn Inside, part: (Time, f64), all: &[Passage]) -> bool {
         let (begin, end) = inside.span();
         let same = SAME * (end - begin).hi;
@@ -182,7 +207,7 @@ impl EventDetector {
             let is_before = (part.0 - passage.t).hi > 2.0 * same;
             is_before && self.counts(passage.event, passage.rises) && self.changes_run(passage.event)
         };
-        turns(inside, self.mechanism.bodies.len(), part) > MANY_TURNS
+        (self.halvings.are_many() || turns(inside, self.mechanism.bodies.len(), part) > MANY_TURNS)
             && all.iter().any(|passage| cuts(passage) && !has_just_happened(passage))
     }
 
@@ -213,7 +238,7 @@ impl EventDetector {
             }
         }
         if is_there && sign(left.map_or(next, |share| curve.at(share)[0])) == other {
-            all.push(Passage { t: part.begin, event, rises: !mode, jumps: false });
+            all.push(Passage { t: part.begin, part: part.span, event, rises: !mode, jumps: false });
         }
         let EventMemory { sides, largest, last, .. } = &mut self.memory;
         largest[event] = largest[event].max(most);
@@ -227,7 +252,7 @@ impl EventDetector {
 
     /// Passages of the function of an event.
     fn of_event(&mut self, inside: &mut dyn Inside, part: &StepPart, event: usize, all: &mut Vec<Passage>) {
-        let (begin, [first, next], most) = (part.begin, part.first(), part.curve.most());
+        let (begin, [first, next], most) = (part.begin, part.first(), part.most());
         let is_woken = self.memory.woken.contains(&event);
         let is_now = |before: &Time| (begin - *before).hi <= SAME * part.span;
         let is_corner = self.memory.flipped.iter().any(|(_, flip)| is_now(flip));
@@ -249,7 +274,7 @@ impl EventDetector {
         still.retain(|other| *other != event);
         let is_at_zero = first.abs() <= NO_VALUE * *largest;
         if is_at_zero && *side != 0 && sign(next) == -*side {
-            all.push(Passage { t: begin, event, rises: *side < 0, jumps: false });
+            all.push(Passage { t: begin, part: part.span, event, rises: *side < 0, jumps: false });
         }
         let mut is_behind = due.iter().any(|(due, _)| *due == event)
             || last.iter().any(|(last, before)| *last == event && is_now(before));
@@ -257,7 +282,7 @@ impl EventDetector {
         let beyond = beyond.filter(|value| value.abs() > BEYOND * most);
         if let Some(value) = beyond {
             if *side != 0 && sign(value) == -*side && !is_behind {
-                all.push(Passage { t: begin, event, rises: *side < 0, jumps: true });
+                all.push(Passage { t: begin, part: part.span, event, rises: *side < 0, jumps: true });
             }
             is_behind = true;
         }
@@ -291,7 +316,7 @@ impl EventDetector {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
         let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
         if *side != 0 && value.abs() <= off && sign(slope) == -*side {
-            all.push(Passage { t: end, event, rises: *side < 0, jumps: false });
+            all.push(Passage { t: end, part: part.span, event, rises: *side < 0, jumps: false });
             *side = -*side;
         }
     }
@@ -316,117 +341,16 @@ impl EventDetector {
             let after = sign(part.curve.at(share.min(1.0))[0]);
             // At the very end of a step what follows is not known: it is on the other side.
             *side = if after == 0 || share >= 1.0 { -*side } else { after };
-            all.push(Passage { t: part.begin + zero * part.span, event, rises: *side > 0, jumps: false });
+            all.push(Passage {
+                t: part.begin + zero * part.span,
+                part: part.span,
+                event,
+                rises: *side > 0,
+                jumps: false,
+            });
             if share >= 1.0 {
                 break;
             }
         }
-    }
-
-    /// Passages of a function between the nodes, the first of which is left out where what it shows
-    /// `is_behind`. Values that its interpolant may be off by tell no side.
-    fn between(
-        &mut self,
-        inside: &mut dyn Inside,
-        part: &StepPart,
-        (event, is_behind): (usize, bool),
-        all: &mut Vec<Passage>,
-    ) {
-        let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
-        let (mut side, mut before) = (self.memory.sides[event], 0.0);
-        let nodes = part.places.iter().zip(part.values).rev().skip(usize::from(is_behind));
-        for (&node, &value) in nodes.filter(|(_, value)| value.abs() > off) {
-            let rises = value > 0.0;
-            if side != 0 && rises != (side > 0) {
-                let mut at = |share: f64| self.values(inside.at(part.begin + share * part.span))[event];
-                let (mut from, mut to) = (before, node);
-                loop {
-                    let middle = 0.5 * (from + to);
-                    let is_instant = (to - from) * part.span <= f64::EPSILON * part.begin.hi.abs();
-                    if middle <= from || middle >= to || is_instant {
-                        break;
-                    }
-                    if (at(middle) > 0.0) == rises { to = middle } else { from = middle }
-                }
-                let jumps = at(from).abs().min(at(to).abs()) > off;
-                all.push(Passage { t: part.begin + to * part.span, event, rises, jumps });
-            }
-            (side, before) = (sign(value), node);
-        }
-        self.memory.sides[event] = side;
-    }
-
-    /// The length of a step of which small shares are straight \[s\]: of a step with many turns as long as so
-    /// many take.
-    fn straight(&self, inside: &mut dyn Inside) -> f64 {
-        let (begin, end) = inside.span();
-        let span = (end - begin).hi;
-        span / (turns(inside, self.mechanism.bodies.len(), (begin, span)) / MANY_TURNS).max(1.0)
-    }
-
-    /// Where a passage near `near` is on the dense output, between the ends of the step.
-    pub(super) fn polished(&self, inside: &mut dyn Inside, event: usize, near: Time) -> Time {
-        let (begin, end) = inside.span();
-        let span = self.straight(inside);
-        let mut at = |t: Time| self.values(inside.at(t))[event];
-        let shift = SAME * span;
-        let (mut before, mut t) =
-            (if (near - begin).hi > shift { near + -shift } else { near + shift }, near);
-        let (mut value_before, mut value) = (at(before), at(t));
-        for _ in 0..ROUNDS {
-            let change = value * (t - before).hi / (value - value_before);
-            if value == 0.0 || !change.is_finite() || change.abs() > SLOPE * span {
-                break;
-            }
-            (before, value_before) = (t, value);
-            t = t + -change;
-            t = if t < begin {
-                begin
-            } else if t > end {
-                end
-            } else {
-                t
-            };
-            value = at(t);
-            if change.abs() <= f64::EPSILON * t.hi.abs() {
-                break;
-            }
-        }
-        let t = self.landed(inside, event, t);
-        // A function of the clock is zero as long as the time has one double: that very moment is the same by
-        // every method.
-        let moment = Time::from(t.hi);
-        let is_of_clock = (begin..=end).contains(&moment)
-            && [t, moment].iter().all(|&t| self.values(inside.at(t))[event] == 0.0);
-        if is_of_clock { moment } else { t }
-    }
-
-    /// The same of a method whose dense output is less accurate than its steps: by steps that end there, with
-    /// the slope of the dense output.
-    fn landed(&self, inside: &mut dyn Inside, event: usize, mut t: Time) -> Time {
-        let (begin, end) = inside.span();
-        let span = self.straight(inside);
-        let beside = if (t - begin).hi > SLOPE * span { t + -SLOPE * span } else { t + SLOPE * span };
-        let mut slope = None;
-        for _ in 0..ROUNDS {
-            let Some(value) = inside.landed(t).map(|motion| self.values(motion)[event]) else { break };
-            let slope = *slope.get_or_insert_with(|| {
-                let [here, there] = [t, beside].map(|t| self.values(inside.at(t))[event]);
-                (there - here) / (beside - t).hi
-            });
-            let change = value / slope;
-            if !change.is_finite() || change.abs() > SLOPE * span {
-                break;
-            }
-            let next = t + -change;
-            if next <= begin || next >= end {
-                break;
-            }
-            t = next;
-            if change.abs() <= SAME * SAME.sqrt() * span {
-                break;
-            }
-        }
-        t
     }
 }

@@ -115,6 +115,30 @@ pub fn interpolated(
     found
 }
 
+/// Turning points among the values in a part up to which a function that no interpolant resolves there has a
+/// corner or a jump: one with more swings, and smaller parts resolve it.
+const SWINGS: usize = 4;
+/// Share of a function's size below which a swing may be rounding.
+const SMALL: f64 = 1e-6;
+
+/// True where a function of this size with these values, one after the other in a part of a step, swings too
+/// often for its interpolant.
+pub fn swings(values: &[f64], size: f64) -> bool {
+    let least = SMALL * size;
+    let Some(&(mut last)) = values.first() else { return false };
+    let (mut sense, mut count) = (0.0, 0);
+    for &value in values {
+        let change = value - last;
+        if sense * change >= 0.0 && sense != 0.0 {
+            last = value;
+        } else if change.abs() > least {
+            count += usize::from(sense != 0.0);
+            (sense, last) = (change.signum(), value);
+        }
+    }
+    count > SWINGS
+}
+
 /// A function on \[0, 1\] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
 ///
 /// Its bound is |T_k''| <= k² (k² - 1)/3, which the fall of the c_k keeps small.  Source: L. N. Trefethen,
@@ -157,6 +181,11 @@ impl Chebyshev {
         /// Share to which it falls at least where a function is smooth.
         const FALLS: f64 = 0.3;
         lower.is_some_and(|lower| self.tail() > FALLS * lower.tail())
+    }
+
+    /// How far at most its values are from their mean in the middle of its range.
+    pub fn spread(&self) -> f64 {
+        self.coefficients.iter().skip(1).fold(0.0, |sum, c| sum + c.abs())
     }
 
     /// Its integral from 0 to 1.

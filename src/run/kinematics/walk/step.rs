@@ -52,10 +52,10 @@ impl DriveWalk {
     }
 
     /// True where the solution, a step of `h` on, is near what was predicted, and so are its rates: these
-    /// differ by three times as much over the step where positions differ by a term in h³.  Where laws came to
-    /// a corner rates jump, and on a step as short as that across a crossing positions may differ by as much
-    /// as that is.  What G does not depend on goes with the others.  The drive's value is rounded, and with it
-    /// how far others are that are faster.
+    /// differ by three times as much over the step where positions differ by a term in h³.  Where laws came
+    /// to a corner rates jump, and on a step as short as that across a crossing positions may differ by as
+    /// much as that is.  What G does not depend on goes with the others.  The drive's value is rounded, and
+    /// with it how far others are that are faster.
     fn is_as_predicted(&self, h: f64, is_at_corner: bool, is_across: bool) -> bool {
         let n = self.alpha.len();
         let (mut apart, mut way) = (0.0_f64, 0.0_f64);
