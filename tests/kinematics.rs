@@ -110,6 +110,37 @@ fn limits_and_dead_centres_are_where_the_law_of_cosines_has_them() {
     assert!((range.min[0] - least).abs() < 1e-12 && (range.max[0] - FRAC_PI_2).abs() < 1e-6, "{range:?}");
 }
 
+/// The rocker as the drive goes to where crank and coupler are in line; there the crank is infinitely fast, and
+/// the pen where the law of cosines has it.
+#[test]
+fn extremes_reach_up_to_the_limits_however_many_positions_there_are() {
+    let mut scene = example("crank_rocker");
+    scene.outputs.retain(|output| ["pen.x", "pen_speed"].contains(&output.name.as_str()));
+    let pen = |crank: f64, f: f64| A * crank.cos() + 0.15 * f.cos() - 0.12 * f.sin();
+    // The angle at the ground of the triangle of ground, rocker and the line of crank and coupler.
+    let angle = |line: f64| ((D * D + line * line - C * C) / (2.0 * D * line)).acos();
+    let [stretched, folded] = [A + B, B - A].map(angle);
+    let most = [pen(folded + PI, folded), pen(stretched, stretched)];
+    for count in [7, 36] {
+        let swung = kinematics(&scene, &KinematicDrive { rate: Some(1.0), ..drive("rocker=0..3") }, count)
+            .expect("kinematics");
+        let [upper, lower] = [1, 0].map(|k| swung.limits[k].drive);
+        let range = |name: &str| swung.ranges.iter().find(|range| range.name == name).expect("a column");
+        let x = range("pen.x");
+        assert!((x.max[0] - most[1]).abs() < 1e-7 && x.max[1] == lower, "{count}: {x:?} {most:?}");
+        assert!((x.min[0] - most[0]).abs() < 1e-7 && x.min[1] == upper, "{count}: {x:?} {most:?}");
+        assert_eq!(range("motor.torque").min, [f64::NEG_INFINITY, lower], "{count}");
+        assert_eq!(range("motor.torque").max, [f64::INFINITY, upper], "{count}");
+        let speed = range("pen_speed");
+        assert!((speed.min[0] - 0.24418).abs() < 1e-5 && speed.max[0].is_infinite(), "{count}: {speed:?}");
+        assert!(range("transmission.A").min[0].abs() < 1e-7, "{count}: {:?}", range("transmission.A"));
+        let object = driftless::report::kinematics::object(&swung);
+        let told = &object["extremes"]["motor.torque"]["max"];
+        assert!(told["value"].is_null() && told["drive"].as_f64() == Some(upper), "{told}");
+        assert!(driftless::report::kinematics::text(&swung).contains("unbounded"));
+    }
+}
+
 /// The rocker as the drive from beside its limit, where the crank is fast: it stays on its side of the dead centre.
 #[test]
 fn no_branch_is_left_for_another_beside_a_limit() {

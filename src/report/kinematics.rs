@@ -21,7 +21,7 @@ use std::fmt::Write;
 const LISTED: usize = 8;
 
 /// One object: `drive`, `positions` (their number), `limits`, `dead_centres`, `change_points`, `extremes`,
-/// `assemblies`, `left_out`.
+/// `assemblies`, `left_out`.  The value of an extreme without bound is null.
 pub fn object(found: &Kinematics) -> Value {
     let range = [found.positions.first(), found.positions.last()].map(|at| at.map(|at| at.drive));
     let extremes = found.ranges.iter().map(|Range { name, unit, min, max }| {
@@ -110,7 +110,8 @@ pub fn text(found: &Kinematics) -> String {
     let rows: Vec<Vec<String>> = (found.ranges.iter())
         .map(|Range { name, unit, min, max }| {
             let numbers = [min[0], min[1], max[0], max[1]];
-            std::iter::once(format!("{name} [{unit}]")).chain(numbers.into_iter().map(figure)).collect()
+            let told = |x: f64| if x.is_infinite() { "unbounded".to_owned() } else { figure(x) };
+            std::iter::once(format!("{name} [{unit}]")).chain(numbers.into_iter().map(told)).collect()
         })
         .collect();
     let at = format!("at [{unit}]");
@@ -221,7 +222,7 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
             unit: unit.replace(' ', "·"),
             time: drives.clone(),
             value: found.positions.iter().map(|at| at.column(column)).collect(),
-            extremes: vec![*min, *max],
+            extremes: [*min, *max].into_iter().filter(|extreme| extreme[0].is_finite()).collect(),
         });
     // An output may be what the table has as the force of the drive: one curve is enough.
     let mut outputs: Vec<OutputSeries> = outputs.collect();

@@ -29,10 +29,11 @@ pub use transmission::Transmission;
 use crate::dynamics::Mechanism;
 use crate::scene::Scene;
 use drive::DrivenScene;
+use extremes::SolvedRange;
 use serde::Serialize;
 use std::sync::Arc;
 use travel::SliderTravel;
-use walk::{DriveWalk, IN_LINE, SolvedPosition};
+use walk::{DriveWalk, IN_LINE, LimitApproach, SolvedPosition};
 
 /// Relative width at which a searched time is taken for found.
 const FOUND: f64 = 1e-13;
@@ -104,9 +105,9 @@ pub struct Range {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Least value, and where.
+    /// Least value, and where; infinite where it falls without bound towards a limit, and the limit.
     pub min: [f64; 2],
-    /// Largest value, and where.
+    /// Largest value, and where; infinite where it grows without bound towards a limit, and the limit.
     pub max: [f64; 2],
 }
 
@@ -166,10 +167,12 @@ pub fn kinematics(
     let value = |k: usize| range[0] + (range[1] - range[0]) * (k as f64 / count as f64);
     let time = |value: f64| (value - start) / rate;
     // The positions on either side of the start, each from there outwards.
+    let is_asked = |drive: f64| range[0] <= drive && drive <= range[1];
     let mut limits = Vec::new();
     let mut sides: [Vec<SolvedPosition>; 2] = Default::default();
+    let mut approaches: [Option<LimitApproach>; 2] = Default::default();
     let mut here = walk.clone();
-    for (side, is_below) in sides.iter_mut().zip([true, false]) {
+    for ((side, approach), is_below) in sides.iter_mut().zip(&mut approaches).zip([true, false]) {
         let mut values: Vec<f64> = (0..=count).map(value).filter(|v| (*v < start) == is_below).collect();
         if is_below {
             values.reverse();
@@ -179,22 +182,25 @@ pub fn kinematics(
             match here.go(time(value)) {
                 Ok(()) => side.push(here.solved()),
                 Err(limit) => {
+                    let last = side.last().cloned().unwrap_or_else(|| walk.solved());
+                    let way = is_asked(limit.drive).then(|| here.approach(&last, &limit));
+                    *approach = way.map(|way| way.within(is_asked));
                     limits.push(limit);
                     break;
                 }
             }
         }
     }
-    let [below, above] = sides;
-    let all: Vec<SolvedPosition> = below.into_iter().rev().chain(above).collect();
+    let all = SolvedRange::new(sides, approaches);
+    let rows = &all.positions[all.rows.clone()];
     let mut found = Kinematics {
         branches: mechanism.other_assemblies(&scene, ATTEMPTS).0,
         left_out: left_out(&scene),
-        is_closed: is_turn && all.first().zip(all.last()).is_some_and(|(a, b)| a.is_as(b, &mechanism)),
+        is_closed: is_turn && rows.first().zip(rows.last()).is_some_and(|(a, b)| a.is_as(b, &mechanism)),
         dead_centres: Vec::new(),
         change_points: Vec::new(),
         ranges: Vec::new(),
-        positions: Vec::new(),
+        positions: rows.iter().map(|one| one.position.clone()).collect(),
         drive: label,
         motor: name,
         scene,
@@ -206,17 +212,18 @@ pub fn kinematics(
         transmissions,
     };
     found.search(&all, &mut here);
-    found.positions = all.into_iter().map(|one| one.position).collect();
     Ok(found)
 }
 
 impl Kinematics {
-    /// Looks between positions for dead centres, change points and extremes.
-    fn search(&mut self, all: &[SolvedPosition], walk: &mut DriveWalk) {
+    /// Looks between positions, and up to limits, for dead centres, change points and extremes.
+    fn search(&mut self, range: &SolvedRange, walk: &mut DriveWalk) {
+        let all = &range.positions[..];
         let coordinates = self.mechanism.coordinates();
         let own = self.mechanism.own_bodies().len();
         let shown: Vec<usize> = (0..own).chain(self.mechanism.bodies.len()..coordinates).collect();
-        let fastest = |k: usize| all.iter().map(|one| one.position.omega[k].abs()).fold(0.0, f64::max);
+        let rows = &all[range.rows.clone()];
+        let fastest = |k: usize| rows.iter().map(|one| one.position.omega[k].abs()).fold(0.0, f64::max);
         let most = shown.iter().map(|&k| fastest(k)).fold(0.0, f64::max);
         let moving: Vec<usize> = shown.into_iter().filter(|&k| fastest(k) > STILL * most).collect();
         for k in moving {
@@ -226,7 +233,7 @@ impl Kinematics {
         }
         for travel in SliderTravel::of(&self.scene, &self.mechanism) {
             let rates = travel.rates(all, walk);
-            let fastest = rates.iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
+            let fastest = rates[range.rows.clone()].iter().fold(0.0, |most: f64, rate| most.max(rate.abs()));
             if fastest <= STILL * most * self.mechanism.units.length {
                 continue;
             }
@@ -244,7 +251,7 @@ impl Kinematics {
                 self.change_points.extend(walk.root([before, after], sign).map(|found| found.drive));
             }
         }
-        self.extremes(all, walk);
+        self.extremes(range, walk);
     }
 
     /// Finds where something turns back between positions, at which it has these rates, and at the last of
@@ -271,7 +278,7 @@ impl Kinematics {
     }
 
     /// Looks for the extremes of all columns.
-    fn extremes(&mut self, all: &[SolvedPosition], walk: &mut DriveWalk) {
+    fn extremes(&mut self, range: &SolvedRange, walk: &mut DriveWalk) {
         let outputs = self.mechanism.outputs.clone();
         let heads: Vec<(String, String)> =
             std::iter::once((self.name_of_force(), self.unit_of_force().to_owned()))
@@ -284,7 +291,7 @@ impl Kinematics {
             .into_iter()
             .enumerate()
             .filter_map(|(column, (name, unit))| {
-                let [min, max] = [1.0, -1.0].map(|sign| walk.least(all, column, sign));
+                let [min, max] = [1.0, -1.0].map(|sign| walk.least(range, column, sign));
                 let (min, max) = (min?, max?);
                 Some(Range { name, unit, min, max: [-max[0], max[1]] })
             })

@@ -1,40 +1,81 @@
 //! Extremes over a range, at positions and between them.
 
 use super::Limit;
-use super::walk::{DriveWalk, SolvedPosition};
+use super::walk::{DriveWalk, LimitApproach, SolvedPosition};
 use crate::stepping::search::golden_sections;
+use std::ops::Range;
 
 /// Least values of the positions beside which a column's least value is looked for, and golden sections
 /// there.
 const LOOKED_AT: usize = 8;
 const SECTIONS: usize = 40;
-/// Values that differ by less, over the column's largest one, are the same: as near as sections come to a
+/// Values that differ by less, over the column's usual size, are the same: as near as sections come to a
 /// corner.
 const SAME: f64 = 1e-9;
 
+/// What was solved of the range of a drive.
+pub(super) struct SolvedRange {
+    /// In ascending order of the drive, those on the way to limits as well.
+    pub positions: Vec<SolvedPosition>,
+    /// Which of them were asked for.
+    pub rows: Range<usize>,
+    /// The limits that end it, below and above.
+    pub limits: [Option<LimitApproach>; 2],
+}
+
+impl SolvedRange {
+    /// From what was solved on the two sides of the start, outwards, and beyond at limits.
+    pub fn new(sides: [Vec<SolvedPosition>; 2], mut limits: [Option<LimitApproach>; 2]) -> Self {
+        let count = sides.iter().map(Vec::len).sum::<usize>();
+        let [below, above] = sides;
+        let [before, after] =
+            limits.each_mut().map(|limit| limit.as_mut().map(|one| std::mem::take(&mut one.positions)));
+        let before = before.unwrap_or_default();
+        let rows = before.len()..before.len() + count;
+        let positions = before.into_iter().rev().chain(below.into_iter().rev()).chain(above);
+        Self { positions: positions.chain(after.unwrap_or_default()).collect(), rows, limits }
+    }
+}
+
 impl DriveWalk {
-    /// The least value of a column, times a sign, over positions and between them, and the drive's value at
-    /// the first of them; nothing where it has none.
+    /// The least value of a column, times a sign, over positions, between them and at limits, and the drive's
+    /// value at the first of them; nothing where it has none.
     ///
     /// Between positions it is looked for on both sides of every one that is not above its neighbours, of
     /// many those that may hide most.
-    pub fn least(&mut self, all: &[SolvedPosition], column: usize, sign: f64) -> Option<[f64; 2]> {
+    pub fn least(&mut self, range: &SolvedRange, column: usize, sign: f64) -> Option<[f64; 2]> {
+        let all = &range.positions;
         let values: Vec<f64> = all.iter().map(|one| sign * one.position.column(column)).collect();
-        let size =
-            values.iter().filter(|value| value.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
+        let size = usual_size(&values[range.rows.clone()]);
         let beside = |k: usize| [k.saturating_sub(1), (k + 1).min(all.len() - 1)];
         // As far below a position as a neighbour is above it, at most.
         let hidden =
             |k: usize| values[k] - beside(k).map(|j| values[j] - values[k]).into_iter().fold(0.0, f64::max);
+        let at_limits = range.limits.each_ref().map(|limit| {
+            let at = limit.as_ref().and_then(|limit| Some([sign * limit.column(column)?, limit.drive]));
+            at.filter(|at| at[0] < f64::INFINITY)
+        });
+        if let Some(unbounded) = at_limits.iter().flatten().find(|at| at[0] == f64::NEG_INFINITY) {
+            return Some(*unbounded);
+        }
+        let [at_lower, at_upper] = at_limits;
         let is_low = |k: &usize| {
             let is_above = |j: usize| values[j] >= values[*k] || values[j].is_nan();
-            values[*k].is_finite() && beside(*k).into_iter().all(is_above)
+            let is_under = |at: Option<[f64; 2]>| at.is_some_and(|at| at[0] < values[*k]);
+            let to_limit = *k == 0 && is_under(at_lower) || *k + 1 == all.len() && is_under(at_upper);
+            values[*k].is_finite() && !to_limit && beside(*k).into_iter().all(is_above)
         };
         let mut low: Vec<usize> = (0..all.len()).filter(is_low).collect();
         low.sort_by(|&a, &b| hidden(a).total_cmp(&hidden(b)));
         low.truncate(LOOKED_AT);
         low.sort_unstable();
-        let mut found: Option<[f64; 2]> = None;
+        let mut found = at_lower;
+        // Of several that are the same to rounding the first.
+        let mut take = |here: [f64; 2]| {
+            if found.is_none_or(|[least, _]| here[0] < least - SAME * size) {
+                found = Some(here);
+            }
+        };
         for k in low {
             let mut here = [values[k], all[k].position.drive];
             let [from, to] = beside(k).map(|j| &all[j]);
@@ -49,11 +90,16 @@ impl DriveWalk {
             };
             // Where there is no way to a place between them, what was found stands.
             let _ = golden_sections(look, [from.state.time.hi, to.state.time.hi], SECTIONS);
-            // Of several that are the same to rounding the first.
-            if found.is_none_or(|[least, _]| here[0] < least - SAME * size) {
-                found = Some(here);
-            }
+            take(here);
         }
+        at_upper.into_iter().for_each(take);
         found
     }
+}
+
+/// How large a column is but where it grows without bound: its upper quartile.
+fn usual_size(values: &[f64]) -> f64 {
+    let mut sizes: Vec<f64> = values.iter().map(|value| value.abs()).filter(|v| v.is_finite()).collect();
+    sizes.sort_by(f64::total_cmp);
+    sizes.get(3 * sizes.len() / 4).copied().unwrap_or(0.0)
 }

@@ -1,7 +1,10 @@
 //! One position after another: predicted from rates and accelerations, solved by projection.
 
+mod approach;
 mod fold;
 mod step;
+
+pub(super) use approach::LimitApproach;
 
 use super::independence::{Independence, determinant, in_jacobian, size};
 use super::transmission::Transmission;
