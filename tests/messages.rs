@@ -148,3 +148,12 @@ fn a_window_is_told_as_far_as_the_run_goes() {
     let chart = program.read(chart);
     assert!(chart.contains("2 s to 3 s of 3 s") && !chart.contains("200 s"));
 }
+
+#[test]
+fn parameters_that_are_no_names_with_numbers_are_refused() {
+    for value in [json!(5), json!("x"), json!(null), json!(true), json!([1, 2])] {
+        let program = changed("free", |scene| scene["parameters"] = value.clone());
+        let words = format!("parameters = {value}: must be {{name: number");
+        program.run("check scene.json").exits(3).says(&["scene.json:1:", &words, "hint: for example"]);
+    }
+}

@@ -130,8 +130,11 @@ fn parameters(source: &Texts, tree: &Located, tables: &[Interpolant]) -> Result<
     let Some(holder) = members.iter().find(|member| member.key == "parameters") else {
         return Ok(Vec::new());
     };
-    let Value::Object(members) = &holder.node.value else { return Ok(Vec::new()) };
     let allowed = FieldShape::Parameters.allowed();
+    let Value::Object(members) = &holder.node.value else {
+        let hint = "for example \"parameters\": {\"k\": 0.6}";
+        return Err(source.refused_value(holder.node.span, "parameters", &allowed, hint));
+    };
     if members.len() > MOST {
         let problem = format!("has {} entries", members.len());
         return Err(source.refusal(holder.span, "parameters", &problem, &allowed, "compute the rest before"));
