@@ -229,6 +229,13 @@ fn impossible_starts_name_the_row() {
     let mechanism = compiled(&with("four_bar_motor", instead));
     let apart = |change: &driftless::dynamics::assembly::StartChange| (change.used - change.given).abs();
     assert!(mechanism.assembly.changes.iter().all(|change| apart(change) < 1e-4));
+    // Integrals are no bars, and are not asked for.
+    let start = json!({"coupler": {"phi": 2.5}, "rocker": {"phi": -1}});
+    let counted = with("four_bar_motor", json!({"start": start, "integrals": {"turned": "crank.omega"}}));
+    let CompileError::Impossible { closest, .. } = refused(&counted) else {
+        panic!("{:?}", refused(&counted))
+    };
+    assert!(!closest.written.contains("turned"), "{}", closest.written);
     // A motor at a dead centre of its slider: the travel cannot grow at any rate of the crank.
     let drive = json!([{"name": "push", "slider": "slider", "law": {"start": 1.5, "rate": 1}}]);
     let dead = with(

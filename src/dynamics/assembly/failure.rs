@@ -83,7 +83,8 @@ impl AssemblyProblem<'_> {
             };
             self.mechanism.constraints.iter().any(drives)
         };
-        let given = self.mechanism.bodies.iter().zip(&q).enumerate().filter(|(body, _)| !is_driven(*body));
+        let given =
+            self.mechanism.own_bodies().iter().zip(&q).enumerate().filter(|(body, _)| !is_driven(*body));
         let all: Vec<String> = given.map(|(_, one)| entry(one)).collect();
         Closest { written: format!("\"start\": {{{}}}", all.join(", ")), q, apart, guesses }
     }
