@@ -157,3 +157,14 @@ fn parameters_that_are_no_names_with_numbers_are_refused() {
         program.run("check scene.json").exits(3).says(&["scene.json:1:", &words, "hint: for example"]);
     }
 }
+
+/// An event that moves its own time on by a nanosecond happens again a nanosecond later.
+#[test]
+fn an_event_that_brings_itself_about_is_named_as_the_cause() {
+    let program = changed("free", |scene| {
+        scene["parameters"] = json!({"k": 0.5});
+        scene["events"] = json!([{"name": "again", "when": "t-k", "set": {"k": "k+1e-9"}}]);
+    });
+    let stopped = program.run("run scene.json --until 1 -q --no-charts --method dp5").exits(4);
+    stopped.says(&["more than 10000 events, the last of them `again`", "hint: look for an event"]);
+}

@@ -333,9 +333,23 @@ impl ContactDriver {
                 return Ok(false);
             }
         }
-        let what = format!("more than {EVENTS_MOST} impacts and releases before the next output time");
-        let hint = "shorten the output interval, lower the restitution, or look for a point that motors \
-                    squeeze between walls";
+        let (what, hint) = match outcome.events.last() {
+            _ if !self.free.contacts.is_empty() => (
+                "impacts and releases".to_owned(),
+                "shorten the output interval, lower the restitution, or look for a point that motors \
+                 squeeze between walls, or for an event that brings itself about",
+            ),
+            Some(event) => (
+                format!("events, the last of them `{}`,", event.name),
+                "look for an event that brings itself about, as by a parameter it sets, or shorten the output \
+                 interval",
+            ),
+            None => (
+                "changes between sticking and sliding".to_owned(),
+                "shorten the output interval, or change the friction",
+            ),
+        };
+        let what = format!("more than {EVENTS_MOST} {what} before the next output time");
         Err(self.stopped(&outcome.plan, what, hint))
     }
 
