@@ -1,6 +1,7 @@
 //! How far a run is: a bar on a terminal, a line now and then elsewhere, nothing when quiet.
 
 use super::output::message;
+use crate::arithmetic::shown::{figure, plain};
 use crate::report::page::counted;
 use crate::run::compare::Stage;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -195,6 +196,16 @@ fn told(before: u64, finished: u64, count: u64, spent: Duration) -> String {
     format!("{finished} of {of}, {rate} a second, {left} left")
 }
 
+/// The share of a run that is done.
+fn share(t: f64, until: f64) -> f64 {
+    (t / until).clamp(0.0, 1.0)
+}
+
+/// `free: 35 %, t = 0.35 s of 1 s`.
+fn reached(scene: &str, t: f64, until: f64) -> String {
+    format!("{scene}: {:.0} %, t = {} s of {} s", 100.0 * share(t, until), figure(t), plain(until))
+}
+
 impl RunProgress {
     /// Begins; `until` is the horizon \[s\].
     pub fn new(scene: &str, until: f64, quiet: bool) -> Self {
@@ -210,15 +221,14 @@ impl RunProgress {
             return;
         }
         let Some(now) = self.looks.now().filter(|&now| now >= self.next) else { return };
-        let share = (t / self.until).clamp(0.0, 1.0);
         match &self.bar {
             Some(bar) => {
                 bar.set_message(format!("t = {t:.6} s"));
-                bar.set_position((share * POSITIONS) as u64);
+                bar.set_position((share(t, self.until) * POSITIONS) as u64);
                 self.next = now + BAR;
             }
             None => {
-                message(&format!("{}: {:.0} %, t = {t} s of {} s", self.scene, 100.0 * share, self.until));
+                message(&reached(&self.scene, t, self.until));
                 self.next = now + LINE;
             }
         }
@@ -235,6 +245,12 @@ impl RunProgress {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_reached_are_told_without_the_rounding_of_sums() {
+        assert_eq!(reached("free", 0.350_000_000_000_000_03, 1.0), "free: 35 %, t = 0.35 s of 1 s");
+        assert_eq!(reached("free", 79_349.700_000_000_01, 1e5), "free: 79 %, t = 79349.7 s of 100000 s");
+    }
 
     #[test]
     fn the_time_left_follows_from_the_rate_so_far() {
