@@ -168,3 +168,22 @@ fn an_event_that_brings_itself_about_is_named_as_the_cause() {
     let stopped = program.run("run scene.json --until 1 -q --no-charts --method dp5").exits(4);
     stopped.says(&["more than 10000 events, the last of them `again`", "hint: look for an event"]);
 }
+
+#[test]
+fn lists_that_are_too_long_are_told_how_long_they_may_be() {
+    let all: serde_json::Map<String, Value> = (0..1001).map(|k| (format!("p{k}"), json!("1"))).collect();
+    for key in ["parameters", "signals", "outputs"] {
+        let program = changed("free", |scene| scene[key] = json!(all));
+        let words = format!("{key} has 1001 entries: must be at most 1000");
+        program.run("check scene.json").exits(3).says(&[&words, "hint: "]);
+    }
+}
+
+#[test]
+fn a_lock_of_what_a_motor_drives_is_refused_with_a_hint() {
+    let program = changed("motor", |scene| {
+        let body = scene["motors"][0]["body"].clone();
+        scene["locks"] = json!([{"name": "L", "body": body}]);
+    });
+    program.run("check scene.json").exits(3).says(&["`L` gives an angle", "hint: leave out one of"]);
+}

@@ -163,7 +163,11 @@ impl From<FileError> for Failure {
 impl From<CheckpointError> for Failure {
     fn from(error: CheckpointError) -> Self {
         let exit = if matches!(error, CheckpointError::Format { .. }) { Exit::Scene } else { Exit::Io };
-        Self::new(exit, error.to_string())
+        let hint = match error {
+            CheckpointError::Damaged { .. } => "\nhint: begin again with the first command and --force",
+            _ => "",
+        };
+        Self::new(exit, format!("{error}{hint}"))
     }
 }
 

@@ -69,7 +69,10 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
     if let (Some(max_evaluations), PendingWork::Run(snapshot)) = (flags.max_evaluations, &mut saved.work) {
         snapshot.allow(max_evaluations);
     }
-    let damaged = || Failure::new(Exit::Io, "the command line in the checkpoint cannot be read");
+    let damaged = || {
+        let hint = "begin again with the first command and --force";
+        Failure::new(Exit::Io, format!("the command line in the checkpoint cannot be read\nhint: {hint}"))
+    };
     match (Flags::try_parse_from(&saved.arguments).map_err(|_| damaged())?.command, &saved.work) {
         (Command::Run(mut run), PendingWork::Run(_)) => {
             run.scene.tell = flags.tell.clone();

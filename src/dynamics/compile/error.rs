@@ -8,7 +8,10 @@ use crate::dynamics::assembly::Closest;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CompileError {
     /// Motors and locks give the same angle twice.
-    #[error("`{0}` gives an angle that the other motors and locks give already")]
+    #[error(
+        "`{0}` gives an angle that the other motors and locks give already\nhint: leave out one of the \
+            motors and locks that share these bars"
+    )]
     Redundant(String),
     /// The law of a motor is what it drives.
     #[error(

@@ -42,15 +42,24 @@ pub(super) fn outputs(fields: &Fields) -> Result<Vec<Output>, SceneError> {
         outputs.push(output);
         Ok(())
     };
+    let count = match &at.node.value {
+        Value::Object(members) => members.len(),
+        Value::List(nodes) => nodes.len(),
+        _ => 0,
+    };
+    if count > MOST {
+        let allowed = format!("must be at most {MOST}");
+        return Err(at.refuse(&format!("has {count} entries"), &allowed, "merge some"));
+    }
     match &at.node.value {
-        Value::Object(members) if members.len() <= MOST => {
+        Value::Object(members) => {
             for member in members {
                 let at = at.member(member);
                 let formula = formula(&at, &member.node)?;
                 add(&at, Output { name: member.key.clone(), formula })?;
             }
         }
-        Value::List(nodes) if nodes.len() <= MOST => {
+        Value::List(nodes) => {
             for (number, node) in nodes.iter().enumerate() {
                 let at = at.item(node, number);
                 let formula = formula(&at, node)?;

@@ -137,6 +137,7 @@ fn parameters(source: &Texts, tree: &Located, tables: &[Interpolant]) -> Result<
     };
     if members.len() > MOST {
         let problem = format!("has {} entries", members.len());
+        let allowed = format!("must be at most {MOST}");
         return Err(source.refusal(holder.span, "parameters", &problem, &allowed, "compute the rest before"));
     }
     let mut order =
