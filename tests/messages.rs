@@ -187,3 +187,13 @@ fn a_lock_of_what_a_motor_drives_is_refused_with_a_hint() {
     });
     program.run("check scene.json").exits(3).says(&["`L` gives an angle", "hint: leave out one of"]);
 }
+
+#[test]
+fn a_study_that_ends_early_has_its_error_in_its_object() {
+    let program = Program::with_scenes(&["free"]);
+    let command = "sensitivity free.json --of flip --to gravity[0] --at 0.1 --json --no-charts";
+    let object = program.run(command).exits(4).object();
+    assert_eq!((&object["error"]["kind"], &object["error"]["exit_code"]), (&json!("stopped"), &json!(4)));
+    assert!(object["error"]["message"].as_str().is_some_and(|text| text.contains("flip")), "{object:#}");
+    assert!(object["files"].is_array(), "what it printed before: {object:#}");
+}

@@ -83,6 +83,9 @@ impl<'a> StudyFolder<'a> {
         let StudyFiles { mut object, text, failure, .. } = study;
         name_files(&mut object, &folder);
         if self.tell.json {
+            if let Some(failure) = &failure {
+                object["error"] = failure.object();
+            }
             print_object(&object)?;
         } else if !self.tell.quiet {
             print(&(text + &files(folder.path(), folder.names())))?;
