@@ -25,6 +25,14 @@ pub fn listen() -> Result<(), Failure> {
     Ok(())
 }
 
+/// From now on a write past the limit of a file's size fails, as one to a full disk does, and ends nothing.
+#[cfg(unix)]
+pub fn survive_size_limits() -> Result<(), Failure> {
+    let failed =
+        |error| Failure::new(super::failure::Exit::Other, format!("cannot listen for signals: {error}"));
+    signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default()).map(drop).map_err(failed)
+}
+
 /// True where the run has been asked to end.
 pub fn is_asked() -> bool {
     interruption::is_asked()

@@ -47,6 +47,8 @@ use std::sync::Arc;
 /// # Errors
 /// Anything that keeps it from being done, with its exit code.
 pub fn run(flags: &Flags) -> Result<(), Failure> {
+    #[cfg(unix)]
+    interrupt::survive_size_limits()?;
     match &flags.command {
         Command::Check(flags) => check::run(flags),
         Command::Inspect(flags) => inspect::run(flags),
