@@ -341,8 +341,8 @@ impl ContactDriver {
             ),
             Some(event) => (
                 format!("events, the last of them `{}`,", event.name),
-                "look for an event that brings itself about, as by a parameter it sets, or shorten the output \
-                 interval",
+                "look for an event that brings itself about, as by a parameter it sets, or shorten the \
+                 output interval",
             ),
             None => (
                 "changes between sticking and sliding".to_owned(),

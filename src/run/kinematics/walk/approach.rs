@@ -78,7 +78,7 @@ impl LimitApproach {
         self
     }
 
-    /// What a column comes to at the limit: infinite where it grows without bound; none where it is not known.
+    /// What a column comes to at the limit: infinite where it grows without bound; none if not known.
     pub fn column(&self, column: usize) -> Option<f64> {
         let points: Vec<[f64; 2]> =
             self.nodes.iter().map(|(s, at)| [*s, at.position.column(column)]).collect();
