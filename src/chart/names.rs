@@ -84,10 +84,15 @@ pub(crate) fn axis_lines(sheet: &Sheet, ticks: &Ticks, name: &str, room: f64) ->
         return vec![whole];
     }
     let [quantity, offset, unit] = ticks.parts(name);
+    // Between the number of the offset and its unit, which follow a sign, a line may end.
+    let (number, of_offset) = match offset.match_indices(' ').nth(1) {
+        Some((at, _)) => (&offset[..at], &offset[at + 1..]),
+        None => (offset.as_str(), ""),
+    };
     let letters = letters(&quantity);
     let broken = |quantity: &str| {
-        let rest = [&offset, &unit].into_iter().filter(|part| !part.is_empty());
-        lines(pieces(quantity).into_iter().chain(rest.map(|part| (" ", part.clone()))), &fits)
+        let rest = [number, of_offset, &unit].into_iter().map(|part| (" ", part.to_owned()));
+        lines(pieces(quantity).into_iter().chain(rest), &fits)
     };
     let cuts = (0..letters.len()).rev().map(|kept| broken(&cut(&letters, kept)));
     let mut all = std::iter::once(broken(&quantity)).chain(cuts);
@@ -178,7 +183,7 @@ mod tests {
             offset: Some("− 0.6244338578".to_owned()),
             ..Ticks::default()
         };
-        assert_eq!(set(&far, "bearing [N]"), ["bearing", "− 0.6244338578", "[×10−12 N]"]);
+        assert_eq!(set(&far, "bearing [N]"), ["bearing", "− 0.6244338578", "N [×10−12 N]"]);
         let long = set(&none, &format!("{} [rad]", "abcdefgh".repeat(8)));
         assert!(long.len() <= LINES && long[0].starts_with("abcdefgh") && long[1].contains("h"), "{long:?}");
     }

@@ -30,11 +30,20 @@ impl Ticks {
         parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" ")
     }
 
-    /// Quantity, offset, and factor and unit in brackets, of an axis name; empty where it has none.
+    /// Quantity, offset, and factor and unit in brackets, of an axis name; empty where it has none.  Beside a
+    /// factor the offset has the unit, as the factor is not meant for it.
     pub(crate) fn parts(&self, name: &str) -> [String; 3] {
         let (quantity, unit) = match name.rsplit_once(" [") {
             Some((quantity, unit)) => (quantity, unit.trim_end_matches(']')),
             None => (name, ""),
+        };
+        // A pure number has no unit to be shown.
+        let unit = if unit == "1" { "" } else { unit };
+        let offset = match (self.offset.as_deref().unwrap_or_default(), &self.factor) {
+            (offset, Some(_)) if !offset.is_empty() && !matches!(unit, "" | "?") => {
+                format!("{offset} {unit}")
+            }
+            (offset, _) => offset.to_owned(),
         };
         let unit = match (&self.factor, unit.is_empty()) {
             (Some(factor), true) => format!("[{factor}]"),
@@ -42,7 +51,7 @@ impl Ticks {
             (None, true) => String::new(),
             (None, false) => format!("[{unit}]"),
         };
-        [quantity.to_owned(), self.offset.clone().unwrap_or_default(), unit]
+        [quantity.to_owned(), offset, unit]
     }
 }
 
@@ -117,19 +126,36 @@ pub(crate) fn figure(value: f64) -> String {
     format!("{}·{}", decimal(mantissa, 2), power(exponent))
 }
 
-/// A multiple of a step of the given decimal exponent, with all its digits.
-fn exact(value: f64, exponent: i32) -> String {
-    if value < 1e9 {
-        let text = decimal(value, (-exponent).clamp(0, 12) as usize);
-        return if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_owned()
-        } else {
-            text
-        };
+/// A whole positive number times a power of ten, with all its digits.
+fn exact(number: f64, exponent: i32) -> String {
+    let text = format!("{number:.0}");
+    let digits = text.trim_end_matches('0');
+    let last = exponent + (text.len() - digits.len()) as i32;
+    let first = last + digits.len() as i32 - 1;
+    if (-4..9).contains(&first) {
+        return decimal(number * ten(exponent), (-last).max(0) as usize);
     }
-    let text = format!("{value:e}");
-    let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-    format!("{mantissa}·10^{{{exponent}}}")
+    match digits.split_at(1) {
+        ("1", "") => power(first),
+        (whole, "") => format!("{whole}·{}", power(first)),
+        (whole, fraction) => format!("{whole}.{fraction}·{}", power(first)),
+    }
+}
+
+/// Largest label beside an offset, without its point.
+const LABEL: f64 = 999.0;
+
+/// The roundest number, a whole one times a power of ten, from which labels from `low` to `high`, whole
+/// numbers times the power of ten `exponent`, are short.
+fn offset_of(low: f64, high: f64, exponent: i32) -> (f64, i32) {
+    let largest = low.abs().max(high.abs()).log10().ceil() as i32;
+    let near = |power: i32| (0.5 * (low + high) / ten(power)).round();
+    let is_short = |&power: &i32| {
+        let offset = near(power) * ten(power);
+        (low - offset).abs().max((high - offset).abs()) <= LABEL
+    };
+    let power = (3..=largest).rev().find(is_short).unwrap_or(2);
+    (near(power), exponent + power)
 }
 
 pub(crate) fn linear(low: f64, high: f64, most: usize) -> Ticks {
@@ -142,10 +168,11 @@ pub(crate) fn linear(low: f64, high: f64, most: usize) -> Ticks {
     }
     // Labels of a narrow range far from zero are told from a round number on.
     let far = first.abs().max(last.abs()) > 20_000.0;
-    let start = if far { (first / 100.0).floor() * 100.0 } else { 0.0 };
-    let offset = (start != 0.0).then(|| {
-        let (sign, value) = if start < 0.0 { ("+", -start * step) } else { ("−", start * step) };
-        format!("{sign} {}", exact(value, exponent))
+    let (number, place) = if far { offset_of(first * mantissa, last * mantissa, exponent) } else { (0.0, 0) };
+    let start = number * ten(place - exponent) / mantissa;
+    let offset = far.then(|| {
+        let sign = if number < 0.0 { "+" } else { "−" };
+        format!("{sign} {}", exact(number.abs(), place))
     });
     // Labels mean `index * mantissa * 10^(exponent - shift)`.
     let largest = (first - start).abs().max((last - start).abs()) * step;
@@ -277,6 +304,50 @@ mod tests {
         let far = linear(1e6, 1e6 + 1e-3, 5);
         assert!(far.name("x [m]").starts_with("x − 1\u{2009}000\u{2009}000"), "{}", far.name("x [m]"));
         assert!(far.majors.len() >= 3);
+        assert_eq!(linear(0.0, 1.0, 5).name("ratio [1]"), "ratio", "a pure number has no unit");
+        assert_eq!(tiny.name("ratio [1]"), "ratio [×10^{−18}]");
+    }
+
+    /// Offset and factor of an axis name, read back.
+    fn read(name: &str) -> [f64; 2] {
+        let number = |text: &str| -> f64 {
+            let plain = text.replace(['\u{2009}', '}'], "").replace('−', "-").replace("10^{", "1e");
+            plain.split('·').map(|part| part.parse::<f64>().unwrap()).product()
+        };
+        let (offset, factor) = name.trim_start_matches("x ").split_once('[').unwrap();
+        let (sign, offset) = offset.trim_end_matches(" N ").trim().split_once(' ').unwrap();
+        let sign = if sign == "+" { -1.0 } else { 1.0 };
+        let factor = factor.trim_start_matches('×').trim_end_matches(']').trim_end_matches('N').trim();
+        [sign * number(offset), if factor.is_empty() { 1.0 } else { number(factor) }]
+    }
+
+    #[test]
+    fn offset_and_label_are_the_value_of_the_tick_to_the_last_digit() {
+        let ranges = [
+            [9.809995e-9, 9.810008e-9],
+            [-9.810008e-9, -9.809995e-9],
+            [999_999.3, 1_000_000.7],
+            [0.123_456_781, 0.123_456_789],
+            [9.81e-12, 9.81e-12 * (1.0 + 2e-13)],
+            [1.000_000_001e21, 1.000_000_002e21],
+            [-7.3e-21 - 1e-29, -7.3e-21 + 3e-30],
+        ];
+        for [low, high] in ranges {
+            let ticks = linear(low, high, 8);
+            let name = ticks.name("x [N]");
+            let [offset, factor] = read(&name);
+            let step = ticks.majors[1].value - ticks.majors[0].value;
+            for tick in &ticks.majors {
+                let label: f64 = tick.label.replace('−', "-").parse().unwrap();
+                let error = offset + label * factor - tick.value;
+                assert!(error.abs() < 0.01 * step, "{name}: {tick:?}");
+                assert!(tick.label.chars().filter(char::is_ascii_digit).count() <= 4, "{name}: {tick:?}");
+            }
+        }
+        assert_eq!(linear(9.809995e-9, 9.810008e-9, 8).name("f [N]"), "f − 9.81·10^{−9} N [×10^{−15} N]");
+        let round = linear(999_999.3, 1_000_000.7, 8);
+        assert_eq!(round.name("x [m]"), "x − 1\u{2009}000\u{2009}000 [m]");
+        assert_eq!(labels(&round)[..3], ["−0.6", "−0.4", "−0.2"]);
     }
 
     #[test]
