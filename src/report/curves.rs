@@ -4,6 +4,8 @@ use crate::run::Sample;
 
 /// A turn of the fastest body between samples beyond which curves through them would mislead \[rad\].
 const COARSE: f64 = 2.0;
+/// A coordinate that changes by less is called constant \[rad or m\].
+pub(super) const STILL: f64 = 1e-9;
 /// Share of the motion that mean rates may miss; a swing sampled seven times a period misses that much.
 const MISSED: f64 = 0.07;
 /// Points of a curve between two samples, and from how many samples on it needs none.
@@ -28,9 +30,13 @@ pub(super) fn is_coarse(samples: &[&Sample], angles: usize) -> bool {
     for pair in samples.windows(2) {
         let (a, b) = (pair[0], pair[1]);
         for k in 0..a.phi.len() {
-            let half = 0.5 * (b.t - a.t);
-            missed += (b.phi[k] - a.phi[k] - half * (a.omega[k] + b.omega[k])).powi(2);
-            told += (half * (a.omega[k].abs() + b.omega[k].abs())).powi(2);
+            let (change, half) = (b.phi[k] - a.phi[k], 0.5 * (b.t - a.t));
+            let way = half * (a.omega[k].abs() + b.omega[k].abs());
+            // What is still moves by rounding, which rates do not tell.
+            if way.max(change.abs()) > STILL {
+                missed += (change - half * (a.omega[k] + b.omega[k])).powi(2);
+                told += way.powi(2);
+            }
         }
     }
     missed > MISSED * MISSED * told
@@ -97,6 +103,11 @@ mod tests {
         };
         assert!(coarse(3.3) && coarse(5.0) && !coarse(10.0) && !coarse(100.0));
         assert!(!is_coarse(&[&sample(0.0, 0.0, 0.0), &sample(1.0, 0.0, 0.0)], 1), "at rest");
+        // Hanging at -pi/2, of which the last digit is 2e-16, a bar swings by 6e-17.
+        let hanging = |t: f64| sample(t, -std::f64::consts::FRAC_PI_2, 3e-16 * (5.0 * t).sin());
+        assert!(!is_coarse(&[&hanging(0.0), &hanging(0.01), &hanging(0.02)], 1), "at rest but for rounding");
+        let fast = |t: f64| sample(t, 0.3, 4.0);
+        assert!(is_coarse(&[&fast(0.0), &fast(1000.0)], 1), "whole periods apart");
         let uniform = [&sample(0.0, 0.0, 5.0), &sample(1.0, 5.0, 5.0)];
         assert!(is_coarse(&uniform, 1) && !is_coarse(&uniform, 0), "a place is not told by turns");
     }

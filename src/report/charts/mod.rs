@@ -13,7 +13,7 @@ use crate::chart::{
 };
 use crate::dynamics::Mechanism;
 use crate::dynamics::forest::BodyOrigin;
-use crate::report::curves::{furthest, is_coarse, smoothed, span, turned};
+use crate::report::curves::{STILL, furthest, is_coarse, smoothed, span, turned};
 use crate::report::drawing::MechanismDrawing;
 use crate::report::page::{figure, rough};
 use crate::run::{Outcome, Sample};
@@ -146,8 +146,8 @@ pub fn motion(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Motion
 const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
 /// How far the fastest body turns along the path shown \[rad\].
 const PATH: f64 = 4.0 * TAU;
-/// An angle that changes by less is called constant \[rad\].
-const STILL: f64 = 1e-9;
+/// What captions say of rows between which a body turns too far.
+const ALIAS: &str = "too far apart for curves: a slow pattern of them may be an alias";
 /// How far it turns between ghosts \[rad\].
 const GHOST: f64 = 0.4;
 /// Ghosts shown.
@@ -324,7 +324,7 @@ impl Finished<'_> {
             poses.drain(..poses.len().saturating_sub(1));
         }
         let end = path.last().map_or(self.outcome.last.t, |sample| sample.t);
-        let title = (drawing.title().filter(|_| !coarse))
+        let title = (drawing.title().filter(|_| !coarse && moves(self.mechanism, self.outcome)))
             .unwrap_or_else(|| format!("The mechanism at {} s", figure(end)));
         let more = more.filter(|_| !coarse || self.outcome.trace.window.is_some());
         let (horizon, past) = self.horizon(end);
@@ -365,7 +365,7 @@ impl Finished<'_> {
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
         let mut caption = self.caption(more);
         caption.extend(past);
-        caption.extend(is_coarse.then(|| "rows alone, which are too far apart for curves".to_owned()));
+        caption.extend(is_coarse.then(|| format!("rows alone, {ALIAS}")));
         let travels: Vec<AngleSeries> = travels.collect();
         let positions = if travels.is_empty() { self.positions(&smooth) } else { Vec::new() };
         // A body that keeps its angle is told in a line where others move.
