@@ -222,6 +222,53 @@ fn charts_show_rows_alone_where_they_are_far_apart_and_motors_that_hold() {
     assert!(program.files().iter().any(|file| file.ends_with("torque_power.png")));
 }
 
+/// A pendulum that hangs has nothing to be too far apart, and one whose rows are many periods apart has dots
+/// of its outputs and torques, which say so; a motor's torque has the same peak in both of its charts.
+#[test]
+fn captions_tell_what_rests_from_what_is_too_far_apart() {
+    let program = Program::new();
+    let pendulum = |start: &str, until: f64, every: f64| {
+        format!(
+            r#"{{"name": "bar", "gravity": [0, -9.81], "start": {{"bar": {{"phi": "{start}", "omega": 0}}}},
+            "bars": [{{"name": "bar", "length": 0.6, "width": 0.05, "thickness": 0.003, "density": 670}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}},
+            {{"body": "bar", "point": [0, 0]}}]}}], "until": {until}, "every": {every},
+            "outputs": {{"x": "bar.x"}}}}"#
+        )
+    };
+    let chart = |text: &str, name: &str, folder: &str| -> String {
+        program.write("bar.json", text);
+        program.run(&format!("run bar.json --trust off --chart-format svg -q --out {folder}")).exits(0);
+        let ending = format!("{name}.svg");
+        let is_it = |file: &String| file.starts_with(folder) && file.ends_with(&ending);
+        program.files().into_iter().find(is_it).map(|file| program.read(&file)).expect("a chart")
+    };
+    let rest = chart(&pendulum("-pi/2", 10.0, 0.01), "mechanism", "a");
+    assert!(!rest.contains("too far apart") && rest.contains("The mechanism at"));
+    let far = chart(&pendulum("0.3", 300.0, 10.0), "outputs", "b");
+    assert!(far.contains("may be an alias"));
+    let near = chart(&pendulum("0.3", 3.0, 0.01), "outputs", "c");
+    assert!(!near.contains("may be an alias"));
+}
+
+#[test]
+fn a_torque_has_the_same_peak_in_both_of_its_charts() {
+    let program = Program::with_scenes(&["motor"]);
+    program
+        .run(
+            "run motor.json --until 2 --every 0.02 --output M=motor.torque --trust off --chart-format svg -q",
+        )
+        .exits(0);
+    let peak = |name: &str| -> String {
+        let file = program.files().into_iter().find(|file| file.ends_with(name)).expect("a chart");
+        let text = program.read(&file);
+        let labels = text.split("aria-label=\"").skip(1).filter_map(|rest| rest.split('"').next());
+        let mut peaks = labels.filter(|label| label.contains("N·m at"));
+        peaks.next().expect("a mark").split(" s").next().unwrap_or_default().to_owned()
+    };
+    assert_eq!(peak("torque_power.svg"), peak("outputs.svg"));
+}
+
 /// Frames of an animation, and how long each stays \[1/100 s\].
 fn frames(path: &std::path::Path) -> Vec<u16> {
     let file = std::fs::File::open(path).expect("an animation");

@@ -36,6 +36,12 @@ impl OutputSeries {
         high - low <= 16.0 * f64::EPSILON * low.abs().max(high.abs())
     }
 
+    /// Its largest magnitude.
+    fn size(&self) -> f64 {
+        let all = self.value.iter().chain(self.extremes.iter().map(|extreme| &extreme[0]));
+        all.map(|value| value.abs()).filter(|value| value.is_finite()).fold(0.0, f64::max)
+    }
+
     /// Whether it has extremes to mark.
     fn has_extremes(&self) -> bool {
         !self.extremes.is_empty() && !self.is_constant()
@@ -55,6 +61,8 @@ pub struct OutputsChart {
     pub quantity: Option<String>,
     /// Name and unit of what it is drawn over; time in seconds where there is none.
     pub over: Option<[String; 2]>,
+    /// True where too much happens between the times for curves through the values.
+    pub is_coarse: bool,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
     /// The time from which on the values choose the ranges of the upright axes; what leaves them before is
@@ -70,8 +78,11 @@ type End = (f64, String, MarkStyle);
 
 /// Height of the page beyond its panels, and of each of these \[pt\].
 const HEIGHTS: [f64; 2] = [80.0, 110.0];
-/// Panels at most: outputs of further units are left to the table.
+/// Panels at most: further outputs are left to the table.
 const PANELS: usize = 6;
+/// Outputs of no unit, or of one that is not known, need not be of one kind: those larger than others so many
+/// times have a panel of their own.
+const SIZES: f64 = 30.0;
 /// Outputs in a panel that have their extremes ringed; of more, only the largest is.
 const RINGED: usize = 3;
 
@@ -81,26 +92,17 @@ const RINGED: usize = 3;
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartError> {
-    let mut units: Vec<&str> = Vec::new();
-    for output in &chart.outputs {
-        if !units.contains(&output.unit.as_str()) {
-            units.push(&output.unit);
-        }
-    }
-    let left_out = units.len().saturating_sub(PANELS);
-    units.truncate(PANELS);
+    let mut groups = groups(&chart.outputs);
+    let left_out: usize = groups.iter().skip(PANELS).map(Vec::len).sum();
+    groups.truncate(PANELS);
     let line = |output: &OutputSeries| -> Vec<Point> {
         let points = output.time.iter().zip(&output.value).map(|(&t, &v)| [t, v]);
         let mut points: Vec<Point> = points.chain(output.extremes.iter().map(|&[v, t]| [t, v])).collect();
         points.sort_by(|a, b| a[0].total_cmp(&b[0]));
         points
     };
-    let rows: Vec<(&str, Vec<Line>)> = units
-        .iter()
-        .map(|unit| {
-            let of_unit = chart.outputs.iter().filter(|output| output.unit == *unit);
-            (*unit, of_unit.map(|output| (output, line(output))).collect())
-        })
+    let rows: Vec<(&str, Vec<Line>)> = (groups.iter())
+        .map(|group| (&*group[0].unit, group.iter().map(|&output| (output, line(output))).collect()))
         .collect();
     let size = [PAGE[0], HEIGHTS[0] + HEIGHTS[1] * rows.len().max(2) as f64];
     let sheet = Sheet::new(size, px_per_pt)?;
@@ -137,7 +139,7 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         caption.push(format!("extremes of the whole {whole} marked"));
     }
     if left_out > 0 {
-        caption.push(format!("{left_out} more units in the table"));
+        caption.push(format!("{left_out} more outputs in the table"));
     }
     let under = sheet.heading(&chart.title, &caption)?;
     let several = rows.iter().any(|row| row.1.len() > 1);
@@ -147,7 +149,10 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
     for (k, (panel, (unit, lines))) in panels.iter().zip(&rows).enumerate() {
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (output, line) in lines {
-            let pieces = panel.trusted(line, mark(output).colour, 1.6, chart.horizon)?;
+            let pieces = match chart.is_coarse && !panel.crowded(line) {
+                true => panel.trusted_dots(line, mark(output).colour, chart.horizon)?,
+                false => panel.trusted(line, mark(output).colour, 1.6, chart.horizon)?,
+            };
             pieces.iter().for_each(|piece| occupied.line(piece));
             if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
                 ends.push((largest_of(line), (end[1], labels[number(output)].clone(), mark(output))));
@@ -163,6 +168,27 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
         }
     }
     Ok(sheet.picture(&chart.title, &caption))
+}
+
+/// The outputs of each panel: those of one unit, and where that says nothing of their kind, of one size.
+fn groups(outputs: &[OutputSeries]) -> Vec<Vec<&OutputSeries>> {
+    let mut groups: Vec<Vec<&OutputSeries>> = Vec::new();
+    for output in outputs {
+        let is_alike = |other: &&OutputSeries| {
+            let [a, b] = [output.size(), other.size()];
+            !matches!(&*output.unit, "" | "1" | "?") || a.max(b) <= SIZES * a.min(b) || a.min(b) == 0.0
+        };
+        let belongs =
+            |group: &&mut Vec<&OutputSeries>| group[0].unit == output.unit && group.iter().all(is_alike);
+        match groups.iter_mut().find(belongs) {
+            Some(group) => group.push(output),
+            None => groups.push(vec![output]),
+        }
+    }
+    // Panels of one unit stand together, in the order of their first outputs.
+    let first = |group: &Vec<&OutputSeries>| outputs.iter().position(|output| output.unit == group[0].unit);
+    groups.sort_by_key(first);
+    groups
 }
 
 /// Rings at the extremes of the lines of a panel, and a figure beside the largest of each that has rings.
@@ -279,6 +305,37 @@ mod tests {
         assert!(has(&changes, "change [rad]"), "{changes:?}");
         let pure = words(vec![series("a", "1"), series("b", "1")], None);
         assert!(has(&pure, "value"), "{pure:?}");
+        assert!(has(&words(vec![series("a", "1")], None), "a"), "a pure number has no unit");
+    }
+
+    #[test]
+    fn outputs_of_unknown_units_and_other_sizes_have_panels_of_their_own() {
+        let sized = |name: &str, unit: &str, size: f64| OutputSeries {
+            value: vec![0.0, size, 0.5 * size],
+            extremes: vec![[0.0, 0.0], [size, 1.0]],
+            ..series(name, unit)
+        };
+        let names = |unit: &str| -> Vec<Vec<String>> {
+            let sizes = [("spike", 1e4), ("jump", 1e6), ("zero", 0.0), ("mixed", 3e-12), ("near", 2e6)];
+            let all: Vec<OutputSeries> = sizes.map(|(name, size)| sized(name, unit, size)).to_vec();
+            let name = |output: &&OutputSeries| output.name.clone();
+            groups(&all).iter().map(|group| group.iter().map(name).collect()).collect()
+        };
+        for unit in ["?", "1"] {
+            assert_eq!(names(unit), [vec!["spike", "zero"], vec!["jump", "near"], vec!["mixed"]], "{unit}");
+        }
+        assert_eq!(names("N").len(), 1, "forces are compared on one axis");
+    }
+
+    #[test]
+    fn rows_too_far_apart_are_dots() {
+        let picture = |is_coarse: bool| {
+            let chart =
+                OutputsChart { outputs: vec![series("a", "N")], is_coarse, ..OutputsChart::default() };
+            outputs_of(&chart).rgb
+        };
+        let painted = |rgb: Vec<u8>| rgb.as_chunks::<3>().0.iter().filter(|p| **p != [255; 3]).count();
+        assert!(painted(picture(true)) < painted(picture(false)), "no line");
     }
 
     #[test]

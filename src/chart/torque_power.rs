@@ -28,8 +28,12 @@ pub struct MotorSeries {
 
 /// Motors of which each has its largest magnitudes marked.
 const MARKED: usize = 3;
-/// What the caption says of these.
-const LARGEST: &str = "largest magnitudes of what is drawn marked";
+/// What the caption says of these where none is known of the run, some are, and all are.
+const LARGEST: [&str; 3] = [
+    "largest of the rows marked",
+    "largest of the rows marked, and of the run where an output tells it",
+    "largest of the run marked",
+];
 
 /// Torque and power of one or several motors.
 #[derive(Clone, Debug, Default)]
@@ -42,6 +46,11 @@ pub struct TorquePower {
     pub motors: Vec<MotorSeries>,
     /// Those of them, by number, that push a slider: what stands for their torques are forces \[N\].
     pub sliders: Vec<usize>,
+    /// Largest magnitudes over the run, and when \[s\], of each motor's torque or force and of its power, where
+    /// they are known; of the others those of the values are marked.
+    pub peaks: Vec<[Option<[f64; 2]>; 2]>,
+    /// True where too much happens between the times for curves through the values.
+    pub is_coarse: bool,
     /// The time from which on the curves are pale: the horizon up to which they can be trusted \[s\].
     pub horizon: Option<f64>,
 }
@@ -58,15 +67,14 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     let sliders = &chart.sliders;
     let is_kept =
         |force: Option<bool>, motor: usize| force.is_none_or(|force| sliders.contains(&motor) == force);
+    let known = |motor: usize, which: usize| chart.peaks.get(motor).and_then(|both| both[which]);
     let data = |values: fn(&MotorSeries) -> &Vec<f64>, force: Option<bool>| -> Vec<Vec<Point>> {
         let line = |(k, motor): (usize, &MotorSeries)| {
-            motor
-                .time
-                .iter()
-                .zip(values(motor))
-                .filter(|_| is_kept(force, k))
-                .map(|(&t, &v)| [t, v])
-                .collect()
+            let peak = known(k, usize::from(force.is_none())).map(|[value, t]| [t, value]);
+            let points = motor.time.iter().zip(values(motor)).map(|(&t, &v)| [t, v]).chain(peak);
+            let mut points: Vec<Point> = points.filter(|_| is_kept(force, k)).collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            points
         };
         chart.motors.iter().enumerate().map(line).collect()
     };
@@ -97,9 +105,14 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
         let panels = stacked(&trial, 40.0, &x, rows.iter().map(y).collect(), 20.0)?;
         panels.iter().zip(&rows).any(|(panel, row)| row.0.iter().any(|line| panel.crowded(line)))
     };
-    let is_marked =
-        rows.iter().any(|row| row.0.len() <= MARKED && row.0.iter().any(|line| top(line).is_some()));
-    let drawn = [(crowded, "bands between the extremes"), (is_marked, LARGEST)];
+    let marked: Vec<bool> = (rows.iter().filter(|row| row.0.len() <= MARKED))
+        .flat_map(|row| row.0.iter().enumerate().map(move |(motor, line)| (row.2, motor, line)))
+        .filter(|(.., line)| top(line).is_some())
+        .map(|(unit, motor, _)| known(motor, usize::from(unit == "W")).is_some())
+        .collect();
+    let exact = marked.iter().filter(|&&is_known| is_known).count();
+    let largest = LARGEST[usize::from(exact > 0) + usize::from(exact == marked.len())];
+    let drawn = [(crowded, "bands between the extremes"), (!marked.is_empty(), largest)];
     let said: Vec<&str> = drawn.into_iter().filter_map(|(is_so, words)| is_so.then_some(words)).collect();
     caption.push(said.join(", "));
     let under = sheet.heading(&chart.title, &caption)?;
@@ -116,7 +129,10 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
         let mark = |motor: usize| if several { marks[motor] } else { own };
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (motor, line) in lines.iter().enumerate() {
-            let pieces = panel.trusted(line, mark(motor).colour, 1.8, chart.horizon)?;
+            let pieces = match chart.is_coarse && !panel.crowded(line) {
+                true => panel.trusted_dots(line, mark(motor).colour, chart.horizon)?,
+                false => panel.trusted(line, mark(motor).colour, 1.8, chart.horizon)?,
+            };
             pieces.iter().for_each(|piece| occupied.line(piece));
             if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
                 ends.push((end[1], labels[motor].clone(), mark(motor)));
@@ -165,4 +181,35 @@ fn peak(
     let time =
         if span > 1e3 || !(0.1..1e5).contains(&top[0].abs()) { figure(top[0]) } else { decimal(top[0], 2) };
     panel.note_beside(at, &format!("{} {unit} at {time} s", figure(top[1])), readable(colour), occupied)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_largest_of_the_run_is_marked_where_it_is_known() {
+        let motor = MotorSeries {
+            name: "motor".to_owned(),
+            time: vec![0.0, 1.0, 2.0],
+            torque: vec![0.0, -3.76, 1.0],
+            power: vec![0.0, -20.0, 6.0],
+        };
+        let words = |peak: [Option<Point>; 2]| -> String {
+            let chart =
+                TorquePower { motors: vec![motor.clone()], peaks: vec![peak], ..TorquePower::default() };
+            let texts = torque_power(&chart, 1.0).expect("a picture").texts;
+            texts.into_iter().map(|text| text.text + "|").collect()
+        };
+        let of_rows = words([None; 2]);
+        assert!(of_rows.contains("−3.76 N·m at 1.00 s|") && of_rows.contains("largest of the rows marked|"));
+        let torque = words([Some([-3.82, 1.1]), None]);
+        assert!(
+            torque.contains("|−3.82 N·m at 1.10 s|") && torque.contains("−20.00 W at 1.00 s"),
+            "{torque}"
+        );
+        assert!(torque.contains("and of the run where an output tells it"), "{torque}");
+        let both = words([Some([-3.82, 1.1]), Some([-20.3, 1.1])]);
+        assert!(both.contains("−20.30 W at 1.10 s") && both.contains("largest of the run marked|"), "{both}");
+    }
 }

@@ -237,6 +237,7 @@ pub fn charts(found: &Kinematics) -> Result<Vec<(&'static str, Picture)>, ChartE
         outputs,
         quantity: None,
         over: Some([plain(&found.drive), found.unit.to_owned()]),
+        is_coarse: false,
         horizon: None,
         settled_from: None,
     };

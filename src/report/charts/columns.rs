@@ -3,6 +3,7 @@
 use super::Finished;
 use crate::chart::{OutputSeries, OutputsChart, plain};
 use crate::dynamics::Mechanism;
+use crate::report::curves::is_coarse;
 use crate::run::table::{header, row};
 use crate::scene::{listed, nearest};
 
@@ -53,6 +54,6 @@ impl Finished<'_> {
             value: rows.iter().map(|row| row[*k]).collect(),
             extremes: Vec::new(),
         });
-        self.over_time(outputs.collect(), more)
+        self.over_time(outputs.collect(), more, is_coarse(&samples, self.angle_count()))
     }
 }

@@ -1,7 +1,8 @@
 //! Torques, outputs and columns against time.
 
-use super::Finished;
+use super::{ALIAS, Finished};
 use crate::chart::{MotorSeries, OutputSeries, OutputsChart, TorquePower, plain};
+use crate::report::curves::is_coarse;
 use crate::report::drawing::names_of;
 use crate::report::page::figure;
 
@@ -19,11 +20,15 @@ impl Finished<'_> {
             torque: window.iter().map(|sample| sample.motors[row][0]).collect(),
             power: window.iter().map(|sample| sample.motors[row][1]).collect(),
         };
+        let within = window.first().zip(window.last()).map_or([0.0; 2], |(first, last)| [first.t, last.t]);
+        let peaks = driven.iter().map(|&row| self.peaks(rows[row].name(), within)).collect();
         let motors: Vec<MotorSeries> = driven.into_iter().map(series).collect();
         let names: Vec<&str> = motors.iter().map(|motor| motor.name.as_str()).collect();
         let (horizon, past) = self.horizon(window.last().map_or(0.0, |sample| sample.t));
         let mut caption = self.caption(more);
         caption.extend(past);
+        let is_coarse = is_coarse(&window, self.angle_count());
+        caption.extend(is_coarse.then(|| format!("rows {ALIAS}")));
         let what = match sliders.len() {
             0 => "Torque",
             all if all == motors.len() => "Force",
@@ -34,8 +39,28 @@ impl Finished<'_> {
             caption,
             motors,
             sliders,
+            peaks,
+            is_coarse,
             horizon,
         }
+    }
+
+    /// The largest magnitudes of a motor's torque or force and of its power over the run, and their times,
+    /// where an output of the scene is just that and has them in the window.
+    fn peaks(&self, motor: &str, [from, to]: [f64; 2]) -> [Option<[f64; 2]>; 2] {
+        let peak = |kinds: &[&str]| {
+            let is_that = |formula: &str| {
+                formula
+                    .trim()
+                    .strip_prefix(motor)
+                    .and_then(|rest| rest.strip_prefix('.'))
+                    .is_some_and(|kind| kinds.contains(&kind))
+            };
+            let output = self.scene.outputs.iter().find(|output| is_that(&output.formula))?;
+            let extremes = self.outcome.extremes.iter().find(|one| one.name == output.name)?;
+            Some(extremes.peak()).filter(|peak| (from..=to).contains(&peak[1]))
+        };
+        [peak(&["torque", "force"]), peak(&["power"])]
     }
 
     /// The outputs over the whole run.
@@ -59,11 +84,17 @@ impl Finished<'_> {
                 .filter(seen)
                 .collect(),
         });
-        self.over_time(outputs.collect(), more)
+        let is_coarse = is_coarse(&whole.iter().collect::<Vec<_>>(), self.angle_count());
+        self.over_time(outputs.collect(), more, is_coarse)
     }
 
-    /// The chart of series of the run.
-    pub fn over_time(&self, outputs: Vec<OutputSeries>, more: Option<String>) -> OutputsChart {
+    /// The chart of series of the run, whose rows may be too far apart for curves.
+    pub fn over_time(
+        &self,
+        outputs: Vec<OutputSeries>,
+        more: Option<String>,
+        is_coarse: bool,
+    ) -> OutputsChart {
         let end = outputs.iter().filter_map(|output| output.time.last()).copied().fold(0.0, f64::max);
         let (horizon, past) = self.horizon(end);
         let begin = outputs.iter().filter_map(|output| output.time.first()).copied().fold(end, f64::min);
@@ -76,8 +107,11 @@ impl Finished<'_> {
             over: None,
             quantity: None,
             title: format!("{} {drawn}", names_of(&outputs)),
-            caption: self.caption(more).into_iter().chain(past).collect(),
+            caption: (self.caption(more).into_iter().chain(past))
+                .chain(is_coarse.then(|| format!("rows {ALIAS}")))
+                .collect(),
             outputs,
+            is_coarse,
             horizon,
             settled_from: None,
         }
