@@ -25,6 +25,8 @@ pub(crate) struct Axis {
     pub scale: Scale,
     pub from: f64,
     pub to: f64,
+    /// The least and the largest value that have ticks, where these are not the ends.
+    pub within: Option<[f64; 2]>,
 }
 
 fn usable(value: f64) -> bool {
@@ -42,7 +44,7 @@ impl Axis {
     /// A linear axis with exactly these ends; equal ends are moved apart.
     pub(crate) fn linear(name: &str, from: f64, to: f64) -> Self {
         let (from, to) = if from == to { apart(from) } else { (from, to) };
-        Axis { name: name.to_owned(), scale: Scale::Linear, from, to }
+        Axis { name: name.to_owned(), scale: Scale::Linear, from, to, within: None }
     }
 
     /// A linear axis around the data: 6 % of air, ends at ticks.
@@ -99,6 +101,7 @@ impl Axis {
             scale: Scale::Pi,
             from: ((low - air) / step).floor() * step,
             to: ((high + air) / step).ceil() * step,
+            within: None,
         }
     }
 
@@ -113,6 +116,7 @@ impl Axis {
             scale: Scale::Log,
             from: ticks::ten(low as i32),
             to: ticks::ten(high.max(low + 1.0) as i32),
+            within: None,
         }
     }
 
@@ -120,7 +124,7 @@ impl Axis {
     pub(crate) fn log_tight(name: &str, values: impl Iterator<Item = f64>) -> Self {
         let (low, high) = extremes(values.filter(|&v| v > 0.0 && usable(v))).unwrap_or((1.0, 10.0));
         let (from, to) = if high >= 2.0 * low { (low, high) } else { (0.5 * low, 2.0 * high) };
-        Axis { name: name.to_owned(), scale: Scale::Log, from, to }
+        Axis { name: name.to_owned(), scale: Scale::Log, from, to, within: None }
     }
 
     fn measure(&self, value: f64) -> f64 {
@@ -149,11 +153,21 @@ impl Axis {
     /// At most about `most` labelled ticks, and the minor ones between them.
     pub(crate) fn ticks(&self, most: usize) -> Ticks {
         let (low, high) = self.ends();
-        match self.scale {
+        let mut ticks = match self.scale {
             Scale::Linear => ticks::linear(low, high, most),
             Scale::Pi => ticks::pi(low, high, most),
             Scale::Log => ticks::log(low, high, most),
+        };
+        if let Some([low, high]) = self.within {
+            let slack = 1e-9 * (high - low);
+            let is_within = |value: f64| (low - slack..=high + slack).contains(&value);
+            // Fewer than two would not tell the scale.
+            if ticks.majors.iter().filter(|tick| is_within(tick.value)).count() > 1 {
+                ticks.majors.retain(|tick| is_within(tick.value));
+                ticks.minors.retain(|&value| is_within(value));
+            }
         }
+        ticks
     }
 }
 

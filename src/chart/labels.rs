@@ -3,7 +3,7 @@
 use super::lines::Point;
 
 /// What labels should not cover.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Occupied {
     /// Samples of lines and bands \[pt\].
     points: Vec<Point>,

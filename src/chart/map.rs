@@ -12,7 +12,7 @@ use super::panel::{Panel, WrittenParts, left_room, most_up};
 use super::sheet::{EDGE, NAME, NOTE, Pen, Sheet, TICK, note};
 use super::text::{Align, Lettering, TextLevel};
 use super::ticks::{Tick, Ticks};
-use std::f64::consts::{FRAC_PI_2, PI};
+use std::f64::consts::FRAC_PI_2;
 
 /// Side of the map, at most \[pt\].
 const SIDE: f64 = 256.0;
@@ -96,7 +96,7 @@ pub struct Map {
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn map(chart: &Map, px_per_pt: f64) -> Result<Picture, ChartError> {
-    let (x, y, colours) = (axis(&chart.x), axis(&chart.y), Colours::of(chart));
+    let (x, y, colours) = (chart.x.drawn(), chart.y.drawn(), Colours::of(chart));
     let legend = legend(chart);
     let side = |count: usize| {
         let most = (SIDE * px_per_pt).max(1.0);
@@ -149,31 +149,6 @@ pub fn map(chart: &Map, px_per_pt: f64) -> Result<Picture, ChartError> {
 
 fn square(left: f64, top: f64, side: f64) -> [[f64; 2]; 4] {
     [[left, top], [left + side, top], [left + side, top + side], [left, top + side]]
-}
-
-/// An axis that ends with the outermost cells.
-fn axis(axis: &MapAxis) -> Axis {
-    let MapAxis { ref name, from, to, count, log } = *axis;
-    if count < 2 || from == to {
-        return Axis::linear(name, from, from);
-    }
-    if log && from > 0.0 && to > 0.0 {
-        let half = (to / from).powf(0.5 / (count - 1) as f64);
-        return Axis { scale: Scale::Log, from: from / half, to: to * half, name: name.clone() };
-    }
-    let half = 0.5 * (to - from) / (count - 1) as f64;
-    let spread = (to - from).abs();
-    let in_pi = name.contains("[rad]") && spread > 0.75 * PI && from.abs().max(to.abs()) < 1e4 * PI;
-    let whole = |end: f64| {
-        let quarters = (end / (0.25 * PI)).round() * 0.25 * PI;
-        if in_pi && (end - quarters).abs() < 1e-9 { quarters } else { end }
-    };
-    Axis {
-        scale: if in_pi { Scale::Pi } else { Scale::Linear },
-        from: whole(from - half),
-        to: whole(to + half),
-        name: name.clone(),
-    }
 }
 
 /// Colours of the cells without a value that occur, and what they mean.
@@ -243,7 +218,7 @@ impl Colours {
         let all = || chart.cells.iter().filter_map(|cell| value(*cell));
         let beyond = [all().any(|value| value < range[0]), all().any(|value| value > range[1])];
         Self {
-            axis: Axis { name: chart.value.clone(), scale, from: range[0], to: range[1] },
+            axis: Axis { name: chart.value.clone(), scale, from: range[0], to: range[1], within: None },
             dark_high: chart.dark_high,
             beyond,
             is_empty,
@@ -344,6 +319,7 @@ fn bar(sheet: &Sheet, panel: &Panel, colours: &Colours, px_per_pt: f64) -> Resul
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     fn chart(cells: Vec<Cell>) -> Map {
         let axis = MapAxis {

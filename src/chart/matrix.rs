@@ -8,8 +8,9 @@ use super::sheet::{CAPTION, EDGE, NOTE, Pen, Sheet, note};
 use super::text::{Align, Lettering, TextLevel};
 use std::f64::consts::FRAC_PI_2;
 
-/// Width and height of a cell, and the em of its word \[pt\].
+/// Width, at least, and height of a cell, the em of its word, and the air beside that \[pt\].
 const CELL: [f64; 2] = [31.0, 11.5];
+const BESIDE: f64 = 3.0;
 const WORD: f64 = 7.0;
 /// Side of a square of the legend \[pt\].
 const SWATCH: f64 = 8.0;
@@ -76,7 +77,9 @@ pub fn matrix(chart: &OutcomeMatrix, px_per_pt: f64) -> Result<Picture, ChartErr
     let widest =
         |names: &[String]| names.iter().map(|name| trial.width(name, NOTE, false)).fold(0.0, f64::max);
     let left = EDGE + widest(&chart.rows) + GAP;
-    let size = [chart.columns.len() as f64 * CELL[0], chart.rows.len() as f64 * CELL[1]];
+    let words = chart.cells.iter().map(|(_, word)| trial.width(word, WORD, false) + 2.0 * BESIDE);
+    let cell = [words.fold(CELL[0], f64::max), CELL[1]];
+    let size = [chart.columns.len() as f64 * cell[0], chart.rows.len() as f64 * cell[1]];
     let legend = legend(chart);
     let told: f64 = legend.iter().map(|(_, words)| SWATCH + 18.0 + trial.width(words, NOTE, false)).sum();
     let width = (left + size[0]).max(2.0 * EDGE + told).max(240.0) + EDGE;
@@ -97,27 +100,27 @@ pub fn matrix(chart: &OutcomeMatrix, px_per_pt: f64) -> Result<Picture, ChartErr
     }
     for (k, name) in chart.columns.iter().enumerate() {
         let upright = Lettering { angle: FRAC_PI_2, ..note(INK, Align::Left, TextLevel::Middle) };
-        sheet.words(name, upright, [left + (k as f64 + 0.5) * CELL[0], top - GAP])?;
+        sheet.words(name, upright, [left + (k as f64 + 0.5) * cell[0], top - GAP])?;
     }
     for (i, name) in chart.rows.iter().enumerate() {
-        let y = top + i as f64 * CELL[1];
-        sheet.words(name, note(INK, Align::Right, TextLevel::Middle), [left - GAP, y + 0.5 * CELL[1]])?;
+        let y = top + i as f64 * cell[1];
+        sheet.words(name, note(INK, Align::Right, TextLevel::Middle), [left - GAP, y + 0.5 * cell[1]])?;
         for k in 0..chart.columns.len() {
             let Some((outcome, word)) = chart.cells.get(i * chart.columns.len() + k) else { continue };
-            let x = left + k as f64 * CELL[0];
-            sheet.polygon(&square([x, y], CELL), outcome.colour())?;
+            let x = left + k as f64 * cell[0];
+            sheet.polygon(&square([x, y], cell), outcome.colour())?;
             let ink = if *outcome == CellOutcome::Wrong { WHITE } else { INK };
             let lettering = Lettering::new(WORD, ink).at(Align::Centre, TextLevel::Middle);
-            sheet.words(word, lettering, [x + 0.5 * CELL[0], y + 0.5 * CELL[1]])?;
+            sheet.words(word, lettering, [x + 0.5 * cell[0], y + 0.5 * cell[1]])?;
         }
     }
     let pen = Pen::new(GRID, 0.6);
     for k in 0..=chart.columns.len() {
-        let x = left + k as f64 * CELL[0];
+        let x = left + k as f64 * cell[0];
         sheet.line(&[[x, top], [x, top + size[1]]], &pen)?;
     }
     for i in 0..=chart.rows.len() {
-        let y = top + i as f64 * CELL[1];
+        let y = top + i as f64 * cell[1];
         sheet.line(&[[left, y], [left + size[0], y]], &pen)?;
     }
     if chart.rows.is_empty() || chart.columns.is_empty() {
@@ -174,6 +177,25 @@ mod tests {
                 assert!(apart(a.colour(), b.colour()) > 50.0, "{a:?} and {b:?}");
             }
         }
+    }
+
+    #[test]
+    fn cells_are_wider_than_their_words() {
+        let words = ["refused", "9.9e-16", "a longer word"];
+        let chart = OutcomeMatrix {
+            rows: vec!["scene".into()],
+            columns: words.map(String::from).to_vec(),
+            cells: words.map(|word| (CellOutcome::Right, word.into())).to_vec(),
+            ..OutcomeMatrix::default()
+        };
+        let texts = matrix(&chart, 1.0).expect("a picture").texts;
+        let ends: Vec<[f64; 2]> = (texts.iter().rev())
+            .filter(|text| words.contains(&&*text.text))
+            .take(3)
+            .map(|text| text.bounds())
+            .map(|[left, _, right, _]| [left, right])
+            .collect();
+        assert!(ends.windows(2).all(|pair| pair[1][1] + 2.0 * BESIDE <= pair[0][0] + 1e-9), "{ends:?}");
     }
 
     #[test]

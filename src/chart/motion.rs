@@ -20,6 +20,9 @@ const GIF: f64 = 2.0;
 const APNG: f64 = 5.0;
 /// Length of the fading trail \[frames\].
 const TAIL: usize = 50;
+/// Poses that the scale bar and the arrow of gravity keep clear of, and width of the time \[pt\].
+const POSES: usize = 60;
+const CLOCK: f64 = 110.0;
 /// A speed that differs from 1 by less is told as none.
 const SAME_SPEED: f64 = 0.05;
 /// Few colours keep the file small.
@@ -128,9 +131,14 @@ fn animated(
     if let Some(pose) = chart.poses.first() {
         pencil.block_supports(&chart.sketch, pose, &mut occupied);
     }
+    for pose in chart.poses.iter().step_by(chart.poses.len().div_ceil(POSES).max(1)) {
+        pencil.block_bars(pose, &mut occupied);
+    }
+    if !chart.time.is_empty() {
+        occupied.block([right - CLOCK, bottom - 5.0 - 2.25 * CAPTION, right, bottom]);
+    }
     pencil.compass(&mut occupied)?;
-    pencil.scale_bar(&mut occupied)?;
-    let background = sheet.pixels();
+    let (background, around) = (sheet.pixels(), occupied);
     let frames = chart.poses.len().max(1);
     let mut draw = |k: usize| -> Result<Vec<u8>, ChartError> {
         sheet.restore(&background);
@@ -148,6 +156,8 @@ fn animated(
             )?;
         }
         pencil.pose(&chart.sketch, pose, &mut occupied)?;
+        // Over the mechanism, which may pass wherever the bar is.
+        pencil.scale_bar(&mut around.clone())?;
         if let Some(&time) = chart.time.get(k) {
             let words = Lettering::new(CAPTION, GREY).at(Align::Right, TextLevel::Baseline);
             let past = if is_past { ", beyond trust" } else { "" };

@@ -261,6 +261,14 @@ impl Pencil<'_> {
         Ok(())
     }
 
+    /// Takes the room of the bars of a pose.
+    pub(crate) fn block_bars(&self, pose: &Pose, occupied: &mut Occupied) {
+        let bars = pose.arms.iter().map(|(_, bar)| bar).chain(&pose.bars);
+        for bar in bars.filter(|bar| finite(&bar[..])) {
+            occupied.line(&bar.map(|end| self.at(end)));
+        }
+    }
+
     /// An arc ahead of the driven bar, arrow head in the sense of rotation.
     fn motor(&self, motor: &MotorPose, named: bool, occupied: &mut Occupied) -> Result<(), ChartError> {
         let centre = self.at(motor.at);

@@ -1,9 +1,10 @@
 //! Scales of a map in words, for a page that draws it itself.
 
-use super::{Colours, Map, SIDE, axis};
-use crate::chart::axis::Axis;
+use super::{Colours, Map, MapAxis, SIDE};
+use crate::chart::axis::{Axis, Scale};
 use crate::chart::text::unmarked;
 use crate::chart::ticks::Ticks;
+use std::f64::consts::PI;
 
 /// Labelled ticks of an axis.
 const ALONG: usize = 6;
@@ -27,9 +28,39 @@ impl Map {
                 .collect(),
         };
         let colours = Colours::of(self);
-        let [x, y] = [axis(&self.x), axis(&self.y)].map(|axis| words(&axis, axis.ticks(ALONG)));
+        let [x, y] = [self.x.drawn(), self.y.drawn()].map(|axis| words(&axis, axis.ticks(ALONG)));
         let bar = words(&colours.axis, colours.ticks(SIDE));
         ([x, y, bar], [colours.axis.from, colours.axis.to])
+    }
+}
+
+impl MapAxis {
+    /// The axis that ends with the outermost cells.  Its ticks end with the outermost values, as what lies
+    /// beyond, half a cell, may mean nothing; where cells end at quarters of π, these have ticks too.
+    pub(super) fn drawn(&self) -> Axis {
+        let MapAxis { ref name, from, to, count, log } = *self;
+        if count < 2 || from == to {
+            return Axis::linear(name, from, from);
+        }
+        let within = Some([from.min(to), from.max(to)]);
+        if log && from > 0.0 && to > 0.0 {
+            let half = (to / from).powf(0.5 / (count - 1) as f64);
+            return Axis { scale: Scale::Log, from: from / half, to: to * half, name: name.clone(), within };
+        }
+        let half = 0.5 * (to - from) / (count - 1) as f64;
+        let spread = (to - from).abs();
+        let in_pi = name.contains("[rad]") && spread > 0.75 * PI && from.abs().max(to.abs()) < 1e4 * PI;
+        let quarters = |end: f64| (end / (0.25 * PI)).round() * 0.25 * PI;
+        let is_whole = |end: f64| in_pi && (end - quarters(end)).abs() < 1e-9;
+        let whole = |end: f64| if is_whole(end) { quarters(end) } else { end };
+        let ends = [from - half, to + half];
+        Axis {
+            scale: if in_pi { Scale::Pi } else { Scale::Linear },
+            from: whole(ends[0]),
+            to: whole(ends[1]),
+            name: name.clone(),
+            within: within.filter(|_| !ends.into_iter().all(is_whole)),
+        }
     }
 }
 
@@ -53,8 +84,7 @@ fn raised(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::{Cell, MapAxis};
-    use std::f64::consts::PI;
+    use crate::chart::Cell;
 
     #[test]
     fn ticks_of_a_page_are_those_of_the_picture() {
@@ -75,5 +105,16 @@ mod tests {
         assert_eq!(bar.ticks[0].1, "≤ 5·10⁻⁴");
         assert!(high > 0.015, "{high}");
         assert_eq!(raised("2·10^{−13} and 10^{40}"), "2·10⁻¹³ and 10⁴⁰");
+    }
+
+    #[test]
+    fn ticks_end_with_the_outermost_values() {
+        let labels = |from: f64, to: f64, count: usize, log: bool| -> Vec<String> {
+            let axis = MapAxis { name: "restitution [1]".into(), from, to, count, log };
+            axis.drawn().ticks(8).majors.into_iter().map(|tick| tick.label).collect()
+        };
+        assert_eq!(labels(0.0, 1.0, 3, false), ["0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
+        assert_eq!(labels(1.0, 0.0, 3, false), labels(0.0, 1.0, 3, false));
+        assert_eq!(labels(2.0, 200.0, 3, true), ["10", "100"], "the axis begins at 0.6");
     }
 }
