@@ -25,7 +25,7 @@ pub enum Exit {
     Scene = 3,
     /// The integration stopped before its horizon.
     Stopped = 4,
-    /// A stated drift limit was exceeded.
+    /// A drift limit was exceeded, stated or not.
     Drift = 5,
     /// A file could not be read or written.
     Io = 6,

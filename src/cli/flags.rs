@@ -31,7 +31,7 @@ use std::process::ExitCode;
 
 const EXIT_CODES: &str = "\
 Exit codes: 0 done, 1 other failure, 2 usage, 3 scene refused, 4 integration stopped,
-            5 a stated drift limit exceeded, 6 files, 130 interrupted after a checkpoint";
+            5 a drift limit exceeded, 6 files, 130 interrupted after a checkpoint";
 
 /// Simulates planar mechanisms over long horizons, and tells how far they drift.
 #[derive(Debug, Parser)]
@@ -144,7 +144,7 @@ pub struct PlanFlags {
     #[arg(long, value_name = "S", value_parser = number, allow_hyphen_values = true)]
     pub time_constant: Option<f64>,
     /// Carry the first orders of taylor's series in double-double: rounding in energy a thousandth of a plain
-    /// run's, at tolerances down to 1e-25 [default: 1e-20]
+    /// run's, at tolerances down to 1e-25, and at 1e-20 without --rtol
     #[arg(long)]
     pub extended: bool,
     /// Evaluations of the equations allowed in a run; one that needs more stops with exit code 4 [default:
@@ -211,9 +211,9 @@ pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub plan: PlanFlags,
-    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (50 ms, and 30
-    /// % of what the run takes without its output), full (5 s, and thirty times that, but no more evaluations
-    /// than --max-evaluations)
+    /// Estimate the error of the result and the time up to which it can be trusted: off, auto (30 % of the
+    /// run's work without its output, and what takes about 20 to 50 ms), full (thirty times that work, and
+    /// what takes about 5 s, but no more evaluations than --max-evaluations); work is counted, not timed
     #[arg(long, value_name = "HOW", value_parser = levels(), default_value = Level::Auto.name(),
         help_heading = "Trust")]
     pub trust: Level,
@@ -222,8 +222,8 @@ pub struct RunFlags {
     #[command(flatten)]
     pub digits: DigitsFlags,
     /// Tell what the last digit of every number comes to, as it is written in the scene or in --set (0.25 is
-    /// uncertain by 0.005, 670 by 0.5; 0, pi/2 and defaults are exact), in a table: two to four runs for each
-    /// number
+    /// uncertain by 0.005, 670 by 0.5; 0, pi/2 and defaults are exact), in a table: usually two to four runs
+    /// for each number
     #[arg(long, help_heading = "Trust")]
     pub inputs: bool,
     /// Stop with exit code 5 where the energy is off by more than this share of its scale [default: what the

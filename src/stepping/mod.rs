@@ -323,7 +323,7 @@ pub enum Cause {
     ImpactCheckFailed,
     /// The method does not fit the mechanism.
     Unsuited,
-    /// A stated drift limit was exceeded.
+    /// A drift limit was exceeded, stated or not.
     DriftLimit,
 }
 
