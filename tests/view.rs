@@ -223,13 +223,13 @@ fn charts_show_rows_alone_where_they_are_far_apart_and_motors_that_hold() {
 }
 
 /// A pendulum that hangs has nothing to be too far apart, and one whose rows are many periods apart has dots
-/// of its outputs and torques, which say so; a motor's torque has the same peak in both of its charts.
+/// of its outputs, of which the caption says so.
 #[test]
 fn captions_tell_what_rests_from_what_is_too_far_apart() {
     let program = Program::new();
-    let pendulum = |start: &str, until: f64, every: f64| {
+    let pendulum = |phi: f64, until: f64, every: f64| {
         format!(
-            r#"{{"name": "bar", "gravity": [0, -9.81], "start": {{"bar": {{"phi": "{start}", "omega": 0}}}},
+            r#"{{"name": "bar", "gravity": [0, -9.81], "start": {{"bar": {{"phi": {phi}, "omega": 0}}}},
             "bars": [{{"name": "bar", "length": 0.6, "width": 0.05, "thickness": 0.003, "density": 670}}],
             "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}},
             {{"body": "bar", "point": [0, 0]}}]}}], "until": {until}, "every": {every},
@@ -243,11 +243,11 @@ fn captions_tell_what_rests_from_what_is_too_far_apart() {
         let is_it = |file: &String| file.starts_with(folder) && file.ends_with(&ending);
         program.files().into_iter().find(is_it).map(|file| program.read(&file)).expect("a chart")
     };
-    let rest = chart(&pendulum("-pi/2", 10.0, 0.01), "mechanism", "a");
+    let rest = chart(&pendulum(-std::f64::consts::FRAC_PI_2, 10.0, 0.01), "mechanism", "a");
     assert!(!rest.contains("too far apart") && rest.contains("The mechanism at"));
-    let far = chart(&pendulum("0.3", 300.0, 10.0), "outputs", "b");
+    let far = chart(&pendulum(0.3, 300.0, 10.0), "outputs", "b");
     assert!(far.contains("may be an alias"));
-    let near = chart(&pendulum("0.3", 3.0, 0.01), "outputs", "c");
+    let near = chart(&pendulum(0.3, 3.0, 0.01), "outputs", "c");
     assert!(!near.contains("may be an alias"));
 }
 
