@@ -46,8 +46,8 @@ pub struct TorquePower {
     pub motors: Vec<MotorSeries>,
     /// Those of them, by number, that push a slider: what stands for their torques are forces \[N\].
     pub sliders: Vec<usize>,
-    /// Largest magnitudes over the run, and when \[s\], of each motor's torque or force and of its power, where
-    /// they are known; of the others those of the values are marked.
+    /// Largest magnitudes over the run, and when \[s\], of each motor's torque or force and of its power,
+    /// where they are known; of the others those of the values are marked.
     pub peaks: Vec<[Option<[f64; 2]>; 2]>,
     /// True where too much happens between the times for curves through the values.
     pub is_coarse: bool,
