@@ -3,6 +3,7 @@
 
 use super::breaking_away::done;
 use super::formulas::adaptive;
+use super::laws::rk4;
 #[cfg(feature = "digits")]
 use super::many_digits::bodies_at_end;
 use driftless::run::{MethodId, Request};
@@ -239,5 +240,45 @@ fn ends_that_strike_in_turn_come_to_rest_while_the_bar_slides() {
         let off = [outcome.last.phi[0] - expected[0], outcome.last.omega[0] - expected[1]];
         println!("{method}: {off:?}");
         assert!(off.iter().all(|off| off.abs() < 1e-9), "{method}: {off:?}");
+    }
+}
+
+/// A box on two supports with friction that carries a pendulum stays where it is, and the pendulum is that of the
+/// ground.  Both supports say that the box does not move along: that they depend on each other is no singular
+/// position ahead.
+#[test]
+fn supports_that_stick_side_by_side_are_no_singular_position() {
+    let support = |x: f64| format!(r#""point": {{"body": "box", "point": [{x}, -0.08]}}, "#);
+    let rail =
+        r#""rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "friction": {"kinetic": 0.5}"#;
+    let foot = |name: &str, x: f64| {
+        format!(
+            r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.08], "line": {{"through": [0, 0], "normal": [0, 1]}},
+            "restitution": 0, "friction": {{"kinetic": 0.5}}}}"#
+        )
+    };
+    let feet = format!(r#""walls": [{}, {}]"#, foot("A", -0.25), foot("B", 0.25));
+    let [left, right] = [-0.25, 0.25].map(support);
+    let rails = format!(r#""sliders": [{{"name": "A", {left}{rail}}}, {{"name": "B", {right}{rail}}}]"#);
+    // Of the pendulum about its hinge: 2 kg at 0.3 m.
+    let inertia = 0.04 + 2.0 * 0.3 * 0.3;
+    let swings = |_: f64, y: &[f64; 2]| [y[1], -2.0 * 9.81 * 0.3 * y[0].cos() / inertia];
+    for (supports, until) in [(&feet, 2.0), (&rails, 2.0), (&feet, 8.0)] {
+        let text = format!(
+            r#"{{"name": "box", "gravity": [0, -9.81], "bars": [
+            {{"name": "box", "mass": 3, "centre": [0, 0], "inertia": 0.07, "length": 0.5}},
+            {{"name": "pendulum", "mass": 2, "centre": [0.3, 0], "inertia": 0.04, "length": 0.8}}],
+            "hinges": [{{"name": "H", "between": [{{"body": "box", "point": [0, 0.08]}},
+                {{"body": "pendulum", "point": [0, 0]}}]}}], {supports},
+            "start": {{"box": {{"phi": 0, "omega": 0, "origin": [0, 0.08], "velocity": [0, 0]}},
+                "pendulum": {{"phi": -1, "omega": 1.5}}}}, "until": {until}, "every": {until}}}"#
+        );
+        let [phi, _] = rk4([-1.0, 1.5], until, (1e4 * until) as u32, swings);
+        for tolerance in [1e-9, 1e-11, 1e-13] {
+            let outcome = done(&text, &adaptive(MethodId::Taylor, tolerance));
+            let off = (outcome.last.phi[1] - phi).abs();
+            assert!(off < (10.0 * tolerance * until).max(1e-11), "{tolerance:e} to {until} s: {off:e}");
+            assert!(outcome.drift.singular.is_none(), "{:?}", outcome.drift.singular);
+        }
     }
 }

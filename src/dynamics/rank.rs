@@ -213,6 +213,11 @@ impl RankVerdict {
         self.weakest.share
     }
 
+    /// The least share of the constraints that are not left out.
+    pub fn kept(&self) -> f64 {
+        self.kept
+    }
+
     /// The weakest constraint where S has been factored with `mass` as its own and these reciprocal pivots
     /// and scales; `again` factors it anew, without the constraints that are to be left out or, with none, as
     /// it was, and tells the least share of a pivot.

@@ -193,10 +193,13 @@ impl Sampler {
         if mechanism.constraints.iter().any(ConstraintEquation::moves) {
             self.holding.share_multipliers(motion.time, &mut self.plain, &self.phi, &self.omega);
         }
-        let is_watched = self.plain.weakest.share < WATCHED && self.holding.has_closed_loops();
+        // Places that rest or stick side by side may depend on each other: no singular position.
+        let weakest = self.plain.weakest;
+        let is_standing = weakest.row < self.holding.standing_rows();
+        let is_watched = weakest.share < WATCHED && is_standing && self.holding.has_closed_loops();
         let sample = &mut self.sample;
         sample.singular = if is_watched { self.holding.conditioning(&self.plain) } else { f64::NAN };
-        sample.weakest = self.plain.weakest.row;
+        sample.weakest = weakest.row;
         sample.t = motion.time.hi;
         let of_integrals = mechanism.energy_of_integrals(&motion.omega);
         sample.kinetic = (kinetic - of_integrals).hi;

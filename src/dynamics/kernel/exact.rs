@@ -8,6 +8,7 @@
 use super::{Bias, Kernel};
 use crate::arithmetic::sum::larger;
 use crate::arithmetic::{DoubleDouble, Real};
+use crate::dynamics::rank::RankVerdict;
 use crate::dynamics::{Mechanism, Time, schur};
 
 impl<T: Real> Kernel<T> {
@@ -79,14 +80,14 @@ impl<T: Real> Kernel<T> {
         round(&mut self.load, &exact.load);
     }
 
-    /// The least share of a constraint at other coordinates than the last, which knows no masses
-    /// ([`rank`](crate::dynamics::rank)); and all of [`Kernel::rows_at`].
-    pub fn independence_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> f64 {
+    /// How independent the constraints are at other coordinates than the last, whatever the masses are; and
+    /// all of [`Kernel::rows_at`].
+    pub fn independence_at(&mut self, mechanism: &Mechanism, t: Time, phi: &[T], omega: &[T]) -> RankVerdict {
         self.unit_vectors::<0>(mechanism, phi);
         self.rows_at(mechanism, t, phi, omega);
         match &self.bodywise {
-            Some(bodywise) => bodywise.judge().share(),
-            None => self.metric.judge(&self.jacobian).share(),
+            Some(bodywise) => bodywise.judge(),
+            None => self.metric.judge(&self.jacobian),
         }
     }
 

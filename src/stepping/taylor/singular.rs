@@ -16,6 +16,7 @@
 use super::expansion::Expansion;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
+use crate::dynamics::rank::RankVerdict;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Form, Mechanism, State};
@@ -25,6 +26,9 @@ const LOW: usize = 8;
 /// Points it is looked for at, and the longest way over the step wanted.
 const POINTS: usize = 96;
 const LONGEST: f64 = 12.0;
+/// Shares below this are rounding: such a constraint depends on others for as long as it acts, as those of
+/// places that stick side by side do, and says nothing of what is ahead.
+const PERMANENT: f64 = 1e-13;
 /// On a way through a singular position the share falls below this part of what it was; elsewhere it is small
 /// for other reasons, and the step is as any.
 const FALL: f64 = 0.1;
@@ -68,7 +72,7 @@ impl<T: Coefficient> SingularPassage<T> {
         let (series, n) = (expansion.series(), mechanism.coordinates());
         let kernel = &mut self.kernel;
         let mut phi = vec![0.0; n];
-        let mut share = |h: f64| {
+        let mut verdict = |h: f64| {
             for (i, phi) in phi.iter_mut().enumerate() {
                 let rates = (0..LOW.min(series.order()))
                     .rev()
@@ -77,12 +81,21 @@ impl<T: Coefficient> SingularPassage<T> {
             }
             kernel.independence_at(mechanism, state.time, &phi, &state.y[n..2 * n])
         };
-        let here = share(0.0);
+        let first = verdict(0.0);
+        let is_permanent = first.share() < PERMANENT;
+        let share_of = |verdict: &RankVerdict| {
+            let is_as_ever = is_permanent && verdict.is_left_out == first.is_left_out;
+            if is_as_ever { verdict.kept() } else { verdict.share() }
+        };
+        let here = share_of(&first);
+        if here >= NEAR {
+            return None;
+        }
         // From well inside the step on: what comes back sooner needs no jump.
         let (mut least, mut fell) = (here, false);
         for point in 1..=POINTS {
             let h = LONGEST * wanted * (point as f64 / POINTS as f64);
-            let now = share(h);
+            let now = share_of(&verdict(h));
             if now.is_nan() {
                 return None;
             }
@@ -122,7 +135,7 @@ impl<T: Coefficient> SingularPassage<T> {
         };
         let lost = balance(kernel, end) - balance(kernel, state);
         let is_energy_kept = lost.abs() <= limit * mechanism.energy_scale;
-        let off = kernel.independence_at(mechanism, end.time, &end.y[..n], &end.y[n..2 * n]);
+        let off = kernel.independence_at(mechanism, end.time, &end.y[..n], &end.y[n..2 * n]).share();
         let is_kept = off.is_finite() && kernel.violation(mechanism) <= limit;
         if !(is_energy_kept && is_kept) {
             return false;

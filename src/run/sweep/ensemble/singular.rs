@@ -71,7 +71,7 @@ impl PastSingular {
                 return Ok(Going::Enough);
             }
             let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
-            let share = kernel.independence_at(mechanism, state.time, phi, omega);
+            let share = kernel.independence_at(mechanism, state.time, phi, omega).share();
             if state.time >= until || share >= NEAR {
                 return Ok(Going::On);
             }
