@@ -298,6 +298,50 @@ fn a_free_shaft_gives_the_follower_what_it_loses() {
     assert!((outcomes[0].last.omega[0] - 20.0).abs() > 0.01);
 }
 
+/// A follower that starts on its cam, to rounding, has no length of its own: what it lifts by is not measured
+/// in that rounding.  Impacts are where `taylor` finds them, the follower is never below its cam, and while
+/// it rests its height is the law of the angle.
+#[test]
+fn a_follower_that_starts_on_its_cam_strikes_it_where_it_meets_it() {
+    let lift = |phi: f64| 0.061 * (1.0 - (2.0 * phi).cos());
+    let of = |until: f64| {
+        scene(&format!(
+            r#"{{"name": "cam", "gravity": [0, -{G}],
+            "bars": [{{"name": "cam", "mass": 1, "centre": [0, 0], "inertia": 0.05, "length": 0.2}},
+                {{"name": "rod", "mass": 0.7, "centre": [0, 0], "inertia": 0.02, "length": 0.2}}],
+            "hinges": [{{"name": "shaft", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "cam", "point": [0, 0]}}]}}],
+            "sliders": [{{"name": "guide", "point": {{"body": "rod", "point": [0, 0]}}, "angle": "locked",
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [0, 1]}}}}],
+            "walls": [{{"name": "lift", "body": "rod", "point": [0, 0], "restitution": 0,
+                "line": {{"through": [0, 0], "normal": [0, 1]}}, "law": "0.061*(1-cos(2*cam.phi))"}}],
+            "torques": [{{"name": "drive", "body": "cam", "torque": 3, "law": {{"start": 0, "sines": [{{"amplitude": 1, "frequency": 3}}]}}}}],
+            "start": {{"cam": {{"phi": -2.875, "omega": 0}}, "rod": {{"phi": 0, "omega": 0, "origin": [0, {}], "velocity": [0, 0]}}}},
+            "until": {until}, "every": {until}}}"#,
+            0.008467262553147226
+        ))
+    };
+    let times = |outcome: &Outcome| -> Vec<f64> { outcome.impacts.iter().map(|impact| impact.t).collect() };
+    let expected = times(&finished(&of(4.0), &adaptive(MethodId::Taylor, 1e-13)));
+    assert_eq!(expected.len(), 9);
+    near(expected[2], 1.586_396_424_1, 1e-9, "the third");
+    let others = [(MethodId::Dp5, 1e-8), (MethodId::Dp8, 1e-6), (MethodId::Dp8, 1e-9)];
+    let implicit = [(MethodId::Radau(3), 1e-8), (MethodId::Radau(5), 1e-7)];
+    for (method, tolerance) in others.into_iter().chain(implicit) {
+        let outcome = run(&of(4.0), &adaptive(method, tolerance));
+        assert!(outcome.stop.is_none(), "{method} {tolerance:e}: {:?}", outcome.stop);
+        let found = times(&outcome);
+        assert_eq!(found.len(), expected.len(), "{method} {tolerance:e}");
+        for (found, expected) in found.iter().zip(&expected) {
+            near(*found, *expected, 1e4 * tolerance, &format!("{method} {tolerance:e}"));
+        }
+        // In the middle of its first rest.
+        let hold = &outcome.holds[0];
+        let last =
+            run(&of(0.5 * (hold.t + hold.until.expect("a release"))), &adaptive(method, tolerance)).last;
+        near(last.phi[3], lift(last.phi[0]), 1e-10, "height at rest");
+    }
+}
+
 #[test]
 fn a_screw_counts_the_turns_of_its_shaft() {
     // The rod is struck at t = 0 and rests on the screw from then on, which it brakes: (1 + I/s²) y'' = -g.

@@ -8,10 +8,10 @@
 //!     E: kinetic and elastic energy at the start, torques, inertia times the square of driven rates
 //! ```
 //!
-//! A point without levers that starts on its wall takes the largest length of the other contacts, else the
-//! size of the bodies, else the height its speed takes it to, else 1 m.  A body far from the origin has its
-//! gap rounded to the size of its coordinates; the length is no less than what makes that rounding
-//! [`ROUNDED`] of it.
+//! A point without levers that starts on its wall, to rounding, takes the largest length of the other
+//! contacts, else the size of the bodies, else the height its speed takes it to, else 1 m.  A body far from
+//! the origin has its gap rounded to the size of its coordinates; the length is no less than what makes that
+//! rounding [`ROUNDED`] of it.
 
 use crate::arithmetic::{Complex, DoubleDouble};
 use crate::dynamics::compile::Body;
@@ -36,7 +36,12 @@ impl Mechanism {
         let own: Vec<f64> = self
             .contacts
             .iter()
-            .map(|contact| levers(&contact.point) + contact.distance(start.time, &phi, &z).abs())
+            .map(|contact| {
+                let distance = contact.distance(start.time, &phi, &z).abs();
+                // Of a point that starts on its wall this is rounding, and no length.
+                let is_known = distance > least_length(&contact.row, &z);
+                levers(&contact.point) + if is_known { distance } else { 0.0 }
+            })
             .collect();
         let others = own.iter().copied().fold(0.0, f64::max);
         let gravity = self.gravity.norm_squared().sqrt();
@@ -50,8 +55,7 @@ impl Mechanism {
                 .into_iter()
                 .find(|x| x.is_finite() && *x > 0.0)
                 .unwrap_or(1.0);
-            let rounding = f64::EPSILON * magnitudes(&contact.row, &z);
-            contact.length = power_of_two(length.max(rounding / ROUNDED));
+            contact.length = power_of_two(length.max(least_length(&contact.row, &z)));
             let force = energy / contact.length
                 + mass * gravity
                 + driven(self.constraints.iter().chain([&contact.row]), mass, contact.length)
@@ -73,6 +77,11 @@ impl Mechanism {
 /// Σ |gamma_k| \[m\].
 fn levers(point: &Point) -> f64 {
     point.terms.iter().map(|term| term.1.norm_squared().sqrt()).sum()
+}
+
+/// The length that a gap's rounding is [`ROUNDED`] of \[m\].
+fn least_length(row: &ConstraintEquation, z: &[Complex<f64>]) -> f64 {
+    f64::EPSILON * magnitudes(row, z) / ROUNDED
 }
 
 /// Sum of the magnitudes a gap is summed from \[m\].
