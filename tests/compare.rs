@@ -350,6 +350,7 @@ mod by_program {
         let ran = program.run("compare motor.json --methods dp8,gauss8 --stabilize elimination,baumgarte --until 4 --budget 4 --no-charts");
         let ran = ran.exits(0).shows(&[
             "For 1e-6 take --method",
+            "errors         of angles in rad, largest at ",
             "dp8 b 1e-9",
             "gauss8 with baumgarte: refused",
             "double-double",

@@ -220,7 +220,8 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, comparison: &Comparison) -> St
     page.entry("horizon", &format!("{} s", figure(comparison.until)));
     if truth.until > 0.0 {
         page.entry("reference", &format!("{}, good to {}", truth.how, magnitude(truth.accuracy)));
-        page.entry("errors", &format!("of angles in rad, largest up to t = {} s", figure(truth.until)));
+        let (times, until) = (truth.times(), figure(truth.until));
+        page.entry("errors", &format!("of angles in rad, largest at {times} times up to t = {until} s"));
     } else {
         page.entry("reference", "none");
     }

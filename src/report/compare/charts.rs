@@ -83,7 +83,8 @@ pub fn chart_data(
         caption.push("largest value on the way, over the energy scale".into());
     } else {
         caption.push(format!(
-            "largest error up to *t* = {} s, against {}",
+            "largest error at {} times up to *t* = {} s, against {}",
+            truth.times(),
             figure(truth.until),
             plain(&truth.how)
         ));

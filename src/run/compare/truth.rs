@@ -61,6 +61,11 @@ impl Truth {
         }
     }
 
+    /// Number of times at which errors are measured.
+    pub fn times(&self) -> usize {
+        self.motions.len()
+    }
+
     /// Times at which errors are told one by one \[s\].
     pub fn marks(&self) -> impl Iterator<Item = f64> {
         self.marks.iter().map(|&row| self.motions[row].time.hi)
