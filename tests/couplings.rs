@@ -349,3 +349,58 @@ fn a_cam_starts_on_its_piece() {
         assert!(outcome.drift.energy.max < 1e-10, "{law}: {:e}", outcome.drift.energy.max);
     }
 }
+
+/// A free wheel with a rack between two walls: phi = w t from wall to wall, where the wheel turns round with the
+/// restitution.
+#[test]
+fn racks_meet_walls_at_any_ratio_and_speed() {
+    let mut impacts = 0;
+    for (ratio, w, e) in [
+        (0.07523960995800624, 2599.1302572411337, 0.627095128717303),
+        (0.003062367797260521, 21.131589952241747, 0.9),
+        (0.005326979462496898, 88.66785693047142, 0.8),
+        (0.31, 1.7, 0.7),
+        (0.019, 731.0, 0.95),
+        (0.11, 316.0, 0.55),
+    ] {
+        let until = 118.0 / w;
+        let (high, low) = (0.161 * ratio * w * until, -0.08 * ratio * w * until);
+        let text = format!(
+            r#"{{"name": "rack", "gravity": [0, 0],
+            "bars": [{{"name": "w", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 0.5}},
+                {{"name": "rk", "mass": 0.7, "centre": [0, 0], "inertia": 0.01, "length": 0.1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "w", "point": [0, 0]}}]}}],
+            "sliders": [{{"name": "s", "point": {{"body": "rk", "point": [0, 0]}}, "angle": "locked",
+                "rail": {{"body": "ground", "point": [0, -1], "direction": [1, 0]}}}}],
+            "motors": [{{"name": "r", "slider": "s", "law": "{ratio:?}*w.phi"}}],
+            "walls": [{{"name": "hi", "body": "rk", "point": [0, 0], "restitution": {e:?},
+                    "line": {{"through": [{high:?}, 0], "normal": [-1, 0]}}}},
+                {{"name": "lo", "body": "rk", "point": [0, 0], "restitution": {e:?},
+                    "line": {{"through": [{low:?}, 0], "normal": [1, 0]}}}}],
+            "start": {{"w": {{"phi": 0, "omega": {w:?}}}, "rk": {{"phi": 0}}}}, "until": {until:?}, "every": {until:?}}}"#
+        );
+        let (mut phi, mut omega, mut t, mut expected) = (0.0, w, 0.0, Vec::new());
+        loop {
+            let wall = (if omega > 0.0 { high } else { low }) / ratio;
+            t += (wall - phi) / omega;
+            if t > until {
+                break;
+            }
+            expected.push(t);
+            (phi, omega) = (wall, -e * omega);
+        }
+        for request in [
+            adaptive(MethodId::Taylor, 1e-9),
+            adaptive(MethodId::Taylor, 1e-10),
+            adaptive(MethodId::Dp8, 1e-9),
+        ] {
+            let outcome = finished(&scene(&text), &request);
+            assert_eq!(outcome.impacts.len(), expected.len(), "{:?} at {ratio} {w}", request.method);
+            for (impact, expected) in outcome.impacts.iter().zip(&expected) {
+                assert!((impact.t / expected - 1.0).abs() < 1e-11, "{impact:?} and not {expected}");
+            }
+        }
+        impacts += expected.len();
+    }
+    assert!(impacts > 15, "{impacts}");
+}

@@ -1,8 +1,8 @@
 //! The first zero of an event function inside a step, told by bounds and not by samples.
 //!
 //! ```text
-//! on |t - c| <= r, with B a bound of |g''| there:
-//! |g(c)| > |g'(c)| r + B r²/2     no zero
+//! on |t - c| <= r, with B a bound of |g''| there, and g(c) known to e:
+//! |g(c)| > |g'(c)| r + B r²/2 + e     no zero
 //! |g'(c)| > B r                   monotone: at most one, told by the signs at the ends
 //! else                            both halves, the earlier one first
 //! ```
@@ -77,7 +77,8 @@ impl IntervalBounds {
         let tilt = self.bend * radius;
         let reach = radius * (slope + 0.5 * tilt);
         let most = value + reach;
-        if value > reach.max(self.rounding) {
+        // A zero may be where the part begins or ends.
+        if value > reach + self.rounding {
             ZeroBounds::NoZero
         } else if slope > tilt || most <= self.rounding || most.is_nan() {
             ZeroBounds::BySigns
@@ -286,15 +287,15 @@ impl Curve for PowerSeries<'_> {
     }
 
     fn about(&self, centre: f64, radius: f64) -> IntervalBounds {
+        let rounding = ROUNDING * size(self.powers, centre + radius);
         if radius > SMALL * self.end {
             let ([value, slope], bend) = (value(self.powers, centre), bend(self.powers, centre + radius));
-            return IntervalBounds { value, slope, bend, rounding: 0.0 };
+            return IntervalBounds { value, slope, bend, rounding };
         }
         let mut local = self.powers.to_vec();
         shift(&mut local, centre);
         let steeper = |sum: f64, (m, a): (usize, &f64)| sum * radius + m as f64 * a.abs();
         let bend = local.iter().enumerate().skip(2).rev().fold(0.0, steeper);
-        let rounding = ROUNDING * size(self.powers, centre + radius);
         IntervalBounds {
             value: local.first().copied().unwrap_or(0.0),
             slope: local.get(1).copied().unwrap_or(0.0),

@@ -69,6 +69,21 @@ fn where_rounding_is_all_there_is_signs_tell_and_few_parts_are_looked_at() {
     assert!(parts < 1000, "{parts}");
 }
 
+/// What moves evenly passes a wall wherever it is: values are zero, or rounding, where the passage is found.
+#[test]
+fn passages_of_straight_lines_are_found() {
+    for i in 1..=2000 {
+        let (begin, slope) =
+            (0.3 + libm::sin(f64::from(i)).abs(), -libm::exp(libm::cos(1.7 * f64::from(i)) * 9.0));
+        let zero = -begin / slope;
+        for end in [1.01, 3.0, 29.3].map(|share| share * zero) {
+            let found = crossing(&[begin, slope, 0.0, 0.0], end);
+            let is_there = |t: f64| (t / zero - 1.0).abs() < 1e-14;
+            assert!(matches!(found, Crossing::At(t) if is_there(t)), "{begin} {slope} {end}: {found:?}");
+        }
+    }
+}
+
 #[test]
 fn powers_about_another_time_give_the_same_values() {
     let powers = through(&[0.3, 0.5, 0.9], -1.0);
