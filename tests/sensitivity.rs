@@ -811,3 +811,23 @@ fn outputs_that_are_added_are_derived() {
         }
     }
 }
+
+/// A wheel, phi = w t - q t²/(2 J), beyond 0.25: the least (phi - 0.25)² is zero and smooth.  What is the smaller
+/// one of a rising and of a falling line is largest at a corner.
+#[test]
+fn extremes_at_zero_are_smooth_and_corners_are_refused() {
+    let text = r#"{"name": "wheel", "gravity": [0, 0],
+        "bars": [{"name": "w", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.5}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "w", "point": [0, 0]}]}],
+        "torques": [{"name": "q", "body": "w", "torque": -0.1}],
+        "outputs": {"sq": "(w.phi-0.25)^2", "high": "7-(w.phi-0.25)^2", "roof": "min(w.phi-0.1, 1.2-3*w.phi)"},
+        "start": {"w": {"phi": 0, "omega": 1}}, "until": 0.6, "every": 0.1}"#;
+    let found = derived(&template(text), &["min:sq", "max:high", "max:roof"], &["w.omega", "q.torque"], 0.6);
+    for (measure, value) in found.measures.iter().zip([0.0, 7.0]) {
+        assert_near(measure.value, value, 1e-9, &measure.name);
+        assert_eq!(measure.slopes.len(), 2, "{:?}", measure.why);
+        measure.slopes.iter().for_each(|slope| assert_near(*slope, 0.0, 1e-6, &measure.name));
+    }
+    let why = found.measures[2].why.as_deref().unwrap_or_default();
+    assert!(why.contains("corner"), "{:?}", found.measures[2]);
+}

@@ -85,7 +85,7 @@ pub(in crate::run) struct Derived {
 }
 
 /// Outputs of a mechanism at a state; whole turns of a motion are added to the angles.
-fn outputs_at(
+pub(super) fn outputs_at(
     mechanism: &Mechanism,
     kernel: &mut Kernel<f64>,
     motion: &Motion,

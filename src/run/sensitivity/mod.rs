@@ -20,6 +20,7 @@ mod at_rest;
 mod collocation;
 mod crossing;
 mod expanded;
+mod extreme;
 mod lyapunov;
 mod measure;
 mod neighbours;
@@ -34,7 +35,7 @@ pub use measure::Measure;
 #[cfg(feature = "fit")]
 pub(super) use measure::outputs;
 use neighbours::Neighbours;
-use recorder::{RecordedTime, SensitivityRecorder};
+use recorder::{RecordedTime, SensitivityRecorder, taken};
 pub use result::{InputNumber, Measured, Sensitivity, SensitivityError, SensitivityRequest, SensitivityRow};
 pub(super) use variation::{Look, Variation};
 
@@ -52,8 +53,6 @@ use std::sync::Arc;
 
 /// Tolerance of the motion \[rad/s\].
 pub const TOLERANCE: f64 = 1e-14;
-/// Slope of an output over its size and the time at an extreme that is none of a smooth curve.
-const CORNER: f64 = 1e-4;
 
 /// A measure on its way.
 struct Query {
@@ -64,6 +63,8 @@ struct Query {
     t: Result<f64, String>,
     /// Its value, of an extreme: on which side of a jump that is.
     value: f64,
+    /// The least and the largest value of its output over the run.
+    range: [f64; 2],
     /// The bar that turns over, or the event, by number.
     number: usize,
     /// True where an extreme is taken as the run ends, and the event that ends it.
@@ -213,8 +214,8 @@ impl Study {
                 position(&known, name, "wall")?;
             }
             let t = Ok(self.plan.until);
-            let value = f64::NAN;
-            Ok(Query { measure: measure.clone(), output, t, value, number, is_end: false, ended_by: None })
+            let (measure, value, range) = (measure.clone(), f64::NAN, [f64::NAN; 2]);
+            Ok(Query { measure, output, t, value, range, number, is_end: false, ended_by: None })
         };
         request.of.iter().map(asked).collect()
     }
@@ -256,6 +257,7 @@ impl Study {
                     let is_max = matches!(asked.measure, Measure::Max(_));
                     let found = extreme.map(|found| if is_max { found.max } else { found.min });
                     asked.value = found.map_or(f64::NAN, |[value, _]| value);
+                    asked.range = extreme.map_or([f64::NAN; 2], |found| [found.min[0], found.max[0]]);
                     found.map(|[_, t]| t).ok_or_else(|| nothing("no extreme"))
                 }
                 Measure::Flip => match driver.flips.as_ref().and_then(|flips| flips.flip) {
@@ -376,59 +378,6 @@ impl Study {
         }
         Sensitivity { scene, inputs, measures, outputs, rows, until: plan.until, lost, steps, by_series }
     }
-}
-
-/// When a measure was taken, its value and derivatives; or why not, empty where the run ended before.
-fn taken(
-    number: usize,
-    asked: &Query,
-    seen: &[RecordedTime],
-    variation: &Variation,
-) -> Result<(f64, f64, Vec<f64>), String> {
-    if let Measure::Impact(wall) = &asked.measure {
-        let first = variation.impacts.iter().find(|impact| impact.wall == *wall);
-        let first = first.ok_or("there is no impact")?;
-        return Ok((first.t, first.t, first.slopes.clone()));
-    }
-    let t = asked.t.clone()?;
-    let at = seen.iter().find(|seen| seen.t == t).ok_or("")?;
-    let Some(output) = asked.output else {
-        // An event that a jump of the rates makes happen comes when that does.
-        let jumped = variation
-            .jumped
-            .iter()
-            .find(|(jumped, _)| *jumped == t && matches!(asked.measure, Measure::Event(_)));
-        if let Some((_, slopes)) = jumped {
-            return Ok((t, t, slopes.clone()));
-        }
-        let slopes = at.times.iter().find(|(measure, _)| *measure == number);
-        let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
-        return Ok((t, t, slopes));
-    };
-    let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
-    let off = |side: &Derived| (side.values[output] - asked.value).abs();
-    let (Derived { values, slopes, rates }, late) = match (&at.after, &at.moves) {
-        // A jump or a corner moves in time: on the side that has the extreme.
-        (Some(after), Some(late)) if is_extreme => {
-            (if off(after) < off(&at.derived) { after } else { &at.derived }, Some(late))
-        }
-        _ if asked.ended_by.is_some() => {
-            // So does the end, with the event.
-            let late = at.times.iter().find(|(measure, _)| *measure == number);
-            let late = late.ok_or("the function of the event that ends the run only touches zero")?;
-            (&at.derived, Some(&late.1))
-        }
-        _ if is_extreme => (&at.derived, None),
-        _ => (at.shown(), None),
-    };
-    let (value, rate, mut slopes) = (values[output], rates[output], slopes[output].clone());
-    let size = value.abs().max(f64::MIN_POSITIVE) / t.max(f64::MIN_POSITIVE);
-    let stays = late.is_none() && !asked.is_end && t != 0.0;
-    if is_extreme && stays && rate.abs() > CORNER * size {
-        return Err(format!("the extreme at {t} s is a corner of the curve, at an impact or an event"));
-    }
-    slopes.iter_mut().zip(late.into_iter().flatten()).for_each(|(slope, late)| *slope += rate * late);
-    Ok((t, value, slopes))
 }
 
 fn position(known: &[&str], name: &str, what: &str) -> Result<usize, SensitivityError> {

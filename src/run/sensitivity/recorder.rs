@@ -1,5 +1,6 @@
 //! Values and derivatives of outputs, and derivatives of times, at the times that are asked for.
 
+use super::extreme::ExtremeTurn;
 use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
 use super::{Look, Query, SensitivityError, Variation, refused};
 use crate::dynamics::Motion;
@@ -29,6 +30,8 @@ pub(super) struct RecordedTime {
     pub moves: Option<Vec<f64>>,
     /// Derivatives of times, by the number of their measure.
     pub times: Vec<(usize, Vec<f64>)>,
+    /// How outputs turn at their extremes, by the number of the measure.
+    pub turns: Vec<(usize, ExtremeTurn)>,
 }
 
 /// Sees a run at the times asked for.
@@ -48,7 +51,7 @@ impl Look for SensitivityRecorder<'_> {
 
     fn at(&mut self, variation: &mut Variation, motion: &Motion, time: f64) {
         self.next += 1;
-        let mut times = Vec::new();
+        let (mut times, mut turns) = (Vec::new(), Vec::new());
         for (k, asked) in self.asked.iter().enumerate().filter(|(_, asked)| asked.t == Ok(time)) {
             match asked.measure {
                 Measure::Flip => times.push((k, flip_slopes(variation, motion, asked.number))),
@@ -58,6 +61,8 @@ impl Look for SensitivityRecorder<'_> {
                 Measure::Max(_) | Measure::Min(_) => {
                     let ended_by = asked.ended_by.and_then(|event| event_slopes(variation, motion, event));
                     times.extend(ended_by.map(|slopes| (k, slopes)));
+                    let output = asked.output.filter(|_| !asked.is_end);
+                    turns.extend(output.map(|output| (k, ExtremeTurn::of(variation, motion, output))));
                 }
                 _ => {}
             }
@@ -68,6 +73,7 @@ impl Look for SensitivityRecorder<'_> {
             after: None,
             moves: None,
             times,
+            turns,
         });
     }
 
@@ -84,4 +90,59 @@ impl RecordedTime {
     pub fn shown(&self) -> &Derived {
         self.after.as_ref().unwrap_or(&self.derived)
     }
+}
+
+/// When a measure was taken, its value and derivatives; or why not, empty where the run ended before.
+pub(super) fn taken(
+    number: usize,
+    asked: &Query,
+    seen: &[RecordedTime],
+    variation: &Variation,
+) -> Result<(f64, f64, Vec<f64>), String> {
+    if let Measure::Impact(wall) = &asked.measure {
+        let first = variation.impacts.iter().find(|impact| impact.wall == *wall);
+        let first = first.ok_or("there is no impact")?;
+        return Ok((first.t, first.t, first.slopes.clone()));
+    }
+    let t = asked.t.clone()?;
+    let at = seen.iter().find(|seen| seen.t == t).ok_or("")?;
+    let Some(output) = asked.output else {
+        // An event that a jump of the rates makes happen comes when that does.
+        let jumped = variation
+            .jumped
+            .iter()
+            .find(|(jumped, _)| *jumped == t && matches!(asked.measure, Measure::Event(_)));
+        if let Some((_, slopes)) = jumped {
+            return Ok((t, t, slopes.clone()));
+        }
+        let slopes = at.times.iter().find(|(measure, _)| *measure == number);
+        let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
+        return Ok((t, t, slopes));
+    };
+    let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
+    let off = |side: &Derived| (side.values[output] - asked.value).abs();
+    let (Derived { values, slopes, rates }, late) = match (&at.after, &at.moves) {
+        // A jump or a corner moves in time: on the side that has the extreme.
+        (Some(after), Some(late)) if is_extreme => {
+            (if off(after) < off(&at.derived) { after } else { &at.derived }, Some(late))
+        }
+        _ if asked.ended_by.is_some() => {
+            // So does the end, with the event.
+            let late = at.times.iter().find(|(measure, _)| *measure == number);
+            let late = late.ok_or("the function of the event that ends the run only touches zero")?;
+            (&at.derived, Some(&late.1))
+        }
+        _ if is_extreme => (&at.derived, None),
+        _ => (at.shown(), None),
+    };
+    let (value, rate, mut slopes) = (values[output], rates[output], slopes[output].clone());
+    if is_extreme && late.is_none() && !asked.is_end && t != 0.0 {
+        let turn = at.turns.iter().find(|(measure, _)| *measure == number);
+        let turned = turn.is_some_and(|(_, turn)| turn.correct(rate, asked.range, &mut slopes));
+        if !turned {
+            return Err(format!("the extreme at {t} s is a corner of the curve, at an impact or an event"));
+        }
+    }
+    slopes.iter_mut().zip(late.into_iter().flatten()).for_each(|(slope, late)| *slope += rate * late);
+    Ok((t, value, slopes))
 }
