@@ -831,3 +831,32 @@ fn extremes_at_zero_are_smooth_and_corners_are_refused() {
     let why = found.measures[2].why.as_deref().unwrap_or_default();
     assert!(why.contains("corner"), "{:?}", found.measures[2]);
 }
+
+/// A wheel at 1e5 rad/s with a cam, y = a sin(phi): (J + m a² cos²(phi)) w² stays, and w is largest where the cam is
+/// at rest.
+#[test]
+fn extremes_of_fast_wheels_keep_their_digits() {
+    let text = r#"{"name": "cam", "gravity": [0, 0], "parameters": {"amp": 0.8},
+        "bars": [{"name": "w", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 0.5},
+            {"name": "f", "mass": 0.3, "centre": [0, 0], "inertia": 0.01, "length": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "w", "point": [0, 0]}]}],
+        "sliders": [{"name": "s", "point": {"body": "f", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [2, 0], "direction": [0, 1]}}],
+        "motors": [{"name": "cam", "slider": "s", "law": "amp*sin(w.phi)"}],
+        "start": {"w": {"phi": 0.2, "omega": 1e5}, "f": {"phi": 0}}, "until": 2e-4, "every": 2e-4}"#;
+    let to = ["bars.w.inertia", "bars.f.mass", "parameters.amp", "w.phi", "w.omega"];
+    let found = derived(&template(text), &["max:w.omega", "max:2*w.omega"], &to, 2e-4);
+    let (j, m, a, phi, w): (f64, f64, f64, f64, f64) = (0.5, 0.3, 0.8, 0.2, 1e5);
+    let c = phi.cos() * phi.cos();
+    let most = w * (1.0 + m * a * a * c / j).sqrt();
+    let by_square =
+        [-m * a * a * c / (j * j), a * a * c / j, 2.0 * m * a * c / j, -m * a * a * (2.0 * phi).sin() / j];
+    let half = 0.5 * w * w / most;
+    let slopes: Vec<f64> = by_square.iter().map(|by| half * by).chain([most / w]).collect();
+    for (measure, factor) in found.measures.iter().zip([1.0, 2.0]) {
+        assert_near(measure.value, factor * most, 1e-12, &measure.name);
+        for ((found, expected), by) in measure.slopes.iter().zip(&slopes).zip(to) {
+            assert_near(*found, factor * expected, 1e-9, &format!("{} by {by}", measure.name));
+        }
+    }
+}

@@ -56,7 +56,11 @@ impl Side {
     ) -> Option<Vec<f64>> {
         let (along, rates) = column.split_at(self.phi.len());
         let largest = |most: f64, x: f64| most.max(x.abs());
-        let rates = rates.iter().zip(&self.omega).map(|(x, rate)| x / (1.0 + rate.abs()));
+        // A rate that passes through zero is as large as it becomes while the fastest one turns by a radian.
+        let fastest = self.omega.iter().copied().fold(1.0, largest);
+        let by = self.acceleration.iter().map(|by| by.abs() / fastest).chain(std::iter::repeat(0.0));
+        let sizes = self.omega.iter().zip(by).map(|(rate, by)| 1.0 + rate.abs() + by);
+        let rates = rates.iter().zip(sizes).map(|(x, size)| x / size);
         let most = along.iter().copied().chain(rates).fold(late.abs(), largest);
         let longest = if most > 0.0 { DIFFERENCE.min(share) / most } else { 1.0 };
         // What it is to move along, over the size of what moves: that is rounded too.

@@ -93,7 +93,11 @@ pub(super) fn outputs_at(
 ) -> Vec<f64> {
     let mut values = Vec::new();
     let Some(outputs) = &mechanism.outputs else { return values };
-    kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
+    if outputs.needs_equations() {
+        kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
+    } else {
+        kernel.place(mechanism, phi);
+    }
     let turned = |k: usize| motion.unwrapped(k) - motion.phi[k].hi;
     let winding: Vec<f64> = (0..phi.len()).map(|k| phi[k] + turned(k)).collect();
     outputs.evaluate(
