@@ -100,13 +100,8 @@ pub(super) fn check_name(
         return Err(source.refusal(span, path, "has a meaning of its own in formulas", allowed, hint));
     }
     if taken.contains(&name) {
-        return Err(source.refusal(
-            span,
-            path,
-            "is a name that is taken",
-            "names must be different",
-            "rename one",
-        ));
+        let allowed = "names must be different";
+        return Err(source.refusal(span, path, "is a name that is taken", allowed, "rename one"));
     }
     Ok(())
 }
@@ -132,7 +127,7 @@ fn parameters(source: &Texts, tree: &Located, tables: &[Interpolant]) -> Result<
     };
     let allowed = FieldShape::Parameters.allowed();
     let Value::Object(members) = &holder.node.value else {
-        let hint = "for example \"parameters\": {\"k\": 0.6}";
+        let hint = "for example {\"k\": 0.6}";
         return Err(source.refused_value(holder.node.span, "parameters", &allowed, hint));
     };
     if members.len() > MOST {
