@@ -312,9 +312,7 @@ impl ExtremesDetector {
             return self.look(inside, begin, span, depth);
         }
         let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
-        let swing = |k| !is_enough(k, &curves[k], None) && parts::swing(&curves[k], &values[k], rounding[k]);
-        let swing = || (0..curves.len()).any(swing);
-        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS], swing) {
+        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS], || false) {
             self.look(inside, begin, 0.5 * span, depth + 1);
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
         }

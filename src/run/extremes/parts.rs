@@ -10,7 +10,7 @@ use super::super::observer::Inside;
 use super::super::rounding::{changes, last_digits};
 use super::{DEGREES, DOUBTS, ExtremesDetector, RESOLVED, has_grown, rounding_of};
 use crate::dynamics::{Motion, Time};
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root, swings};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use std::sync::Arc;
 
 /// Parts of a step looked at, in each turn of it where that is more, and changes in it of conditions that no
@@ -31,8 +31,6 @@ const CERTAIN: f64 = 1e-3;
 /// of a part within which that is looked for where it begins near zero.
 const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
-/// Size of a function over its rounding from which on its swings are looked at.
-const SWINGING: f64 = 1e9;
 /// Halvings of a part in which no interpolant resolves a condition, and of the bracket of its zero.
 const HALVINGS: u32 = 10;
 const ROUNDS: usize = 48;
@@ -271,9 +269,7 @@ impl ExtremesDetector {
             return self.search(inside, ahead, [low, high], depth);
         }
         let (angles, part) = (self.mechanism.bodies.len(), (ahead.time(low), (high - low) * ahead.span));
-        let swing = |k| !is_known(k, &curves[k]) && swing(&curves[k], &values[k], still[k]);
-        let swing = || (0..curves.len()).any(swing);
-        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS], swing) {
+        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS], || false) {
             return PartZeros::TooMuch;
         }
         let is_zero = |k: usize| curves[k].most() <= still[k];
@@ -305,11 +301,6 @@ impl ExtremesDetector {
         }
         PartZeros::Change(earliest.map(|(share, _)| place(share)), is_blind)
     }
-}
-
-/// True where a function of this interpolant and values, of which so much is rounding, swings too often.
-pub(super) fn swing(curve: &Chebyshev, values: &[f64], rounding: f64) -> bool {
-    swings(values, curve.most().max(SWINGING * rounding))
 }
 
 /// Where a curve that times `sign` is positive, or zero, becomes negative.

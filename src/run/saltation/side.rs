@@ -7,6 +7,8 @@ use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Mechanism, Motion};
 
+/// Angle by which the fastest coordinate turns until a rate that is zero has a size \[rad\].
+const SOON: f64 = 0.01;
 /// Half of the longest difference: of a coordinate \[rad, m\], of a rate over its size, or of time \[s\].
 const DIFFERENCE: f64 = 1e-3;
 /// Offsets and weights of a derivative of the fourth order.
@@ -56,9 +58,9 @@ impl Side {
     ) -> Option<Vec<f64>> {
         let (along, rates) = column.split_at(self.phi.len());
         let largest = |most: f64, x: f64| most.max(x.abs());
-        // A rate that passes through zero is as large as it becomes while the fastest one turns by a radian.
+        // A rate that passes through zero is as large as it soon becomes beside the fastest one.
         let fastest = self.omega.iter().copied().fold(1.0, largest);
-        let by = self.acceleration.iter().map(|by| by.abs() / fastest).chain(std::iter::repeat(0.0));
+        let by = self.acceleration.iter().map(|by| SOON * by.abs() / fastest).chain(std::iter::repeat(0.0));
         let sizes = self.omega.iter().zip(by).map(|(rate, by)| 1.0 + rate.abs() + by);
         let rates = rates.iter().zip(sizes).map(|(x, size)| x / size);
         let most = along.iter().copied().chain(rates).fold(late.abs(), largest);
