@@ -20,6 +20,8 @@ const RESOLVED: f64 = 1e-10;
 const CLEAR: f64 = 10.0;
 const SURE: f64 = 1e-3;
 const FLAT: f64 = 1.0 / 30.0;
+/// Size of gaps, in their lengths, whose swings are looked at: those of smaller ones may be rounding.
+const SWINGING: f64 = 1e-4;
 
 /// True where an interpolant is as good as the function, or the function has no zero.
 fn is_enough(curve: &Chebyshev) -> bool {
@@ -64,7 +66,8 @@ impl SearchScratch {
                     continue;
                 }
                 let mut each = curves.iter().zip(&looked_at.values);
-                if each.any(|(curve, values)| !is_enough(curve) && swings(values, curve.most())) {
+                if each.any(|(curve, values)| !is_enough(curve) && swings(values, curve.most().max(SWINGING)))
+                {
                     return FirstEvent::Near(if begin > 0.0 { begin } else { span });
                 }
             }
