@@ -30,10 +30,9 @@ mod variation;
 
 use expanded::Expansions;
 pub use lyapunov::{Regime, Spectrum, lyapunov};
-pub(super) use measure::Derived;
 pub use measure::Measure;
 #[cfg(feature = "fit")]
-pub(super) use measure::outputs;
+pub(super) use measure::{Derived, outputs};
 use neighbours::Neighbours;
 use recorder::{RecordedTime, SensitivityRecorder, taken};
 pub use result::{InputNumber, Measured, Sensitivity, SensitivityError, SensitivityRequest, SensitivityRow};
