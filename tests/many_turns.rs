@@ -135,9 +135,9 @@ fn extremes_and_means_of_every_turn_count() {
     }
 }
 
-/// An encoder gives 50 lines a turn: its formula swings in a step while the wheel hardly turns.
+/// An encoder gives 50 lines a turn: its formula oscillates in a step while the wheel hardly turns.
 #[test]
-fn an_event_of_a_formula_that_swings_is_found_in_every_swing() {
+fn an_event_of_a_formula_that_oscillates_is_found_in_every_period() {
     let (lines, rate, until) = (50.0, TAU, 10.0);
     let events = format!(r#""events": [{{"name": "e", "when": "sin({lines:?}*b.phi)"}}]"#);
     let scene = wheel(rate, until, &events);
@@ -155,7 +155,7 @@ fn an_event_of_a_formula_that_swings_is_found_in_every_swing() {
 
 /// A torque that acts on every other tooth gives the work of the teeth that have passed, and never drives back.
 #[test]
-fn a_law_that_is_switched_in_every_swing_does_the_work_of_each() {
+fn a_law_that_is_switched_in_every_period_does_the_work_of_each() {
     let (teeth, torque, inertia) = (100.0, 0.02, 0.125);
     for (formula, share) in [("if(sin(100*b.phi) > 0, 1, 0)", 0.5), ("max(0, sin(100*b.phi))", 1.0 / PI)] {
         let torques = format!(r#""torques": [{{"name": "q", "body": "b", "torque": "{torque}*{formula}"}}]"#);

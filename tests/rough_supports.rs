@@ -251,19 +251,19 @@ fn supports_that_stick_side_by_side_are_no_singular_position() {
     let support = |x: f64| format!(r#""point": {{"body": "box", "point": [{x}, -0.08]}}, "#);
     let rail =
         r#""rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "friction": {"kinetic": 0.5}"#;
-    let foot = |name: &str, x: f64| {
+    let wall = |name: &str, x: f64| {
         format!(
             r#"{{"name": "{name}", "body": "box", "point": [{x}, -0.08], "line": {{"through": [0, 0], "normal": [0, 1]}},
             "restitution": 0, "friction": {{"kinetic": 0.5}}}}"#
         )
     };
-    let feet = format!(r#""walls": [{}, {}]"#, foot("A", -0.25), foot("B", 0.25));
+    let walls = format!(r#""walls": [{}, {}]"#, wall("A", -0.25), wall("B", 0.25));
     let [left, right] = [-0.25, 0.25].map(support);
     let rails = format!(r#""sliders": [{{"name": "A", {left}{rail}}}, {{"name": "B", {right}{rail}}}]"#);
     // Of the pendulum about its hinge: 2 kg at 0.3 m.
     let inertia = 0.04 + 2.0 * 0.3 * 0.3;
     let swings = |_: f64, y: &[f64; 2]| [y[1], -2.0 * 9.81 * 0.3 * y[0].cos() / inertia];
-    for (supports, until) in [(&feet, 2.0), (&rails, 2.0), (&feet, 8.0)] {
+    for (supports, until) in [(&walls, 2.0), (&rails, 2.0), (&walls, 8.0)] {
         let text = format!(
             r#"{{"name": "box", "gravity": [0, -9.81], "bars": [
             {{"name": "box", "mass": 3, "centre": [0, 0], "inertia": 0.07, "length": 0.5}},

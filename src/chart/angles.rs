@@ -159,10 +159,7 @@ pub fn angles(chart: &Angles, px_per_pt: f64) -> Result<Picture, ChartError> {
         let mut ends = Vec::new();
         for (line, mark) in lines.iter().zip(marks.by_ref()) {
             let width = if lines.len() > APART { 1.4 } else { 1.6 };
-            let pieces = match chart.is_coarse {
-                true => panel.trusted_dots(line, mark.colour, chart.horizon)?,
-                false => panel.trusted(line, mark.colour, width, chart.horizon)?,
-            };
+            let pieces = panel.trusted_rows(line, (mark.colour, width), chart.horizon, chart.is_coarse)?;
             let label = if lines.len() > 1 { next_label.next() } else { None };
             if let (Some(label), Some(end)) = (label, pieces.last().and_then(|piece| piece.last())) {
                 ends.push((end[1], label.clone(), mark));

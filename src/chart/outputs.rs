@@ -149,10 +149,8 @@ pub fn outputs(chart: &OutputsChart, px_per_pt: f64) -> Result<Picture, ChartErr
     for (k, (panel, (unit, lines))) in panels.iter().zip(&rows).enumerate() {
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (output, line) in lines {
-            let pieces = match chart.is_coarse && !panel.crowded(line) {
-                true => panel.trusted_dots(line, mark(output).colour, chart.horizon)?,
-                false => panel.trusted(line, mark(output).colour, 1.6, chart.horizon)?,
-            };
+            let is_coarse = chart.is_coarse && !panel.crowded(line);
+            let pieces = panel.trusted_rows(line, (mark(output).colour, 1.6), chart.horizon, is_coarse)?;
             pieces.iter().for_each(|piece| occupied.line(piece));
             if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
                 ends.push((largest_of(line), (end[1], labels[number(output)].clone(), mark(output))));

@@ -295,8 +295,22 @@ impl<'a> Panel<'a> {
         Ok(pieces.into_iter().rev().flatten().collect())
     }
 
+    /// The same of rows, which may be too far apart for a line.
+    pub(crate) fn trusted_rows(
+        &self,
+        rows: &[Point],
+        (colour, width): (Colour, f64),
+        horizon: Option<f64>,
+        is_coarse: bool,
+    ) -> Result<Vec<Vec<Point>>, ChartError> {
+        match is_coarse {
+            true => self.trusted_dots(rows, colour, horizon),
+            false => self.trusted(rows, colour, width, horizon),
+        }
+    }
+
     /// The points alone in full colour up to a time, and pale beyond it.
-    pub(crate) fn trusted_dots(
+    fn trusted_dots(
         &self,
         points: &[Point],
         colour: Colour,

@@ -129,10 +129,8 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
         let mark = |motor: usize| if several { marks[motor] } else { own };
         let (mut occupied, mut ends) = (Occupied::default(), Vec::new());
         for (motor, line) in lines.iter().enumerate() {
-            let pieces = match chart.is_coarse && !panel.crowded(line) {
-                true => panel.trusted_dots(line, mark(motor).colour, chart.horizon)?,
-                false => panel.trusted(line, mark(motor).colour, 1.8, chart.horizon)?,
-            };
+            let is_coarse = chart.is_coarse && !panel.crowded(line);
+            let pieces = panel.trusted_rows(line, (mark(motor).colour, 1.8), chart.horizon, is_coarse)?;
             pieces.iter().for_each(|piece| occupied.line(piece));
             if let Some(end) = pieces.last().and_then(|piece| piece.last()) {
                 ends.push((end[1], labels[motor].clone(), mark(motor)));

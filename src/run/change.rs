@@ -46,10 +46,9 @@ impl ContactDriver {
                 method: outcome.plan.method.to_string(),
                 t: self.motion().time.hi,
                 step: 0.0,
-                what:
-                    "in the step that ends here a body turns, or a formula swings, too often for events and \
-                    outputs to be looked for in each turn and swing"
-                        .into(),
+                what: "in the step that ends here a body turns, or a formula oscillates, too often for \
+                    events and outputs to be looked for each time"
+                    .into(),
                 hint: "end the run earlier with --until, or leave its events and outputs out".into(),
             });
         }

@@ -23,7 +23,8 @@ use std::sync::Arc;
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-10;
-/// Degrees by which a step is judged first: short steps, as between close rows, by the lower one.
+/// Degrees by which a step is judged before anything else is done: short steps, as between close rows, by the
+/// lower one first.
 const FIRST: [usize; 2] = [6, 12];
 /// Below this share of the largest value, last coefficients that [stay](Chebyshev::stays) with twice the
 /// degree are what the dense output is off, where its pieces join: neither a higher degree nor halves have
@@ -312,7 +313,7 @@ impl ExtremesDetector {
             return self.look(inside, begin, span, depth);
         }
         let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
-        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS], || false) {
+        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS]) {
             self.look(inside, begin, 0.5 * span, depth + 1);
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
         }

@@ -1,4 +1,5 @@
-//! Turns that bodies make in a step, and swings of formulas: functions are resolved only in parts with few.
+//! Turns that bodies make in a step, and oscillations of formulas: functions are resolved only in parts with
+//! few.
 
 use super::observer::Inside;
 use crate::dynamics::Time;
@@ -33,21 +34,21 @@ impl Halvings {
     }
 
     /// Whether a part is to be halved that comes of so many halvings: up to the usual number, and then as
-    /// long as a function swings in it or it has many turns of so many angles.
+    /// long as it has many turns of so many angles.
     pub fn asks(
         &mut self,
         inside: &mut dyn Inside,
         angles: usize,
         part: (Time, f64),
         [depth, usual]: [u32; 2],
-        swings: impl FnOnce() -> bool,
     ) -> bool {
-        if depth < usual {
-            return true;
-        }
-        let has_many = turns(inside, angles, part) > FEW || swings();
-        self.count += u32::from(has_many);
-        has_many && !self.is_too_much()
+        depth < usual || turns(inside, angles, part) > FEW && self.go_on()
+    }
+
+    /// Counts a part to be halved beyond the usual number of times; false where there are too many.
+    pub fn go_on(&mut self) -> bool {
+        self.count += 1;
+        !self.is_too_much()
     }
 
     /// True where parts of the step were halved beyond the usual number of times.
@@ -87,16 +88,16 @@ mod tests {
     fn parts_with_many_turns_are_halved_further_up_to_a_number() {
         let mut inside = Turning(Motion::of_doubles(0.0, [&[0.0], &[-1e9 * TAU]]));
         let mut halvings = Halvings::default();
-        let (part, still) = (|span: f64| (Time::from(0.0), span), || false);
-        assert!(halvings.asks(&mut inside, 1, part(1e-10), [3, 4], still));
-        assert!(!halvings.asks(&mut inside, 1, part(0.9e-9), [4, 4], still));
-        assert!(halvings.asks(&mut inside, 1, part(1.1e-9), [4, 4], still) && !halvings.is_too_much());
+        let part = |span: f64| (Time::from(0.0), span);
+        assert!(halvings.asks(&mut inside, 1, part(1e-10), [3, 4]));
+        assert!(!halvings.asks(&mut inside, 1, part(0.9e-9), [4, 4]));
+        assert!(halvings.asks(&mut inside, 1, part(1.1e-9), [4, 4]) && !halvings.is_too_much());
         // What is no angle does not turn.
-        assert!(!halvings.asks(&mut inside, 0, part(1.0), [4, 4], still));
-        assert!((1..MOST).all(|_| halvings.asks(&mut inside, 1, part(1.0), [4, 4], still)));
-        assert!(!halvings.asks(&mut inside, 1, part(1.0), [4, 4], still) && halvings.is_too_much());
+        assert!(!halvings.asks(&mut inside, 0, part(1.0), [4, 4]));
+        assert!((1..MOST).all(|_| halvings.asks(&mut inside, 1, part(1.0), [4, 4])));
+        assert!(!halvings.asks(&mut inside, 1, part(1.0), [4, 4]) && halvings.is_too_much());
         halvings.begin();
         assert!(!halvings.is_too_much() && !halvings.are_many());
-        assert!(halvings.asks(&mut inside, 0, part(1.0), [4, 4], || true) && halvings.are_many());
+        assert!(halvings.go_on() && halvings.are_many());
     }
 }

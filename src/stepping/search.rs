@@ -18,7 +18,7 @@
 
 mod chebyshev;
 
-pub use chebyshev::{Chebyshev, Interpolants, Nodes, interpolated, swings};
+pub use chebyshev::{Chebyshev, Interpolants, Nodes, interpolated, oscillates};
 
 /// A value that counts as zero at the step's start: it must open before it can close.
 pub const TOUCH: f64 = 1e-12;

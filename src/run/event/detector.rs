@@ -397,6 +397,7 @@ impl StepWatcher for EventDetector {
             return Some(end);
         }
         self.memory.woken.clear();
+        // In the order of their times for each function.
         let all = passages.clone();
         passages.retain(|passage| self.counts(passage.event, passage.rises));
         for passage in passages.iter_mut().filter(|passage| passage.t > begin && !passage.jumps) {
@@ -404,13 +405,8 @@ impl StepWatcher for EventDetector {
         }
         let due = std::mem::take(&mut self.memory.due).into_iter();
         let due = due.filter(|&(event, rises)| self.counts(event, rises));
-        passages.extend(due.map(|(event, rises)| Passage {
-            t: begin,
-            part: span,
-            event,
-            rises,
-            jumps: true,
-        }));
+        let (part, jumps) = (span, true);
+        passages.extend(due.map(|(event, rises)| Passage { t: begin, part, event, rises, jumps }));
         passages.sort_by(|a, b| (a.t - b.t).hi.total_cmp(&0.0).then(a.event.cmp(&b.event)));
         for (number, &Passage { t, event, .. }) in passages.iter().enumerate() {
             let is_friction = matches!(self.owner(event), Owner::Friction(..));

@@ -54,13 +54,8 @@ impl EventDetector {
                 let is_pole = !ends.iter().all(|end| *end <= POLE * most);
                 let jumps = ends[0].min(ends[1]) > off;
                 if !is_pole {
-                    all.push(Passage {
-                        t: part.begin + to * part.span,
-                        part: part.span,
-                        event,
-                        rises,
-                        jumps,
-                    });
+                    let passage = part.passage(part.begin + to * part.span, event, rises);
+                    all.push(Passage { jumps, ..passage });
                 }
             }
             (side, before) = (sign(value), node);
@@ -69,7 +64,7 @@ impl EventDetector {
     }
 
     /// The length of a step of which small shares are straight \[s\]: of a step with many turns as long as so
-    /// many take, and no more than so many `part`s in which functions do not swing often.
+    /// many take, and no more than so many `part`s in which functions do not oscillate often.
     fn straight(&self, inside: &mut dyn Inside, part: f64) -> f64 {
         let (begin, end) = inside.span();
         let span = (end - begin).hi;

@@ -8,7 +8,7 @@ use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
 use crate::run::halvings::turns;
 use crate::run::observer::Inside;
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, root, sign, swings};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, oscillates, root, sign};
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
@@ -19,8 +19,8 @@ const SHARE: f64 = 0.1;
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: the function has
 /// no zero there, whatever its other digits are.
 const CERTAIN: f64 = 1e-3;
-/// Halvings of a step whose event functions no interpolant resolves; of parts with many turns or swings there
-/// are more, and of those with a place beyond which a function has no value.
+/// Halvings of a step whose event functions no interpolant resolves; of parts with many turns or
+/// oscillations there are more, and of those with a place beyond which a function has no value.
 pub(super) const HALVINGS: u32 = 4;
 const BORDERS: u32 = 20;
 /// Turns of a part of a step that is not searched beyond what cuts the step short before it, and of which
@@ -74,6 +74,11 @@ pub(super) struct StepPart<'a> {
 }
 
 impl StepPart<'_> {
+    /// A passage in it, of a function that does not jump.
+    pub fn passage(&self, t: Time, event: usize, rises: bool) -> Passage {
+        Passage { t, part: self.span, event, rises, jumps: false }
+    }
+
     /// The largest magnitude the function can have, where it has values.
     pub fn most(&self) -> f64 {
         let most = self.curve.most();
@@ -137,24 +142,26 @@ impl EventDetector {
         };
         let Interpolants { curves, values, nodes: Nodes { places, .. }, .. } =
             interpolated(&DEGREES, at, |event, curve, _| is_enough(event, curve));
-        let has_borders = |event: usize| {
+        let has_values = |event: usize| {
             let is_of_scene = matches!(self.owner(event), Owner::Scene(..));
             is_of_scene && values[event].iter().any(|value| value.is_finite())
         };
         let is_resolved = |(event, curve): (usize, &Chebyshev)| match curve.most().is_finite() {
             true => is_enough(event, curve),
-            false => !has_borders(event),
+            false => !has_values(event),
         };
         let are_resolved: Vec<bool> = curves.iter().enumerate().map(is_resolved).collect();
         let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
         let unresolved = || (0..curves.len()).filter(|&event| !are_resolved[event]);
-        let swing = || {
+        let oscillate = || {
             let size = |event: usize| self.memory.largest[event].max(curves[event].most());
-            unresolved().any(|event| swings(&values[event], size(event)))
+            unresolved().any(|event| oscillates(&values[event], size(event)))
         };
         let has_border = unresolved().any(|event| !curves[event].most().is_finite());
         let depths = [depth, if has_border { BORDERS } else { HALVINGS }];
-        if unresolved().next().is_some() && self.halvings.asks(inside, angles, part, depths, swing) {
+        if unresolved().next().is_some()
+            && (self.halvings.asks(inside, angles, part, depths) || oscillate() && self.halvings.go_on())
+        {
             let (half, middle, before) = (0.5 * span, begin + 0.5 * span, all.len());
             self.passages(inside, begin, half, depth + 1, all);
             if !self.is_cut_before(inside, (middle, half), &all[before..]) {
@@ -194,8 +201,8 @@ impl EventDetector {
         }
     }
 
-    /// True for a part of a step with many turns or swings before which one of these passages cuts the step
-    /// short.
+    /// True for a part of a step with many turns or oscillations before which one of these passages cuts the
+    /// step short.
     fn is_cut_before(&self, inside: &mut dyn Inside, part: (Time, f64), all: &[Passage]) -> bool {
         let (begin, end) = inside.span();
         let same = SAME * (end - begin).hi;
@@ -238,7 +245,7 @@ impl EventDetector {
             }
         }
         if is_there && sign(left.map_or(next, |share| curve.at(share)[0])) == other {
-            all.push(Passage { t: part.begin, part: part.span, event, rises: !mode, jumps: false });
+            all.push(part.passage(part.begin, event, !mode));
         }
         let EventMemory { sides, largest, last, .. } = &mut self.memory;
         largest[event] = largest[event].max(most);
@@ -274,7 +281,7 @@ impl EventDetector {
         still.retain(|other| *other != event);
         let is_at_zero = first.abs() <= NO_VALUE * *largest;
         if is_at_zero && *side != 0 && sign(next) == -*side {
-            all.push(Passage { t: begin, part: part.span, event, rises: *side < 0, jumps: false });
+            all.push(part.passage(begin, event, *side < 0));
         }
         let mut is_behind = due.iter().any(|(due, _)| *due == event)
             || last.iter().any(|(last, before)| *last == event && is_now(before));
@@ -282,7 +289,7 @@ impl EventDetector {
         let beyond = beyond.filter(|value| value.abs() > BEYOND * most);
         if let Some(value) = beyond {
             if *side != 0 && sign(value) == -*side && !is_behind {
-                all.push(Passage { t: begin, part: part.span, event, rises: *side < 0, jumps: true });
+                all.push(Passage { jumps: true, ..part.passage(begin, event, *side < 0) });
             }
             is_behind = true;
         }
@@ -316,7 +323,7 @@ impl EventDetector {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
         let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
         if *side != 0 && value.abs() <= off && sign(slope) == -*side {
-            all.push(Passage { t: end, part: part.span, event, rises: *side < 0, jumps: false });
+            all.push(part.passage(end, event, *side < 0));
             *side = -*side;
         }
     }
@@ -341,13 +348,7 @@ impl EventDetector {
             let after = sign(part.curve.at(share.min(1.0))[0]);
             // At the very end of a step what follows is not known: it is on the other side.
             *side = if after == 0 || share >= 1.0 { -*side } else { after };
-            all.push(Passage {
-                t: part.begin + zero * part.span,
-                part: part.span,
-                event,
-                rises: *side > 0,
-                jumps: false,
-            });
+            all.push(part.passage(part.begin + zero * part.span, event, *side > 0));
             if share >= 1.0 {
                 break;
             }

@@ -269,7 +269,7 @@ impl ExtremesDetector {
             return self.search(inside, ahead, [low, high], depth);
         }
         let (angles, part) = (self.mechanism.bodies.len(), (ahead.time(low), (high - low) * ahead.span));
-        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS], || false) {
+        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS]) {
             return PartZeros::TooMuch;
         }
         let is_zero = |k: usize| curves[k].most() <= still[k];

@@ -6,7 +6,7 @@
 
 use super::{FirstEvent, SearchScratch};
 use crate::dynamics::{OdeSystem, State};
-use crate::stepping::search::{Chebyshev, Crossing, crossing, interpolated, swings};
+use crate::stepping::search::{Chebyshev, Crossing, crossing, interpolated, oscillates};
 
 /// Degrees of interpolants.
 const DEGREES: [usize; 4] = [8, 16, 32, 64];
@@ -20,8 +20,8 @@ const RESOLVED: f64 = 1e-10;
 const CLEAR: f64 = 10.0;
 const SURE: f64 = 1e-3;
 const FLAT: f64 = 1.0 / 30.0;
-/// Size of gaps, in their lengths, whose swings are looked at: those of smaller ones may be rounding.
-const SWINGING: f64 = 1e-4;
+/// Size of gaps, in their lengths, whose oscillations are looked at: those of smaller ones may be rounding.
+const OSCILLATING: f64 = 1e-4;
 
 /// True where an interpolant is as good as the function, or the function has no zero.
 fn is_enough(curve: &Chebyshev) -> bool {
@@ -65,9 +65,10 @@ impl SearchScratch {
                     parts.extend([(begin + half, half, depth + 1), (begin, half, depth + 1)]);
                     continue;
                 }
-                let mut each = curves.iter().zip(&looked_at.values);
-                if each.any(|(curve, values)| !is_enough(curve) && swings(values, curve.most().max(SWINGING)))
-                {
+                let is_fast = |(curve, values): (&Chebyshev, &Vec<f64>)| {
+                    !is_enough(curve) && oscillates(values, curve.most().max(OSCILLATING))
+                };
+                if curves.iter().zip(&looked_at.values).any(is_fast) {
                     return FirstEvent::Near(if begin > 0.0 { begin } else { span });
                 }
             }

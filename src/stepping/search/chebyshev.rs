@@ -116,14 +116,14 @@ pub fn interpolated(
 }
 
 /// Turning points among the values in a part up to which a function that no interpolant resolves there has a
-/// corner or a jump: one with more swings, and smaller parts resolve it.
-const SWINGS: usize = 4;
-/// Share of a function's size below which a swing may be rounding.
+/// corner or a jump: one with more oscillates, and smaller parts resolve it.
+const TURNING_POINTS: usize = 4;
+/// Share of a function's size below which an oscillation may be rounding.
 const SMALL: f64 = 1e-6;
 
-/// True where a function of this size with these values, one after the other in a part of a step, swings too
-/// often for its interpolant.
-pub fn swings(values: &[f64], size: f64) -> bool {
+/// True where a function of this size with these values, one after the other in a part of a step, oscillates
+/// too often for its interpolant.
+pub fn oscillates(values: &[f64], size: f64) -> bool {
     let least = SMALL * size;
     let Some(&(mut last)) = values.first() else { return false };
     let (mut sense, mut count) = (0.0, 0);
@@ -136,7 +136,7 @@ pub fn swings(values: &[f64], size: f64) -> bool {
             (sense, last) = (change.signum(), value);
         }
     }
-    count > SWINGS
+    count > TURNING_POINTS
 }
 
 /// A function on \[0, 1\] known by its values alone: its interpolant `Σ c_k T_k(2t - 1)`.
@@ -160,8 +160,8 @@ impl Chebyshev {
 
     /// The least and the largest value it can have.
     pub fn range(&self) -> [f64; 2] {
-        let swing: f64 = self.coefficients.iter().skip(1).map(|c| c.abs()).sum();
-        [self.coefficients[0] - swing, self.coefficients[0] + swing]
+        let spread = self.spread();
+        [self.coefficients[0] - spread, self.coefficients[0] + spread]
     }
 
     /// What the last coefficients say it may be off.
@@ -183,7 +183,7 @@ impl Chebyshev {
         lower.is_some_and(|lower| self.tail() > FALLS * lower.tail())
     }
 
-    /// How far at most its values are from their mean in the middle of its range.
+    /// How far at most its values are from the middle of their range.
     pub fn spread(&self) -> f64 {
         self.coefficients.iter().skip(1).fold(0.0, |sum, c| sum + c.abs())
     }
