@@ -317,6 +317,35 @@ fn a_number_whose_best_value_is_no_scene_is_held_at_its_bound() {
     assert_eq!(found.covariance.column(1).amax(), 0.0);
 }
 
+/// A rate of 2 rad/s looked for from 20 rad/s on: the sum of squares has a minimum beside every multiple of
+/// 2π over the length of the data, where the residuals are about as large as the data.
+#[test]
+fn a_minimum_that_leaves_more_than_the_noise_is_doubtful() {
+    let mut noise = Noise(11);
+    let rows: String = (1..=100)
+        .map(|row| {
+            let t = 0.1 * f64::from(row);
+            format!("{t},{}\n", oscillation([2.0, 0.0, 0.5, 0.0], t)[0] + 0.01 * noise.normal())
+        })
+        .collect();
+    let data = Data::parse(&format!("t [s],b.phi [rad]\n{rows}"), "data.csv").expect("a table");
+    let doubts = |stiffness: f64, sigma: &[f64]| {
+        let set = [format!("parameters.k={stiffness}"), "parameters.c=0".into(), "parameters.w=0".into()];
+        let set: Vec<_> = set.iter().map(|set| set.parse().expect("an override")).collect();
+        let guess = Template::new(OSCILLATOR.into(), "oscillator.json".into(), &set);
+        let sigmas = sigma.iter().map(|sigma| ("b.phi".to_owned(), *sigma)).collect();
+        let request = FitRequest { vary: vec!["k".into()], sigmas, ..FitRequest::default() };
+        fit(&guess, &data, &request, &mut || false).expect("a minimum").doubts
+    };
+    for sigma in [&[0.01][..], &[]] {
+        let far = doubts(200.0, sigma).expect("doubts");
+        assert!(far.contains("residuals of b.phi") && far.contains("--segments"), "{far}");
+        assert_eq!(doubts(2.2, sigma), None);
+    }
+    // A noise that was told too small by three.
+    assert!(doubts(2.2, &[0.01 / 3.0]).is_some_and(|doubts| doubts.contains("times its sigma")));
+}
+
 /// A brake holds the bar from 0.5 s to 1 s: the rows at these very times are those of the braked bar.
 #[test]
 fn a_row_at_the_time_of_an_event_is_fitted_by_what_comes_after_it() {

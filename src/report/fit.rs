@@ -13,7 +13,7 @@ pub fn options(found: &Fit) -> String {
     set.collect::<Vec<_>>().join(" ")
 }
 
-/// One object: `numbers`, `covariance`, `columns`, `chi_square`, `degrees_of_freedom`, `set`.
+/// One object: `numbers`, `covariance`, `columns`, `chi_square`, `degrees_of_freedom`, `ended`, `doubts`, `set`.
 pub fn object(found: &Fit) -> Value {
     json!({
         "scene": found.scene.name,
@@ -34,6 +34,7 @@ pub fn object(found: &Fit) -> Value {
         "gap": if found.segments > 1 { json!(found.gap) } else { Value::Null },
         "runs": found.runs,
         "ended": found.ended,
+        "doubts": found.doubts,
         "set": options(found),
     })
 }
@@ -67,6 +68,9 @@ pub fn text(found: &Fit) -> String {
         })
         .collect();
     page.entry("fitted", &found.ended);
+    if let Some(doubts) = &found.doubts {
+        page.entry("doubtful", doubts);
+    }
     page.table(&["number", "guess", "value", "std. error"], &rows);
     let rows: Vec<Vec<String>> = (found.columns.iter())
         .map(|column| {

@@ -18,6 +18,7 @@
 
 mod bounds;
 mod data;
+mod doubt;
 mod noise;
 mod problem;
 mod search;
@@ -177,6 +178,8 @@ pub struct Fit {
     pub gap: f64,
     /// How the search ended.
     pub ended: String,
+    /// What is doubtful of the minimum: residuals that noise does not explain.
+    pub doubts: Option<String>,
 }
 
 /// Fits numbers of a scene to data.
@@ -274,6 +277,7 @@ pub fn fit(
         runs: problem.runs(),
         segments: request.segments,
         gap: problem.gap(),
+        doubts: doubt::doubts(&columns),
         columns,
         ended,
         scene,

@@ -102,7 +102,7 @@ pub(super) fn untold(columns: &[FittedColumn], told: &[DMatrix<f64>]) -> Vec<Str
 }
 
 /// Root mean square about the mean.
-fn spread(values: &[Option<f64>]) -> f64 {
+pub(super) fn spread(values: &[Option<f64>]) -> f64 {
     let count = values.iter().flatten().count().max(1) as f64;
     let mean = values.iter().flatten().sum::<f64>() / count;
     (values.iter().flatten().map(|value| (value - mean).powi(2)).sum::<f64>() / count).sqrt()
