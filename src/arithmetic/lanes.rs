@@ -94,29 +94,28 @@ pub trait Lanes: Signed + Send {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Portable([f64; 4]);
 
+// Operations of several lanes are calls where there are other vectors for nearly every processor: kernels are
+// half the code then.
+
 impl Portable {
-    #[inline(always)]
-    fn zip(self, other: Self, f: fn(f64, f64) -> f64) -> Self {
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        let [a, b] = [self.0, other.0];
+        Self([f(a[0], b[0]), f(a[1], b[1]), f(a[2], b[2]), f(a[3], b[3])])
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn fused(self, factor: Self, addend: Self) -> Self {
+        let [a, b, c] = [self.0, factor.0, addend.0];
         Self([
-            f(self.0[0], other.0[0]),
-            f(self.0[1], other.0[1]),
-            f(self.0[2], other.0[2]),
-            f(self.0[3], other.0[3]),
+            sum::fused(a[0], b[0], c[0]),
+            sum::fused(a[1], b[1], c[1]),
+            sum::fused(a[2], b[2], c[2]),
+            sum::fused(a[3], b[3], c[3]),
         ])
     }
-}
-
-/// `a b + c` lane by lane; its four calls kept in one place where the processor cannot be counted on to have
-/// the instruction.
-#[cfg_attr(all(target_arch = "x86_64", not(target_feature = "fma")), inline(never))]
-#[cfg_attr(not(all(target_arch = "x86_64", not(target_feature = "fma"))), inline(always))]
-fn fused(a: [f64; 4], b: [f64; 4], c: [f64; 4]) -> [f64; 4] {
-    [
-        sum::fused(a[0], b[0], c[0]),
-        sum::fused(a[1], b[1], c[1]),
-        sum::fused(a[2], b[2], c[2]),
-        sum::fused(a[3], b[3], c[3]),
-    ]
 }
 
 impl Arithmetic for Portable {
@@ -150,7 +149,7 @@ impl Arithmetic for Portable {
 
     #[inline(always)]
     fn mul_add(self, factor: Self, addend: Self) -> Self {
-        Self(fused(self.0, factor.0, addend.0))
+        self.fused(factor, addend)
     }
 
     #[inline(always)]

@@ -86,9 +86,15 @@ impl<T: Scalar> CanonicalScratch<T> {
 
     /// From u and p to unit vectors, twist and all rates: `u_rate`, `omega`.
     #[inline(always)]
-    fn velocities<const N: usize, const WORK: bool>(&mut self, mechanism: &Mechanism, u: &[T], p: &[T]) {
+    fn velocities<const N: usize>(
+        &mut self,
+        mechanism: &Mechanism,
+        has_work_integral: bool,
+        u: &[T],
+        p: &[T],
+    ) {
         let n = size::<N>(mechanism.coordinates());
-        if !WORK {
+        if !has_work_integral {
             self.kernel.unit_vectors::<N>(mechanism, u);
             mechanism.tree.mass_matrix::<T, N>(&self.kernel.z, &mut self.kernel.mass, &mut self.kernel.twist);
             tree::factor::<T, N>(n, &mut self.kernel.mass, &mut self.kernel.pivot);
@@ -117,12 +123,18 @@ impl<T: Scalar> CanonicalScratch<T> {
         tree::multiply::<T, N>(n, &self.kernel.mass, &self.omega, &mut self.momentum);
     }
 
-    /// y' at the drives taken last.
+    /// y' at the drives taken last; `has_work_integral`: y ends with p_t.
     #[inline(always)]
-    fn rate<const N: usize, const WORK: bool>(&mut self, mechanism: &Mechanism, y: &[T], rate: &mut [T]) {
+    fn rate<const N: usize>(
+        &mut self,
+        mechanism: &Mechanism,
+        has_work_integral: bool,
+        y: &[T],
+        rate: &mut [T],
+    ) {
         let n = size::<N>(mechanism.coordinates());
-        let f = if WORK { mechanism.partition.count() } else { n };
-        self.velocities::<N, WORK>(mechanism, &y[..f], &y[f..2 * f]);
+        let f = if has_work_integral { mechanism.partition.count() } else { n };
+        self.velocities::<N>(mechanism, has_work_integral, &y[..f], &y[f..2 * f]);
         let kernel = &mut self.kernel;
         mechanism.tree.lagrangian_forces::<T, N>(&kernel.z, &self.omega, &kernel.twist, &mut kernel.load);
         for spring in &mechanism.springs {
@@ -138,7 +150,7 @@ impl<T: Scalar> CanonicalScratch<T> {
                 &mut kernel.load,
             );
         }
-        if !WORK {
+        if !has_work_integral {
             rate[..n].copy_from_slice(&self.omega[..n]);
             rate[n..2 * n].copy_from_slice(&kernel.load[..n]);
             return;
@@ -218,7 +230,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
         if WORK {
             self.work.drive_at(&self.mechanism, t);
         }
-        self.work.rate::<N, WORK>(&self.mechanism, y, rate);
+        self.work.rate::<N>(&self.mechanism, WORK, y, rate);
     }
 
     fn rates(&mut self, points: &mut Points) {
@@ -268,7 +280,7 @@ impl<const N: usize, const WORK: bool> OdeSystem for Canonical<N, WORK> {
 /// dy'/dy row by row (d × d); not generic, so that it is compiled once.
 fn slopes(
     scratch: &mut CanonicalScratch<Slopes>,
-    work_integral: bool,
+    has_work_integral: bool,
     mechanism: &Mechanism,
     t: Time,
     y: &[f64],
@@ -276,18 +288,14 @@ fn slopes(
 ) {
     let d = y.len();
     let (mut point, mut rate) = (vec![Slopes::ZERO; d], vec![Slopes::ZERO; d]);
-    if work_integral {
+    if has_work_integral {
         scratch.drive_at(mechanism, t);
     }
     for first in (0..d).step_by(LANES) {
         for (k, (point, &y)) in point.iter_mut().zip(y).enumerate() {
             *point = Slopes::unknown(y, k.wrapping_sub(first));
         }
-        if work_integral {
-            scratch.rate::<0, true>(mechanism, &point, &mut rate);
-        } else {
-            scratch.rate::<0, false>(mechanism, &point, &mut rate);
-        }
+        scratch.rate::<0>(mechanism, has_work_integral, &point, &mut rate);
         for (row, rate) in y_by_y.chunks_exact_mut(d).zip(&rate) {
             for (entry, &slope) in row[first..].iter_mut().zip(&rate.slope) {
                 *entry = slope;
@@ -329,7 +337,7 @@ impl<const N: usize, const WORK: bool> Form for Canonical<N, WORK> {
         if WORK {
             scratch.drive_at(&self.mechanism, state.time);
         }
-        scratch.velocities::<0, WORK>(&self.mechanism, &unknowns[..f], &unknowns[f..2 * f]);
+        scratch.velocities::<0>(&self.mechanism, WORK, &unknowns[..f], &unknowns[f..2 * f]);
         motion.omega.copy_from_slice(&scratch.omega);
         if WORK {
             motion.work = dot(&scratch.momentum, &scratch.drive_rate) - unknowns[2 * f];

@@ -48,12 +48,12 @@ impl<T: Lanewise> StageScratch<T> {
 
     /// The rates at all points.
     #[inline(always)]
-    fn rates<const N: usize, const WORK: bool>(&mut self, mechanism: &Mechanism, points: &mut Points) {
+    fn rates<const N: usize>(&mut self, StagePoints { mechanism, has_work_integral, points }: StagePoints) {
         for ((y, high), low) in self.y.iter_mut().zip(&points.y).zip(&points.low) {
             *y = T::load(high, low);
         }
         let d = points.y.len();
-        self.scratch.rate::<N, WORK>(mechanism, &self.y[..d], &mut self.rate[..d]);
+        self.scratch.rate::<N>(mechanism, has_work_integral, &self.y[..d], &mut self.rate[..d]);
         for ((rate, high), low) in self.rate.iter().zip(&mut points.rate).zip(&mut points.rate_low) {
             rate.store(high, low);
         }
@@ -92,19 +92,6 @@ impl<L: Lanes> BothScalars<L> {
         Self { plain: StageScratch::new(mechanism), exact: StageScratch::new(mechanism) }
     }
 
-    #[inline(always)]
-    fn rates<const N: usize, const WORK: bool, const EXACT: bool>(
-        &mut self,
-        mechanism: &Mechanism,
-        points: &mut Points,
-    ) {
-        if EXACT {
-            self.exact.rates::<N, WORK>(mechanism, points);
-        } else {
-            self.plain.rates::<N, WORK>(mechanism, points);
-        }
-    }
-
     fn drive(&mut self, mechanism: &Mechanism, time: &[Time; LANES]) {
         for (k, dependent_angle) in mechanism.partition.bodies.iter().enumerate() {
             let phases = time.map(|time| dependent_angle.drive::<DoubleDouble>(time));
@@ -121,31 +108,28 @@ impl<L: Lanes> BothScalars<L> {
     }
 }
 
-struct CanonicalRates<'a, V, const N: usize, const WORK: bool, const EXACT: bool>(
-    &'a mut BothScalars<V>,
-    &'a Mechanism,
-    &'a mut Points,
-);
+/// What is evaluated.
+struct StagePoints<'a> {
+    mechanism: &'a Mechanism,
+    has_work_integral: bool,
+    points: &'a mut Points,
+}
 
-impl<V: Lanes, const N: usize, const WORK: bool, const EXACT: bool> Code
-    for CanonicalRates<'_, V, N, WORK, EXACT>
-{
+/// The rates at all points, in doubles or, where `EXACT`, with what these leave out.
+struct CanonicalRates<'a, V, const N: usize, const EXACT: bool>(&'a mut BothScalars<V>, StagePoints<'a>);
+
+impl<V: Lanes, const N: usize, const EXACT: bool> Code for CanonicalRates<'_, V, N, EXACT> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        self.0.rates::<N, WORK, EXACT>(self.1, self.2);
+        let Self(both, of) = self;
+        if EXACT {
+            both.exact.rates::<N>(of);
+        } else {
+            both.plain.rates::<N>(of);
+        }
     }
-}
-
-/// The same code compiled for the processor.
-fn in_hardware<const N: usize, const WORK: bool, const EXACT: bool>(
-    hardware: Hardware,
-    both: &mut BothScalars<Vector>,
-    mechanism: &Mechanism,
-    points: &mut Points,
-) {
-    hardware.run(CanonicalRates::<_, N, WORK, EXACT>(both, mechanism, points));
 }
 
 impl LaneStages {
@@ -160,47 +144,38 @@ impl LaneStages {
     }
 
     /// The rates at all points; with `exact`, what doubles leave out of points and rates too.
-    /// `work_integral`: the form carries p_t.
+    /// `has_work_integral`: the form carries p_t.
     ///
     /// Not generic, so that it is compiled once and not with every program that integrates a mechanism.
-    pub fn rates(&mut self, work_integral: bool, exact: bool, mechanism: &Mechanism, points: &mut Points) {
-        if work_integral && self.time != points.time {
+    pub fn rates(
+        &mut self,
+        has_work_integral: bool,
+        exact: bool,
+        mechanism: &Mechanism,
+        points: &mut Points,
+    ) {
+        if has_work_integral && self.time != points.time {
             self.time = points.time;
             match &mut self.room {
                 StagesByVector::Portable(both) => both.drive(mechanism, &self.time),
                 StagesByVector::Hardware(_, both) => both.drive(mechanism, &self.time),
             }
         }
+        let of = StagePoints { mechanism, has_work_integral, points };
         // The sizes worth unrolling; any other count of the same operations has the same bits.
         match &mut self.room {
-            StagesByVector::Portable(both) => match (work_integral, exact) {
-                (false, false) => {
-                    Portable::apart(CanonicalRates::<_, 0, false, false>(both, mechanism, points))
-                }
-                (false, true) => {
-                    Portable::apart(CanonicalRates::<_, 0, false, true>(both, mechanism, points))
-                }
-                (true, false) => {
-                    Portable::apart(CanonicalRates::<_, 0, true, false>(both, mechanism, points))
-                }
-                (true, true) => Portable::apart(CanonicalRates::<_, 0, true, true>(both, mechanism, points)),
+            StagesByVector::Portable(both) => match exact {
+                false => Portable::apart(CanonicalRates::<_, 0, false>(both, of)),
+                true => Portable::apart(CanonicalRates::<_, 0, true>(both, of)),
             },
-            StagesByVector::Hardware(hardware, both) => {
-                let code = match (mechanism.size(), work_integral, exact) {
-                    (1, false, false) => in_hardware::<1, false, false>,
-                    (2, false, false) => in_hardware::<2, false, false>,
-                    (3, false, false) => in_hardware::<3, false, false>,
-                    (4, false, false) => in_hardware::<4, false, false>,
-                    (_, false, false) => in_hardware::<0, false, false>,
-                    (2, false, true) => in_hardware::<2, false, true>,
-                    (_, false, true) => in_hardware::<0, false, true>,
-                    (2, true, false) => in_hardware::<2, true, false>,
-                    (_, true, false) => in_hardware::<0, true, false>,
-                    (2, true, true) => in_hardware::<2, true, true>,
-                    (_, true, true) => in_hardware::<0, true, true>,
-                };
-                code(*hardware, both, mechanism, points);
-            }
+            StagesByVector::Hardware(hardware, both) => match (mechanism.size(), exact) {
+                (1, false) => hardware.run(CanonicalRates::<_, 1, false>(both, of)),
+                (2, false) => hardware.run(CanonicalRates::<_, 2, false>(both, of)),
+                (3, false) => hardware.run(CanonicalRates::<_, 3, false>(both, of)),
+                (4, false) => hardware.run(CanonicalRates::<_, 4, false>(both, of)),
+                (_, false) => hardware.run(CanonicalRates::<_, 0, false>(both, of)),
+                (_, true) => hardware.run(CanonicalRates::<_, 0, true>(both, of)),
+            },
         }
     }
 }
