@@ -4,7 +4,7 @@
 use crate::sweep::points;
 use driftless::run::trust::Level;
 use driftless::run::{Request, Shard, Status, Sweep, SweepPoint, Vary, simulate};
-use driftless::scene::Template;
+use driftless::scene::{Template, parse_scene};
 use driftless::stepping::taylor::batch::Batch;
 
 pub fn shipped(name: &str) -> Template {
@@ -163,5 +163,32 @@ fn points_of_loops_are_judged_in_lanes() {
         let off = point.phi.iter().zip(&fine.phi).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
         let error = trust.error.expect("a figure");
         assert!(off < error && error < 1e-5 && trust.horizon.is_none(), "{trust:?} for {off:e}");
+    }
+}
+
+/// Output times anywhere near the singular positions of two parallelograms, whose bars swing as one pendulum:
+/// three bars about their ends, and two that are carried along.
+#[test]
+fn output_times_close_to_singular_positions_leave_a_point_where_it_is() {
+    let gravity = -8.994_237_499_999_999;
+    let vary = format!("gravity[1]={gravity}..{gravity}:1");
+    let one = format!(
+        r#"{{"name": "one", "gravity": [0, {gravity}],
+        "start": {{"bar": {{"phi": 1.5707963267948966, "omega": -1}}}},
+        "bars": [{{"name": "bar", "mass": 7, "centre": [0.5, 0], "inertia": 1.25, "length": 1}}],
+        "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}},
+            {{"body": "bar", "point": [0, 0]}}]}}], "until": 4, "every": 4}}"#
+    );
+    let scene = parse_scene(&one, "one", &[]).expect("a scene");
+    let pendulum = simulate(&scene, &by_taylor(4.0, 1e-13), &mut |_| Ok(())).expect("a run").last;
+    for every in [0.038_443_589_005_354_02, 0.057, 0.13] {
+        let request = Request { every: Some(every), ..by_taylor(4.0, 1e-9) };
+        let plan = planned(&shipped("four_bars"), &[&vary], &request).trusted(Level::Auto);
+        let point = &points(&plan, 1)[0];
+        assert_eq!(point.status, Status::Done, "{every}: {point:?}");
+        let off = (point.phi[0] - pendulum.phi[0]).abs();
+        let estimate = point.trust.as_ref().and_then(|trust| trust.error).expect("an estimate");
+        assert!(off < 3e-8 && point.energy < 1e-8, "{every}: off by {off:.1e} rad, {point:?}");
+        assert!(estimate < 3e-8, "{every}: {estimate:.1e}");
     }
 }

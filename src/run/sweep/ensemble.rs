@@ -106,6 +106,13 @@ impl BatchObserver for WatchedLanes<'_, '_> {
         (self.watch)(number, step)
     }
 
+    fn resume(&mut self, number: usize, member: &mut BatchMember) -> Going {
+        match &self.alone[number] {
+            Some(Alone::PastSingular(alone)) if alone.is_inside() => self.alone(number, member),
+            _ => Going::On,
+        }
+    }
+
     fn alone(&mut self, number: usize, member: &mut BatchMember) -> Going {
         let Self { batch, plan, until, alone, watching, watch } = self;
         let watching = &mut watching[number];
@@ -128,7 +135,7 @@ fn take_on(
     let alone = match alone {
         Some(alone) => alone,
         None => alone.insert(match member.mechanism.contacts.is_empty() && watching.events.is_none() {
-            true => Alone::PastSingular(Box::new(PastSingular::new(batch, member))),
+            true => Alone::PastSingular(Box::new(PastSingular::new(batch, member, plan.time(plan.rows)))),
             false => Alone::ThroughImpacts(Box::new(ThroughImpacts::new(plan, member, watching)?)),
         }),
     };

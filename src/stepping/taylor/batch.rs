@@ -109,6 +109,11 @@ pub(crate) trait BatchObserver {
     /// Shown a step that was made.
     fn step(&mut self, number: usize, step: &TakenStep) -> Going;
 
+    /// Takes on a trajectory that stands inside a step it made alone, before the lanes do.
+    fn resume(&mut self, _number: usize, _member: &mut BatchMember) -> Going {
+        Going::On
+    }
+
     /// Takes on a trajectory that has left from where it stands, and is shown as many steps as that takes.
     fn alone(&mut self, number: usize, member: &mut BatchMember) -> Going;
 }
@@ -227,7 +232,9 @@ impl Batch {
         until: Time,
         observer: &mut dyn BatchObserver,
     ) {
-        let is_done = vec![false; members.len()];
+        let resumed = members.iter_mut().enumerate();
+        let is_done =
+            resumed.map(|(number, member)| observer.resume(number, member) == Going::Enough).collect();
         self.integrate_rest(members, until, observer, is_done);
     }
 

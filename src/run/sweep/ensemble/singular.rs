@@ -1,4 +1,7 @@
 //! A trajectory near a singular position.
+//!
+//! Steps end there where the method ends them, at no output time: one that lies inside a step is read from
+//! its series, as single runs read it, and the trajectory goes on from the step's own end.
 
 use super::whole_turns;
 use crate::dynamics::kernel::Kernel;
@@ -17,45 +20,71 @@ pub(super) struct PastSingular {
     problem: RefCell<Box<dyn Problem>>,
     method: RefCell<Projected<Taylor<f64>>>,
     kernel: Kernel<f64>,
+    /// The end of all, at which steps do end.
+    horizon: Time,
+    /// Both ends of the last step, where the trajectory stands inside it.
+    step: Option<[State; 2]>,
 }
 
 impl PastSingular {
-    pub(super) fn new(batch: &Batch, member: &BatchMember) -> Self {
+    pub(super) fn new(batch: &Batch, member: &BatchMember, horizon: Time) -> Self {
         let mechanism = Arc::new(member.mechanism.clone());
         Self {
             kernel: Kernel::new(&mechanism),
             problem: RefCell::new(tangent_form(&mechanism)),
             method: RefCell::new(Projected::new(batch.alone())),
+            horizon,
+            step: None,
         }
     }
 
-    /// Takes steps until the constraints are independent of one another again, at least one; tells whether
-    /// there is more to be seen.
+    /// True where the trajectory stands inside a step.
+    pub(super) fn is_inside(&self) -> bool {
+        self.step.is_some()
+    }
+
+    /// Goes on to `until`, or until the constraints are independent of one another again after a step, at
+    /// least one; tells whether there is more to be seen.
     pub(super) fn go(
         &mut self,
         member: &mut BatchMember,
         until: Time,
         watch: &mut dyn FnMut(&TakenStep) -> Going,
     ) -> Result<Going, StepError> {
-        let Self { problem, method, kernel } = self;
+        let Self { problem, method, kernel, horizon, step } = self;
         let n = member.mechanism.coordinates();
         let room = RefCell::new(State::default());
-        method.get_mut().begin(&mut **problem.get_mut(), &mut member.state, until)?;
+        if step.is_none() {
+            method.get_mut().begin(&mut **problem.get_mut(), &mut member.state, *horizon)?;
+        }
         loop {
-            let from = member.state.clone();
             let BatchMember { mechanism, state, statistics, .. } = &mut *member;
-            method.get_mut().step(&mut **problem.get_mut(), state, until, statistics)?;
+            let [from, to] = match step.take() {
+                Some(ends) => ends,
+                None => {
+                    let mut to = state.clone();
+                    method.get_mut().step(&mut **problem.get_mut(), &mut to, *horizon, statistics)?;
+                    [state.clone(), to]
+                }
+            };
+            let begin = state.clone();
+            let is_whole = to.time <= until;
+            if is_whole {
+                state.clone_from(&to);
+            } else {
+                method.get_mut().interpolate(&mut **problem.get_mut(), &from, until, state);
+            }
             let inside = |after: f64| {
                 let mut inside = State::default();
                 let (mut problem, mut method) = (problem.borrow_mut(), method.borrow_mut());
-                method.interpolate_roughly(&mut **problem, &from, from.time + after, &mut inside);
+                method.interpolate_roughly(&mut **problem, &from, begin.time + after, &mut inside);
                 inside
             };
-            let series = |body: usize, after: f64| angle_and_rate(&inside(after), &from, n, body);
-            let start = |body: usize| angle_and_rate(&from, &from, n, body);
-            let ends =
-                |body: usize| [start(body), angle_and_rate(state, &from, n, body)].map(<[f64; 2]>::from);
-            let span = (state.time - from.time).hi;
+            let series = |body: usize, after: f64| angle_and_rate(&inside(after), &begin, n, body);
+            let ends = |body: usize| {
+                [&begin, &*state].map(|state| <[f64; 2]>::from(angle_and_rate(state, &begin, n, body)))
+            };
+            let span = (state.time - begin.time).hi;
             let motion = |after: f64, motion: &mut Motion| {
                 if after >= span {
                     read(mechanism, state, motion);
@@ -63,16 +92,16 @@ impl PastSingular {
                 }
                 let (mut problem, mut method) = (problem.borrow_mut(), method.borrow_mut());
                 let inside = &mut *room.borrow_mut();
-                method.interpolate(&mut **problem, &from, from.time + after, inside);
+                method.interpolate(&mut **problem, &from, begin.time + after, inside);
                 read(mechanism, inside, motion);
             };
-            let passage = TakenStep::new(from.time, span, &ends, &series, &motion);
-            if watch(&passage) == Going::Enough {
-                return Ok(Going::Enough);
+            let going = watch(&TakenStep::new(begin.time, span, &ends, &series, &motion));
+            *step = (!is_whole).then_some([from, to]);
+            if going == Going::Enough || state.time >= until {
+                return Ok(going);
             }
             let (phi, omega) = (&state.y[..n], &state.y[n..2 * n]);
-            let share = kernel.independence_at(mechanism, state.time, phi, omega).share();
-            if state.time >= until || share >= NEAR {
+            if kernel.independence_at(mechanism, state.time, phi, omega).share() >= NEAR {
                 return Ok(Going::On);
             }
         }
