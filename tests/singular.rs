@@ -12,8 +12,8 @@ use driftless::arithmetic::{DoubleDouble, Scalar};
 use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::looped::Looped;
 use driftless::dynamics::{Form, Mechanism, OdeSystem, Time};
-use driftless::run::{Outcome, Request};
-use driftless::scene::{Scene, parse_scene};
+use driftless::run::{Outcome, Request, Status, Sweep};
+use driftless::scene::{Scene, Template, parse_scene};
 use driftless::stepping::Cause;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -517,4 +517,78 @@ fn change_points(wanted: usize, seed: u64) {
 #[test]
 fn two_hundred_change_points_are_passed_on_the_right_branch() {
     change_points(200, 4);
+}
+
+/// Generalized mass and potential energy of the kite at an angle of its crank, from the place of the hinge
+/// between coupler and rocker on the branch that is smooth where it folds.
+fn kite_at(crank: f64) -> (f64, f64) {
+    let (sine, cosine) = crank.sin_cos();
+    // From the crank's end to the ground pivot at (2, 0): squared, and the way to the hinge along and across.
+    let square = 5.0 - 4.0 * cosine;
+    let slope = 4.0 * sine;
+    let (along, across) = (0.5 - 1.5 / square, 2.0 * sine / square);
+    let along_slope = 1.5 * slope / (square * square);
+    let across_slope = (2.0 * cosine - across * slope) / square;
+    let coupler = [along * (2.0 - cosine) + across * sine, -along * sine + across * (2.0 - cosine)];
+    let coupler_slope = [
+        along_slope * (2.0 - cosine) + along * sine + across_slope * sine + across * cosine,
+        -along_slope * sine - along * cosine + across_slope * (2.0 - cosine) + across * sine,
+    ];
+    let rocker = [0.5 * (cosine + coupler[0] - 2.0), 0.5 * (sine + coupler[1])];
+    let rocker_slope = [0.5 * (coupler_slope[0] - sine), 0.5 * (coupler_slope[1] + cosine)];
+    let turned = |at: [f64; 2], slope: [f64; 2]| at[0] * slope[1] - at[1] * slope[0];
+    let (coupler_rate, rocker_rate) = (turned(coupler, coupler_slope), turned(rocker, rocker_slope));
+    let middle = [0.5 * coupler_slope[0] - sine, 0.5 * coupler_slope[1] + cosine];
+    let mass = 1.0 / 3.0
+        + coupler_rate * coupler_rate / 12.0
+        + middle[0] * middle[0]
+        + middle[1] * middle[1]
+        + rocker_rate * rocker_rate * 8.0 / 3.0;
+    let potential = 9.81 * (1.5 * sine + 0.5 * coupler[1] + 2.0 * rocker[1]);
+    (mass, potential)
+}
+
+/// The kite's crank after `until` \[s\], from a quarter turn and a rate: its energy alone, by the classical
+/// Runge-Kutta method.
+fn kite_after(rate: f64, until: f64) -> f64 {
+    let (mass, potential) = kite_at(std::f64::consts::FRAC_PI_2);
+    let energy = 0.5 * mass * rate * rate + potential;
+    let rate = |crank: f64| {
+        let (mass, potential) = kite_at(crank);
+        (2.0 * (energy - potential) / mass).sqrt()
+    };
+    let steps = 20_000;
+    let h = until / f64::from(steps);
+    (0..steps).fold(std::f64::consts::FRAC_PI_2, |crank, _| {
+        let k1 = rate(crank);
+        let k2 = rate(crank + 0.5 * h * k1);
+        let k3 = rate(crank + 0.5 * h * k2);
+        let k4 = rate(crank + h * k3);
+        crank + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    })
+}
+
+/// Steps that would end just where the kite folds end before it, in runs and where points of a sweep are alone.
+#[test]
+fn no_step_ends_where_the_kite_folds() {
+    let text = std::fs::read_to_string("examples/scenes/kite.json").expect("a shipped scene");
+    let scene = |rate: f64, until: f64| {
+        let mut scene: Value = serde_json::from_str(&text).expect("a scene");
+        scene["start"]["crank"]["omega"] = json!(rate);
+        Scene { until, every: until, ..parsed(&scene.to_string()) }
+    };
+    for rate in [7.499_659, 6.755_904, 8.049_233] {
+        let outcome = run(&scene(rate, 3.0), &by("taylor", 1e-9));
+        let off = (outcome.last.phi[0] - kite_after(rate, 3.0)).abs();
+        assert!(outcome.stop.is_none() && off < 1e-7, "{rate}: off by {off:.1e} rad, {:?}", outcome.stop);
+    }
+    let vary = ["crank.omega=6..10:9".parse().expect("a range")].to_vec();
+    let template = Template::read("examples/scenes/kite.json".as_ref(), &[]).expect("a shipped scene");
+    let request = Request { until: Some(2.0), every: Some(0.25), ..by("taylor", 1e-9) };
+    let plan = Sweep::new(&template, vary, &request).expect("a sweep");
+    for index in 0..9 {
+        let point = plan.point(index).expect("a point");
+        let off = (point.phi[0] - kite_after(point.values[0], 2.0)).abs();
+        assert!(point.status == Status::Done && off < 1e-7, "off by {off:.1e} rad, {point:?}");
+    }
 }

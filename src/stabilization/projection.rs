@@ -35,6 +35,8 @@ pub struct Projected<M> {
     /// Energy less work after the last step, and whether that ended near a singular position.
     balance: Option<f64>,
     near: bool,
+    /// Where the last step began.
+    from: State,
     /// Largest violation left that counts as converged, at both levels, in the units of the mechanism,
     /// relative to levers and speeds where these are larger; no less than the rounding of angles and places.
     pub tolerance: f64,
@@ -43,18 +45,31 @@ pub struct Projected<M> {
 impl<M> Projected<M> {
     /// Projects after the steps of `inner`.
     pub fn new(inner: M) -> Self {
-        Self { inner, projector: None, balance: None, near: false, tolerance: 1e-13 }
+        Self { inner, projector: None, balance: None, near: false, from: State::default(), tolerance: 1e-13 }
     }
 }
 
 impl<M> Projected<M> {
-    /// Projects the end of a step; true where that moved it by more than rounding.
-    fn project_back<P: ?Sized>(&mut self, mechanism: &Mechanism, state: &mut State) -> Result<bool, StepError>
+    /// Projects the end of a step, or of part of it where it may be shortened; true where that moved it by
+    /// more than rounding.
+    fn project_back<P>(
+        &mut self,
+        problem: &mut P,
+        state: &mut State,
+        is_open: bool,
+    ) -> Result<bool, StepError>
     where
         M: Integrator<P>,
+        P: Form + ?Sized,
     {
-        let name = self.inner.name();
-        let Some(projector) = &mut self.projector else { return Ok(false) };
+        let Self { inner, projector: Some(projector), from, tolerance, .. } = self else { return Ok(false) };
+        let name = inner.name();
+        let mut projected = projector.project(problem.mechanism(), state, *tolerance);
+        let is_far = projected.as_ref().is_ok_and(|landing| !landing.is_near);
+        if is_open && !is_far && inner.shorten(problem, from, state) {
+            projected = projector.project(problem.mechanism(), state, *tolerance);
+        }
+        let mechanism = problem.mechanism();
         let stop = |cause, state: &State, what, hint: &str| StepError {
             cause,
             method: name.into(),
@@ -63,7 +78,7 @@ impl<M> Projected<M> {
             what,
             hint: hint.into(),
         };
-        let landing = projector.project(mechanism, state, self.tolerance).map_err(|(row, left)| {
+        let landing = projected.map_err(|(row, left)| {
             let what = format!("projection leaves {left:.1e} of constraint {row}");
             stop(Cause::ProjectionFailed, state, what, hint(mechanism, &projector.kernel, name))
         })?;
@@ -111,8 +126,9 @@ where
         until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
+        self.from.clone_from(state);
         let event = self.inner.step(problem, state, until, statistics)?;
-        if self.project_back(problem.mechanism(), state)? {
+        if self.project_back(problem, state, event.is_none() && state.time < until)? {
             self.inner.changed(state);
         }
         Ok(event)

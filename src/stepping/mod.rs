@@ -243,6 +243,14 @@ pub trait Integrator<P: ?Sized> {
         false
     }
 
+    /// Takes back part of the last step, which began at `from`, where it ends far closer to a singular
+    /// position than it began, so that it ends on the way there; false, and nothing changed, where it does
+    /// not, or where the method knows none.
+    #[doc(hidden)]
+    fn shorten(&mut self, _problem: &mut P, _from: &State, _state: &mut State) -> bool {
+        false
+    }
+
     /// Writes the powers of the motion about the beginning of the last step; false, and nothing written,
     /// where the method has none of a hinge tree.
     #[doc(hidden)]

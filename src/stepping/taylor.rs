@@ -231,15 +231,18 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
     }
 
     fn interpolate(&mut self, _: &mut P, from: &State, time: Time, inside: &mut State) {
-        inside.clone_from(from);
-        let h = time - from.time;
-        match (&mut self.fast, &self.expansion) {
-            (Some(fast), _) if !self.by_series => fast.go(inside, h.hi),
-            (_, Some(expansion)) => expansion.go(inside, h),
-            _ => {}
+        self.sum(from, time, inside);
+    }
+
+    fn shorten(&mut self, problem: &mut P, from: &State, state: &mut State) -> bool {
+        let Some(mut passage) = self.singular_passage(problem) else { return false };
+        let mut inside = |time: Time, inside: &mut State| self.sum(from, time, inside);
+        let shorter = passage.before(problem.mechanism(), from, state.time, &mut inside);
+        if let Some(time) = shorter {
+            inside(time, state);
         }
-        inside.time = time;
-        inside.wrap();
+        self.singular_passage = Some(passage);
+        shorter.is_some()
     }
 
     fn powers(&self, powers: &mut MotionPowers) -> bool {
@@ -323,13 +326,33 @@ impl<T: Coefficient> Taylor<T> {
                 let whole = through.min(left);
                 expansion.sum_to_smallest(whole);
                 if singular_passage.is_confirmed(problem, expansion, state, whole, self.tolerance) {
-                    wanted = through;
-                } else {
-                    expansion.sum_all();
+                    // Half of it would end at the singular position.
+                    return (through, whole);
                 }
+                expansion.sum_all();
             }
         }
         (wanted, if wanted.is_nan() { 0.0 } else { step_size::taken(wanted, left) })
+    }
+
+    /// Writes the state at a time in the last step, which began at `from`.
+    fn sum(&mut self, from: &State, time: Time, inside: &mut State) {
+        inside.clone_from(from);
+        let h = time - from.time;
+        match (&mut self.fast, &self.expansion) {
+            (Some(fast), _) if !self.by_series => fast.go(inside, h.hi),
+            (_, Some(expansion)) => expansion.go(inside, h),
+            _ => {}
+        }
+        inside.time = time;
+        inside.wrap();
+    }
+
+    /// What passages are looked for with, taken out.
+    fn singular_passage<P: Form + ?Sized>(&mut self, problem: &P) -> Option<SingularPassage<T>> {
+        let Self { singular_passage, expansion, .. } = self;
+        let new = |expansion| SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion);
+        singular_passage.take().or_else(|| expansion.as_ref().map(new))
     }
 
     /// Of the step `h` \[s\] what comes before its first event, and which event that is.

@@ -11,7 +11,8 @@
 //!
 //! Such a step is longer than the powers allow by themselves, so it is made only where it is confirmed: at
 //! its end the constraints and the energy balance hold, and the series about its end leads back to its start.
-//! Else the step is as any, and what the projection finds at its end is told.
+//! Else the step is as any.  One that would end far closer to the singular position than it began ends before
+//! it, so that the next can lead through; what the projection finds at its end is told.
 
 use super::expansion::Expansion;
 use crate::arithmetic::DoubleDouble;
@@ -19,7 +20,7 @@ use crate::dynamics::kernel::Kernel;
 use crate::dynamics::rank::RankVerdict;
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Coefficient;
-use crate::dynamics::{Coordinates, Form, Mechanism, State};
+use crate::dynamics::{Coordinates, Form, Mechanism, State, Time};
 
 /// Powers the way through is looked for with.
 const LOW: usize = 8;
@@ -32,6 +33,12 @@ const PERMANENT: f64 = 1e-13;
 /// On a way through a singular position the share falls below this part of what it was; elsewhere it is small
 /// for other reasons, and the step is as any.
 const FALL: f64 = 0.1;
+/// A step is too close to a singular position where the share of the weakest constraint at its end is below
+/// this part of what it was, or of what is near; closer than this the way out is the same as the way on.
+const CLOSER: f64 = 1.0 / 16.0;
+const CLOSEST: f64 = 1e-8;
+/// Halvings of the time in which a shorter step is looked for.
+const HALVINGS: usize = 12;
 /// Largest share of the motion that the smallest power in such a step may have.
 const NOISE: f64 = 1e-6;
 /// Largest difference between the start and where the way back leads, over the tolerance; and the limits of
@@ -108,6 +115,36 @@ impl<T: Coefficient> SingularPassage<T> {
             }
         }
         None
+    }
+
+    /// Of a step from `start` to the time `end` that ends far closer to a singular position than it began, the
+    /// end of that part which leads to where passages are looked for, or closer by a little; `inside` writes
+    /// states inside the step.
+    pub fn before(
+        &mut self,
+        mechanism: &Mechanism,
+        start: &State,
+        end: Time,
+        inside: &mut dyn FnMut(Time, &mut State),
+    ) -> Option<Time> {
+        let n = mechanism.coordinates();
+        let Self { kernel, end: state, .. } = self;
+        let mut share = |h: f64| {
+            inside(start.time + h, state);
+            kernel.independence_at(mechanism, state.time, &state.y[..n], &state.y[n..2 * n]).share()
+        };
+        let h = (end - start.time).hi;
+        let here = share(0.0).min(NEAR);
+        let last = share(h);
+        if here < CLOSEST || last >= CLOSER * here {
+            return None;
+        }
+        let [mut off, mut near] = [0.0, h];
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (off + near);
+            *(if share(middle) < 0.5 * here { &mut near } else { &mut off }) = middle;
+        }
+        Some(start.time + near)
     }
 
     /// True where a step of `h` \[s\], as it is summed, keeps the constraints and the energy balance, and the
