@@ -792,6 +792,56 @@ fn extremes_at_an_event_move_with_it() {
     }
 }
 
+/// A torque that changes its sign at p0, from a to -a: outputs of the same signal jump there.  Up to then J w²/2 = a phi,
+/// and a phi, a w, a are largest just before it; w is the same at -p0 on the way back, and a phi least at the end.
+#[test]
+fn extremes_are_derived_on_the_side_of_a_jump_that_has_them() {
+    let text = r#"{"name": "shared", "gravity": [0, 0], "parameters": {"a": 1, "p0": 0.1},
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "signals": {"f": "if(b.phi < p0, a, -a)"}, "torques": [{"name": "q", "body": "b", "torque": "f"}],
+        "outputs": {"y": "f*b.phi", "pw": "f*b.omega", "f1": "f"},
+        "start": {"b": {"phi": 0, "omega": 0}}, "until": 0.9, "every": 0.1}"#;
+    let found = derived(&template(text), &["max:y", "max:pw", "max:f1", "min:f1"], &["a", "p0"], 0.9);
+    let (a, p) = (1.0_f64, 0.1_f64);
+    let speed = (4.0 * a * p).sqrt();
+    let expected = [
+        (a * p, [p, a]),
+        (a * speed, [1.5 * speed, 2.0 * a * a / speed]),
+        (a, [1.0, 0.0]),
+        (-a, [-1.0, 0.0]),
+    ];
+    for (measure, (value, slopes)) in found.measures.iter().zip(expected) {
+        assert_near(measure.value, value, 1e-9, &measure.name);
+        assert_eq!(measure.slopes.len(), 2, "{}: {:?}", measure.name, measure.why);
+        let slopes = measure.slopes.iter().zip(slopes);
+        slopes.for_each(|(found, expected)| assert_near(*found, expected, 1e-8, &measure.name));
+    }
+}
+
+/// The same of time: the torque rises to a tc and falls to -a tc there; and a ball that falls from rest at h, of which
+/// -2 y - 5 counts as soon as it falls.
+#[test]
+fn extremes_are_derived_on_the_side_of_a_start_or_a_time_that_has_them() {
+    let text = r#"{"name": "time", "gravity": [0, 0], "parameters": {"a": 1.5, "tc": 0.7},
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "torques": [{"name": "q", "body": "b", "torque": "if(t < tc, a*t, -a*t)"}],
+        "outputs": {"tq": "if(t < tc, a*t, -a*t)"}, "start": {"b": {"phi": 0, "omega": 0}},
+        "until": 1.5, "every": 0.1}"#;
+    let found = derived(&template(text), &["max:tq"], &["a", "tc"], 1.5);
+    assert_near(found.measures[0].value, 1.05, 1e-9, "value");
+    assert_near(found.measures[0].slopes[0], 0.7, 1e-9, "by a");
+    assert_near(found.measures[0].slopes[1], 1.5, 1e-9, "by tc");
+    let text = r#"{"name": "falls", "gravity": [0, -9.81],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 0.2}],
+        "outputs": {"u": "if(b.vy < 0, -2*b.y - 5, b.vy)"},
+        "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 1], "velocity": [0, 0]}}, "until": 0.3, "every": 0.1}"#;
+    let found = derived(&template(text), &["min:u"], &["start.b.origin[1]"], 0.3);
+    assert_near(found.measures[0].value, -7.0, 1e-9, "value");
+    assert_near(found.measures[0].slopes[0], -2.0, 1e-9, "by height");
+}
+
 /// A flight at (2, 3) m/s: what `--output` adds is derived beside formulas that are asked for, and in place of an
 /// output of the scene of the same name.
 #[test]

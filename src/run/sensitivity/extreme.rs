@@ -33,7 +33,8 @@ impl ExtremeTurn {
             let (side, mut kernel) = (Side::new(mechanism, moved), Kernel::new(mechanism));
             let mut beside = |moved: &Motion| {
                 let (t, phi, omega) = plain(moved);
-                outputs_at(mechanism, &mut kernel, motion, (t, &phi, &omega)).get(output).map(|&y| vec![y])
+                let values = outputs_at(mechanism, &mut kernel, motion, (t, &phi, &omega), &[]);
+                values.get(output).map(|&y| vec![y])
             };
             side.slope(&side.ahead(), 1.0, f64::INFINITY, &mut beside)
         };

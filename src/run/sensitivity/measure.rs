@@ -4,7 +4,7 @@ use super::super::event::SwitchFunction;
 use super::neighbours::Neighbour;
 use super::variation::{Variation, plain};
 use crate::dynamics::kernel::{Bias, Kernel};
-use crate::dynamics::output::{Moment, OutputScratch};
+use crate::dynamics::output::{Moment, OutputScratch, Outputs};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::saltation::{Delta, Side, event_value, late_at_zero};
 use crate::scene::Output;
@@ -84,15 +84,18 @@ pub(in crate::run) struct Derived {
     pub rates: Vec<f64>,
 }
 
-/// Outputs of a mechanism at a state; whole turns of a motion are added to the angles.
-pub(super) fn outputs_at(
+/// Time before and after a moment, in the mechanism's unit, at which branches beside it are taken.
+const BESIDE: f64 = 1e-6;
+
+/// Shows the outputs of a mechanism a state; whole turns of a motion are added to the angles.
+fn shown<R: Default>(
     mechanism: &Mechanism,
     kernel: &mut Kernel<f64>,
     motion: &Motion,
     (t, phi, omega): (Time, &[f64], &[f64]),
-) -> Vec<f64> {
-    let mut values = Vec::new();
-    let Some(outputs) = &mechanism.outputs else { return values };
+    what: impl FnOnce(&Outputs, &Moment) -> R,
+) -> R {
+    let Some(outputs) = &mechanism.outputs else { return R::default() };
     if outputs.needs_equations() {
         kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
     } else {
@@ -100,17 +103,48 @@ pub(super) fn outputs_at(
     }
     let turned = |k: usize| motion.unwrapped(k) - motion.phi[k].hi;
     let winding: Vec<f64> = (0..phi.len()).map(|k| phi[k] + turned(k)).collect();
-    outputs.evaluate(
-        &Moment { mechanism, time: t, phi, winding: &winding, omega, kernel },
-        &mut OutputScratch::default(),
-        &[],
-        &mut values,
-    );
-    values
+    what(outputs, &Moment { mechanism, time: t, phi, winding: &winding, omega, kernel })
+}
+
+/// Outputs of a mechanism at a state, on these branches of their formulas; on those that hold there if none
+/// are given.
+pub(super) fn outputs_at(
+    mechanism: &Mechanism,
+    kernel: &mut Kernel<f64>,
+    motion: &Motion,
+    at: (Time, &[f64], &[f64]),
+    branches: &[bool],
+) -> Vec<f64> {
+    shown(mechanism, kernel, motion, at, |outputs, moment| {
+        let mut values = Vec::new();
+        outputs.evaluate(moment, &mut OutputScratch::default(), branches, &mut values);
+        values
+    })
 }
 
 /// All outputs beside a variation at a motion.
 pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Derived {
+    outputs_on(variation, motion, &[])
+}
+
+/// The same on the branches of their formulas that hold just before the motion, for a `sense` of -1, or just
+/// after it, for 1: a formula may jump where a law does.
+pub(super) fn outputs_beside(variation: &mut Variation, motion: &Motion, sense: f64) -> Derived {
+    let mechanism = &variation.mechanism;
+    let Side { mut phi, mut omega, acceleration, .. } = Side::new(mechanism, motion);
+    let late = sense * BESIDE * mechanism.units.time;
+    for ((phi, omega), by) in phi.iter_mut().zip(&mut omega).zip(&acceleration) {
+        *phi += late * (*omega + 0.5 * late * by);
+        *omega += late * by;
+    }
+    let at = (motion.time + late, &phi[..], &omega[..]);
+    let branches = shown(mechanism, &mut Kernel::new(mechanism), motion, at, |outputs, moment| {
+        outputs.branches(moment, &mut OutputScratch::default(), &[])
+    });
+    outputs_on(variation, motion, &branches)
+}
+
+fn outputs_on(variation: &mut Variation, motion: &Motion, branches: &[bool]) -> Derived {
     let mechanism = &variation.mechanism;
     if mechanism.outputs.is_none() {
         return Derived::default();
@@ -118,11 +152,11 @@ pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Der
     let side = Side::new(mechanism, motion);
     let at = (motion.time, &side.phi[..], &side.omega[..]);
     let mut kernel = Kernel::new(mechanism);
-    let values = outputs_at(mechanism, &mut kernel, motion, at);
+    let values = outputs_at(mechanism, &mut kernel, motion, at, branches);
     let mut along = |column: &[f64], late: f64| {
         let mut beside = |moved: &Motion| {
             let (t, phi, omega) = plain(moved);
-            Some(outputs_at(mechanism, &mut kernel, motion, (t, &phi, &omega)))
+            Some(outputs_at(mechanism, &mut kernel, motion, (t, &phi, &omega), branches))
         };
         side.slope(column, late, f64::INFINITY, &mut beside).unwrap_or_default()
     };
@@ -130,8 +164,9 @@ pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Der
     let mut slopes = vec![Vec::new(); values.len()];
     for (column, neighbours) in variation.columns.iter().zip(&mut variation.neighbours) {
         let mut sums = along(column, 0.0);
-        let of =
-            |neighbour: &mut Neighbour| outputs_at(&neighbour.mechanism, &mut neighbour.kernel, motion, at);
+        let of = |neighbour: &mut Neighbour| {
+            outputs_at(&neighbour.mechanism, &mut neighbour.kernel, motion, at, branches)
+        };
         if let Some(moved) = neighbours.as_mut().and_then(|neighbours| neighbours.derivative(of)) {
             sums.iter_mut().zip(moved).for_each(|(sum, moved)| *sum += moved);
         }

@@ -71,6 +71,12 @@ struct Query {
     ended_by: Option<usize>,
 }
 
+impl Query {
+    fn is_extreme(&self) -> bool {
+        matches!(self.measure, Measure::Max(_) | Measure::Min(_))
+    }
+}
+
 /// Derivatives of measures of a scene's run by numbers of it.
 ///
 /// ```
@@ -272,9 +278,9 @@ impl Study {
                 }
                 Measure::Output(_) | Measure::Impact(_) => Ok(self.plan.until),
             };
-            if matches!(asked.measure, Measure::Max(_) | Measure::Min(_)) {
-                asked.is_end = asked.t.as_ref().is_ok_and(|t| (end - t).abs() <= 4.0 * f64::EPSILON * end);
-                asked.ended_by = ended_by.filter(|_| asked.is_end);
+            let is_end = |t: &f64| (end - t).abs() <= 4.0 * f64::EPSILON * end;
+            if asked.is_extreme() && asked.t.as_ref().is_ok_and(is_end) {
+                (asked.t, asked.is_end, asked.ended_by) = (Ok(end), true, ended_by);
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Values and derivatives of outputs, and derivatives of times, at the times that are asked for.
 
 use super::extreme::ExtremeTurn;
-use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs};
+use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs, outputs_beside};
 use super::{Look, Query, SensitivityError, Variation, refused};
 use crate::dynamics::Motion;
 
@@ -19,6 +19,11 @@ pub(super) fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, Sensitiv
     Ok((0..=rows as u64).map(|k| (k as f64 * every).min(until)).collect())
 }
 
+/// Difference of an output between both sides of a moment, over its size, that is no jump; and what the side
+/// that has an extreme may be off it, over the jump.
+const NO_JUMP: f64 = 1e-6;
+const OFF: f64 = 1e-3;
+
 /// What was seen at one time.
 pub(super) struct RecordedTime {
     pub t: f64,
@@ -26,6 +31,8 @@ pub(super) struct RecordedTime {
     pub derived: Derived,
     /// The same after it, where anything happens.
     pub after: Option<Derived>,
+    /// On the branches that hold just before that time and just after it, where an extreme is taken then.
+    pub sides: Option<[Derived; 2]>,
     /// How that time moves, where the columns were taken through it.
     pub moves: Option<Vec<f64>>,
     /// Derivatives of times, by the number of their measure.
@@ -67,10 +74,13 @@ impl Look for SensitivityRecorder<'_> {
                 _ => {}
             }
         }
+        let is_extreme = self.asked.iter().any(|asked| asked.is_extreme() && asked.t == Ok(time));
+        let sides = is_extreme.then(|| [-1.0, 1.0].map(|sense| outputs_beside(variation, motion, sense)));
         self.seen.push(RecordedTime {
             t: time,
             derived: outputs(variation, motion),
             after: None,
+            sides,
             moves: None,
             times,
             turns,
@@ -82,6 +92,9 @@ impl Look for SensitivityRecorder<'_> {
         let moment = variation.moment.as_ref().filter(|(at, _)| at.hi == time);
         seen.moves = moment.map(|(_, late)| late.clone());
         seen.after = Some(outputs(variation, motion));
+        if let Some([_, after]) = &mut seen.sides {
+            *after = outputs_beside(variation, motion, 1.0);
+        }
     }
 }
 
@@ -119,30 +132,51 @@ pub(super) fn taken(
         let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
         return Ok((t, t, slopes));
     };
-    let is_extreme = matches!(asked.measure, Measure::Max(_) | Measure::Min(_));
-    let off = |side: &Derived| (side.values[output] - asked.value).abs();
-    let (Derived { values, slopes, rates }, late) = match (&at.after, &at.moves) {
-        // A jump or a corner moves in time: on the side that has the extreme.
-        (Some(after), Some(late)) if is_extreme => {
-            (if off(after) < off(&at.derived) { after } else { &at.derived }, Some(late))
-        }
+    if asked.is_extreme() {
+        return extreme(number, asked, t, at).map(|(value, slopes)| (t, value, slopes));
+    }
+    let Derived { values, slopes, .. } = at.shown();
+    Ok((t, values[output], slopes[output].clone()))
+}
+
+/// An extreme at a time, on the side of a jump that has it, and its derivatives; or why there are none.
+fn extreme(number: usize, asked: &Query, t: f64, at: &RecordedTime) -> Result<(f64, Vec<f64>), String> {
+    let (Some(output), Some([before, after])) = (asked.output, &at.sides) else { return Err(String::new()) };
+    let value = |side: &Derived| side.values[output];
+    let off = |side: &Derived| (value(side) - asked.value).abs();
+    let nearer = |one, other| if off(other) < off(one) { other } else { one };
+    let jump = [before, after]
+        .into_iter()
+        .fold(0.0, |most: f64, side| most.max((value(side) - value(&at.derived)).abs()));
+    let has_jump = jump > NO_JUMP * asked.range[0].abs().max(asked.range[1].abs());
+    let corner = || format!("the extreme at {t} s is a corner of the curve, at an impact or an event");
+    let (side, late) = match &at.moves {
+        // A jump or a corner moves in time.
+        Some(late) if at.after.is_some() => (nearer(before, after), Some(late)),
         _ if asked.ended_by.is_some() => {
             // So does the end, with the event.
             let late = at.times.iter().find(|(measure, _)| *measure == number);
-            let late = late.ok_or("the function of the event that ends the run only touches zero")?;
-            (&at.derived, Some(&late.1))
+            (before, Some(&late.ok_or("the function of the event that ends the run only touches zero")?.1))
         }
-        _ if is_extreme => (&at.derived, None),
-        _ => (at.shown(), None),
+        _ if asked.is_end => (before, None),
+        _ if t == 0.0 => (nearer(&at.derived, after), None),
+        _ if has_jump => return Err(corner()),
+        _ => (&at.derived, None),
     };
-    let (value, rate, mut slopes) = (values[output], rates[output], slopes[output].clone());
-    if is_extreme && late.is_none() && !asked.is_end && t != 0.0 {
+    if has_jump && off(side) > OFF * jump {
+        return Err(format!(
+            "on neither side of the jump at {t} s is it {:e}, the extreme that a run finds there",
+            asked.value
+        ));
+    }
+    let (rate, mut slopes) = (side.rates[output], side.slopes[output].clone());
+    if late.is_none() && !asked.is_end && t != 0.0 {
         let turn = at.turns.iter().find(|(measure, _)| *measure == number);
         let turned = turn.is_some_and(|(_, turn)| turn.correct(rate, asked.range, &mut slopes));
         if !turned {
-            return Err(format!("the extreme at {t} s is a corner of the curve, at an impact or an event"));
+            return Err(corner());
         }
     }
     slopes.iter_mut().zip(late.into_iter().flatten()).for_each(|(slope, late)| *slope += rate * late);
-    Ok((t, value, slopes))
+    Ok((value(side), slopes))
 }
