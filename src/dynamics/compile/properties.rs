@@ -139,12 +139,12 @@ impl Mechanism {
     /// which has none, nor with dry friction and aims that depend on the mechanism, which `taylor` takes
     /// where it is asked for; and it takes the matrices of the tree.
     pub fn has_series(&self) -> bool {
-        self.has_series_between_switches() && self.frictions.is_empty()
+        self.has_series_between_switches() && self.frictions.is_empty() && !self.has_aims()
     }
 
-    /// The same with dry friction, between whose transitions the motion is smooth.
+    /// The same with dry friction, between whose transitions the motion is smooth, and with such aims.
     pub fn has_series_between_switches(&self) -> bool {
-        self.vibration.is_none() && !self.has_aims() && self.tree.is_dense()
+        self.vibration.is_none() && self.tree.is_dense()
     }
 
     /// True where the scene has a damper, or a force from outside that depends on rates.

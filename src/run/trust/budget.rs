@@ -60,7 +60,9 @@ impl Prices {
         let forces = (mechanism.springs.len()
             + mechanism.torsions.len()
             + mechanism.actions.len()
-            + mechanism.forces.len()) as f64;
+            + mechanism.forces.len()
+            + mechanism.constraints.iter().filter(|row| row.aim.is_some()).count())
+            as f64;
         let goes_bodywise = mechanism.recursion.is_some();
         let matrices = if goes_bodywise { 7.0 * n } else { 4.0 * n * n };
         let friction = FRICTION.map(|price| price * mechanism.frictions.len() as f64);

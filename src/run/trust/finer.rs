@@ -96,7 +96,8 @@ pub(super) fn first(mechanism: &Mechanism, run: &Plan, level: Level) -> Finer {
 fn in_doubles(mechanism: &Mechanism, run: &Plan) -> Finer {
     let finer = tolerance(run).filter(|_| !is_near_rounding(run)).map(|tolerance| tolerance / FINER);
     let tolerance = match finer {
-        Some(finer) if run.method == MethodId::Taylor => finer.max(FINEST),
+        // Those of gears and cams do not get better in step with their tolerance.
+        Some(finer) if run.method == MethodId::Taylor && !mechanism.has_aims() => finer.max(FINEST),
         // Steps that end at every output time are often far better than their tolerance, and a finer series
         // costs little.
         Some(finer) => finer.min(FINE),
@@ -147,11 +148,14 @@ pub(super) fn coarse(mechanism: &Mechanism, run: &Plan) -> Finer {
     series(mechanism, run, COARSE, [false; 2])
 }
 
-/// Where there is no series, or the run is one that finds its impacts on it.
-fn stepwise(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
-    let tolerance = Tolerance { relative: tolerance, absolute: tolerance };
-    let plan = Plan { method: MethodId::Dp8, ..Plan::of_series(mechanism, tolerance, run.until) };
-    Finer { name: format!("dp8 at {:.0e}", tolerance.relative), plan }
+/// Where there is no series, or the run is one that finds its impacts on it: never by the run's own method at
+/// its own tolerance, which would make the same errors.
+fn stepwise(mechanism: &Mechanism, run: &Plan, at: f64) -> Finer {
+    let is_run = run.method == MethodId::Dp8 && tolerance(run).is_some_and(|own| own <= at);
+    let method = if is_run { MethodId::Radau(5) } else { MethodId::Dp8 };
+    let tolerance = Tolerance { relative: at, absolute: at };
+    let plan = Plan { method, ..Plan::of_series(mechanism, tolerance, run.until) };
+    Finer { name: format!("{method} at {at:.0e}"), plan }
 }
 
 fn series(
@@ -178,12 +182,12 @@ fn series(
     Finer { name: format!("taylor at {:.0e}{digits}", tolerance.relative), plan }
 }
 
-/// Whether a reference solution may be no finer than its run.
+/// Whether the difference from a reference solution may be mostly the error of that, so that the run is off by
+/// no more.
 pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
-    let tolerance = tolerance(run).unwrap_or_default();
-    is_rounded(series)
-        || (series.method != MethodId::Taylor
-            && (run.method == MethodId::Taylor || tolerance < NEAR_ROUNDING))
+    // Beside a series at its own tolerance the classic pairs are tens of times as far off.
+    let is_coarser = || run.method == MethodId::Taylor && tolerance(run) <= tolerance(series);
+    is_rounded(series) || series.method != MethodId::Taylor && is_coarser()
 }
 
 /// What a reference solution in doubles may be off by in each second \[rad/s\], where that may be as much as
