@@ -380,6 +380,46 @@ fn estimates_cover_when_an_event_ends_the_run() {
     }
 }
 
+/// x = cos(2 t) is given where the event ends the run, and nowhere before: output times inside the last steps count
+/// all the same, however far off the end is that the scene asks for.
+#[test]
+fn estimates_cover_the_steps_before_an_event_ends_the_run() {
+    let text = r#"{"name": "slow", "gravity": [0, 0], "until": 500, "every": 0.01,
+        "bars": [{"name": "block", "mass": 1, "centre": [0, 0], "inertia": 1, "length": 1}],
+        "sliders": [{"name": "rail", "point": {"body": "block", "point": [0, 0]}, "angle": "locked",
+                     "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+        "points": [{"name": "p", "body": "block", "point": [0, 0]}],
+        "outputs": {"x": "p.x"},
+        "forces": [{"name": "pull", "body": "block", "point": [0, 0], "force": ["-4*p.x", 0]}],
+        "events": [{"name": "there", "when": "p.x + LEVEL", "action": "stop"}],
+        "start": {"block": {"phi": 0, "omega": 0, "origin": [1, 0], "velocity": [0, 0]}}}"#;
+    for (name, tolerance, level) in [
+        ("taylor", 1e-4, "0.3"),
+        ("taylor", 1e-5, "0.5"),
+        ("dp8", 1e-4, "0.5"),
+        ("dp8", 1e-7, "0.5"),
+        ("dp5", 1e-4, "0.5"),
+        ("radau9", 1e-5, "0.5"),
+    ] {
+        let scene = parse_scene(&text.replace("LEVEL", level), "slow", &[]).expect("a scene");
+        let simulation = Simulation::new(&scene).expect("equations").method(method(name).expect("one"));
+        let mut off = 0.0_f64;
+        let simulation = simulation.tolerance(tolerance, tolerance).trust(Level::Auto);
+        let outcome = simulation.run_with(|sample| {
+            off = off.max((sample.outputs[0] - (2.0 * sample.t).cos()).abs());
+            Ok(())
+        });
+        let outcome = outcome.expect("a run");
+        assert_eq!(outcome.ended_by.as_deref(), Some("there"), "{name}");
+        let estimate = outcome.trust.expect("an estimate").error_estimate.expect("a figure");
+        println!("{name} at {tolerance:e}: off by {off:.1e}, estimate {estimate:.1e}");
+        assert!(
+            off > 1e-13 && estimate > off / 3.0 && estimate < 10.0 * off,
+            "{name}: {off:e}, {estimate:e}"
+        );
+    }
+}
+
 /// The impact of a falling bar makes the event happen that ends the run, at phi = -asin 0.8; its reference may not be
 /// there yet, and moving it to where omega = 0.2 makes no sense.
 #[test]

@@ -318,7 +318,9 @@ impl ErrorEstimator {
         let mut gap = share * reference_run.mean_step(t);
         let is_polynomial = matches!(self.run.method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Radau(_));
         if is_polynomial && measured.lost.is_none() {
-            gap = gap.min((INSIDE * t / statistics.steps.max(1) as f64).max(until / LOOKS_INSIDE));
+            // Where an event may end the run, nobody knows how long it is.
+            let length = if self.mechanism.has_stops() { t } else { until };
+            gap = gap.min((INSIDE * t / statistics.steps.max(1) as f64).max(length / LOOKS_INSIDE));
         }
         // Units are powers of 1024: in those of slow mechanisms a whole run may be short.
         let first = (FIRST * self.mechanism.units.time).min(until / LOOKS_INSIDE);

@@ -221,10 +221,16 @@ impl ReferenceRun {
             left = left.saturating_sub(1);
             left == 0
         };
-        let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
-        let arrived = arrived.map_err(|stop| {
-            Some(format!("the reference solution stopped at t = {} s: {}", figure(stop.t), stop.what))
-        })?;
+        let arrived = loop {
+            let arrived = self.contact_driver.go(until, &mut self.outcome, &mut is_spent);
+            let arrived = arrived.map_err(|stop| {
+                Some(format!("the reference solution stopped at t = {} s: {}", figure(stop.t), stop.what))
+            })?;
+            // Where an event ends the run, the reference solution may have come to it before.
+            if self.contact_driver.ended_by.take().is_none() {
+                break arrived;
+            }
+        };
         let is_paid = arrived && *budget.spent <= budget.limit;
         // Where another series goes on, this is where it begins.
         self.contact_driver.look(&mut self.motion);
