@@ -898,6 +898,24 @@ fn runs_with_gears_have_companions_that_are_finer() {
     }
 }
 
+/// Where the series in double-double is used up, another in doubles goes on that is no finer than the run: what it is
+/// off by itself is counted, and no bound is told.  Against the series in double-double all the way.
+#[test]
+fn companions_that_are_no_finer_than_their_run_give_no_bound() {
+    let text = r#"{"name": "sprung", "gravity": [0, -9.81], "until": 64, "every": 0.5,
+        "bars": [{"name": "bar", "mass": 0.32, "centre": [0.45, 0], "inertia": 0.01204, "length": 0.69}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "springs": [{"name": "s", "between": [{"body": "bar", "point": [0.69, 0]}, {"body": "ground",
+            "point": [0.499, 1.137]}], "stiffness": 35.5, "free_length": 0.48}],
+        "start": {"bar": {"phi": -1.198, "omega": -0.013}}}"#;
+    let scene = driftless::scene::parse_scene(text, "sprung.json", &[]).expect("a scene");
+    let of = |level| trusted(&scene, &asked("taylor", 1e-15, 64.0, 0.5), level).trust.expect("asked for");
+    let both = [Level::Auto, Level::Full].map(of);
+    assert!(both[0].error_estimator.as_ref().is_some_and(|name| name.contains("s on taylor at 1e-15")));
+    let [told, truth] = both.map(|trust| (trust.is_upper_bound, trust.error_estimate.expect("a figure")));
+    assert!(!told.0 && told.1 > 0.5 * truth.1 && told.1 < 5.0 * truth.1, "{told:?} for {truth:?}");
+}
+
 #[test]
 fn the_reason_for_no_estimate_is_told() {
     let path =

@@ -329,18 +329,10 @@ impl ErrorEstimator {
 
     /// Measures how far the run and its reference solution are apart.
     fn measure(&mut self, motion: &Motion) {
-        let Self { mechanism, metric, measured, events, reference_run: Some(reference_run), torques, .. } =
-            self
-        else {
-            return;
-        };
-        let rounding = reference_run
-            .tangent
-            .as_ref()
-            .filter(|_| reference_run.is_rounded)
-            .map_or(0.0, TangentFlow::rounding);
+        let Self { mechanism, metric, measured, events, torques, run, .. } = self;
+        let Some(reference_run) = &self.reference_run else { return };
         let apart = metric.apart(motion, &reference_run.motion);
-        let own = rounding.hypot(reference_run.own_error(motion.time.hi));
+        let own = reference_run.own_error(motion.time.hi, run, measured);
         // It is there for differences that are small by chance.
         let angle = apart.hypot(own.min(MOST_OWN_ERROR * apart.max(measured.error)));
         let rate = (measured.tells_rates([*events, reference_run.events()]))

@@ -107,19 +107,20 @@ fn in_doubles(mechanism: &Mechanism, run: &Plan) -> Finer {
 }
 
 /// A series in doubles, of another order than a run that is a series itself.
-fn in_doubles_at(mechanism: &Mechanism, run: &Plan, tolerance: f64) -> Finer {
-    let mut finer = series(mechanism, run, tolerance, [false; 2]);
+fn in_doubles_at(mechanism: &Mechanism, run: &Plan, at: f64) -> Finer {
+    let mut finer = series(mechanism, run, at, [false; 2]);
     let order = |plan: &Plan| {
         let is_series = plan.method == MethodId::Taylor;
         is_series.then(|| plan.series(plan.tolerance.unwrap_or_default()).order)
     };
-    // At the least tolerance it is rounding that they differ by.
-    if let Some(own) = order(run).filter(|_| tolerance > FINEST)
+    let is_no_coarser = tolerance(run).is_some_and(|own| own <= at);
+    // At the least tolerance it is rounding that they differ by, where the run's is another.
+    if let Some(own) = order(run).filter(|_| at > FINEST || is_no_coarser)
         && order(&finer.plan) == Some(own)
     {
         let tree = &mechanism.tree;
         let is_near = || tree.is_dense() && run.until * tree.fastest_rate(&mechanism.springs) < NEAR;
-        let higher = if mechanism.is_switched() || is_near() { HIGHER } else { 0 };
+        let higher = if is_no_coarser || mechanism.is_switched() || is_near() { HIGHER } else { 0 };
         finer.plan.order = Some((own + higher).max(ANOTHER_ORDER));
     }
     finer
@@ -182,12 +183,22 @@ fn series(
     Finer { name: format!("taylor at {:.0e}{digits}", tolerance.relative), plan }
 }
 
-/// Whether the difference from a reference solution may be mostly the error of that, so that the run is off by
-/// no more.
+/// Whether the difference from a reference solution is mostly the error of that, so that the run is off by no
+/// more: not where both are alike.
 pub(super) fn is_bound(series: &Plan, run: &Plan) -> bool {
-    // Beside a series at its own tolerance the classic pairs are tens of times as far off.
-    let is_coarser = || run.method == MethodId::Taylor && tolerance(run) <= tolerance(series);
-    is_rounded(series) || series.method != MethodId::Taylor && is_coarser()
+    if series.method != MethodId::Taylor {
+        // Beside a series at its own tolerance the classic pairs are tens of times as far off.
+        return run.method == MethodId::Taylor && tolerance(run) <= tolerance(series);
+    }
+    is_rounded(series) && !is_alike(series, run)
+}
+
+/// Whether a reference solution is a series in doubles hardly finer than its run, which is one, too.
+pub(super) fn is_alike(series: &Plan, run: &Plan) -> bool {
+    is_rounded(series)
+        && run.method == MethodId::Taylor
+        && !run.extended
+        && tolerance(run).is_some_and(|own| own <= FINE)
 }
 
 /// What a reference solution in doubles may be off by in each second \[rad/s\], where that may be as much as

@@ -179,11 +179,13 @@ impl TrustMeasurement {
     /// how it grows.
     fn inputs_at(&self, t: f64, is_chaotic: bool) -> Option<f64> {
         let [until, reach] = self.stopped.filter(|[until, _]| is_chaotic || *until >= 0.5 * t)?;
-        let error = |t: f64| {
-            self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST))
-        };
-        let grown = if t >= self.until { self.error } else { error(t) };
-        (t <= self.until).then(|| reach * (grown / error(until)).max(1.0))
+        let grown = if t >= self.until { self.error } else { self.error_at(t) };
+        (t <= self.until).then(|| reach * (grown / self.error_at(until)).max(1.0))
+    }
+
+    /// E at a time that was passed \[s\].
+    pub(super) fn error_at(&self, t: f64) -> f64 {
+        self.record.iter().take_while(|look| look[0] <= t).last().map_or(LEAST, |look| look[1].max(LEAST))
     }
 
     /// Keeps the estimate of this time.

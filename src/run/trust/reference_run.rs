@@ -1,7 +1,8 @@
 //! A reference solution under way: the series, and the tangent flow along it.
 
 use super::budget::Prices;
-use super::finer::{is_rounded, own_error};
+use super::finer::{is_alike, is_rounded, own_error};
+use super::measured::TrustMeasurement;
 use super::tangent::{Path, TangentFlow};
 use crate::arithmetic::shown::figure;
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -173,8 +174,17 @@ impl ReferenceRun {
     }
 
     /// What its motion at `t` \[s\] may be off by itself \[rad\], where that may be as much as the run is.
-    pub(super) fn own_error(&self, t: f64) -> f64 {
-        own_error(self.plan()) * (t - self.begun)
+    pub(super) fn own_error(&self, t: f64, run: &Plan, measured: &TrustMeasurement) -> f64 {
+        let time = t - self.begun;
+        let least = own_error(self.plan()) * time;
+        match &self.tangent {
+            Some(tangent) if self.is_rounded => tangent.rounding().hypot(least),
+            // A series like that of the run comes to in its time what the run had come to before.
+            None if self.begun > 0.0 && is_alike(self.plan(), run) => {
+                least.max(measured.error_at(self.begun) * (time / self.begun).powi(2))
+            }
+            _ => least,
+        }
     }
 
     /// The mean length of its steps \[s\], of those up to `t` \[s\]; where they end at every look it has no
