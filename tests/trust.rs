@@ -898,6 +898,18 @@ fn runs_with_gears_have_companions_that_are_finer() {
     }
 }
 
+/// The mean force of a vibration has no series, and `dp8` at the least tolerance of its references would be judged by
+/// itself.
+#[test]
+fn no_run_is_judged_by_its_own_method_at_its_own_tolerance() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/stress/spring_rigid_1e8.json");
+    let scene = driftless::scene::read_scene(&path, &[]).expect("a shipped scene");
+    for (rtol, companion) in [(1e-13, "dp8 at 1e-14"), (1e-14, "radau9 at 1e-14")] {
+        let trust = trusted(&scene, &asked("dp8", rtol, 0.5, 0.1), Level::Auto).trust.expect("asked for");
+        assert_eq!((trust.error_estimator.as_deref(), trust.is_upper_bound), (Some(companion), false));
+    }
+}
+
 /// Where the series in double-double is used up, another in doubles goes on that is no finer than the run: what it is
 /// off by itself is counted, and no bound is told.  Against the series in double-double all the way.
 #[test]
