@@ -6,8 +6,8 @@ use super::noise::spread;
 
 /// Rms of the residuals of a column, over its noise, from which that is no chance.
 const FAR: f64 = 2.0;
-/// Standard deviations by which a sum of squares must be above its mean as well: of few values such an rms may
-/// be chance.
+/// Standard deviations by which a sum of squares must be above its mean as well: of few values such an rms
+/// may be chance.
 const DEVIATIONS: f64 = 5.0;
 /// Rms of the residuals over the spread of the data where nobody says what the noise is.
 const SHARE: f64 = 0.5;

@@ -141,7 +141,9 @@ pub(super) fn taken(
 
 /// An extreme at a time, on the side of a jump that has it, and its derivatives; or why there are none.
 fn extreme(number: usize, asked: &Query, t: f64, at: &RecordedTime) -> Result<(f64, Vec<f64>), String> {
-    let (Some(output), Some([before, after])) = (asked.output, &at.sides) else { return Err(String::new()) };
+    let (Some(output), Some([before, after])) = (asked.output, &at.sides) else {
+        return Err(format!("the run does not come to the extreme at {t} s"));
+    };
     let value = |side: &Derived| side.values[output];
     let off = |side: &Derived| (value(side) - asked.value).abs();
     let nearer = |one, other| if off(other) < off(one) { other } else { one };
