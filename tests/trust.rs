@@ -7,7 +7,7 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::{Form, Motion, Time};
 use driftless::run::trust::{DistanceMetric, How, Level, TangentFlow};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running, integrate, reference};
-use driftless::scene::Scene;
+use driftless::scene::{Scene, parse_scene};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
@@ -1008,6 +1008,65 @@ fn rates_are_judged_after_bounces_of_another_number() {
         assert!(
             told > off / 3.0 && told < 1000.0 * off.max(1e-10),
             "{method} {rtol:e}: {told:e} for {off:e}"
+        );
+    }
+}
+
+/// A parallelogram folds at every half turn and comes out as one: all of it is a pendulum, its links about their
+/// ends and the coupler carried along.
+#[test]
+fn references_and_extended_series_pass_a_parallelograms_folds() {
+    let bar = |name: &str, length: f64| {
+        format!(
+            r#"{{"name": "{name}", "mass": 1, "centre": [{}, 0], "inertia": 0.25, "length": {length}}}"#,
+            0.5 * length
+        )
+    };
+    let at = |body: &str, x: f64| format!(r#"{{"body": "{body}", "point": [{x}, 0]}}"#);
+    let hinge = |name: &str, a: String, b: String| format!(r#"{{"name": "{name}", "between": [{a}, {b}]}}"#);
+    let scene = |bars: &[String], hinges: &[String], start: &str| {
+        let text = format!(
+            r#"{{"name": "fold", "gravity": [0, -9.81], "bars": [{}], "hinges": [{}],
+                "start": {{"a": {{"phi": 1, "omega": 5}} {start}}}, "until": 2, "every": 1}}"#,
+            bars.join(","),
+            hinges.join(",")
+        );
+        parse_scene(&text, "fold", &[]).expect("a scene")
+    };
+    let folding = scene(
+        &[bar("a", 1.0), bar("k", 2.0), bar("c", 1.0)],
+        &[
+            hinge("O", at("ground", 0.0), at("a", 0.0)),
+            hinge("A", at("a", 1.0), at("k", 0.0)),
+            hinge("B", at("k", 2.0), at("c", 1.0)),
+            hinge("C", at("ground", 2.0), at("c", 0.0)),
+        ],
+        r#", "k": {"phi": 0}, "c": {"phi": 1}"#,
+    );
+    let heavy = r#"{"name": "a", "mass": 4, "centre": [0.5, 0], "inertia": 1, "length": 1}"#.to_owned();
+    let pendulum = scene(&[heavy], &[hinge("O", at("ground", 0.0), at("a", 0.0))], "");
+    let times = [1.0, 2.0].map(Time::from);
+    let [found, exact] = [&folding, &pendulum].map(|scene| {
+        let mechanism = compile(scene);
+        reference(&mechanism, &mechanism.start(scene), &times).expect("a reference")
+    });
+    for ((one, exact), accuracy) in found.motions.iter().zip(&exact.motions).zip(&found.accuracy) {
+        assert_eq!(one.turns[0], exact.turns[0]);
+        let off = (one.phi[0] - exact.phi[0]).hi.abs();
+        // The rates of coupler and rocker at the start are doubles.
+        assert!(off < 1e-15 && *accuracy < 1e-20, "off by {off:.1e} rad, told as {accuracy:.1e}");
+    }
+    let end = exact.motions[1].unwrapped(0);
+    assert!(end.abs() > 3.0 * PI, "{end}");
+    for (rtol, extended) in [(1e-12, false), (1e-20, true)] {
+        let request = Request { extended, ..asked("taylor", rtol, 2.0, 2.0) };
+        let outcome = trusted(&folding, &request, Level::Auto);
+        let off = (outcome.last.phi[0] - end).abs();
+        assert!(outcome.stop.is_none() && off < 1e-9, "{rtol:e}: off by {off:.1e} rad, {:?}", outcome.stop);
+        let trust = outcome.trust.expect("trust");
+        assert!(
+            trust.horizon.is_none() && trust.error_estimate.is_some_and(|error| error < 1e-8),
+            "{trust:?}"
         );
     }
 }

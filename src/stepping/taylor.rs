@@ -221,6 +221,12 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
             }
         }
         state.time = if h == left.hi { until } else { state.time + h };
+        if !T::IS_PLAIN
+            && let Some(passage) = &mut self.singular_passage
+            && self.expansion.as_ref().is_some_and(|expansion| singular::is_near(problem, expansion))
+        {
+            passage.put_back(problem.mechanism(), state);
+        }
         state.wrap();
         statistics.steps += 1;
         Ok(event)
@@ -319,13 +325,13 @@ impl<T: Coefficient> Taylor<T> {
         wanted = if known < wanted { known } else { wanted };
         wanted = expansion.until_reversal(wanted);
         if !problem.mechanism().constraints.is_empty() && singular::is_near(problem, expansion) {
-            let singular_passage = self.singular_passage.get_or_insert_with(|| {
+            let passage = self.singular_passage.get_or_insert_with(|| {
                 SingularPassage::new(problem.mechanism(), problem.coordinates(), expansion)
             });
-            if let Some(through) = singular_passage.length(problem, expansion, state, wanted) {
+            if let Some(through) = passage.length(problem, expansion, state, wanted, self.tolerance) {
                 let whole = through.min(left);
                 expansion.sum_to_smallest(whole);
-                if singular_passage.is_confirmed(problem, expansion, state, whole, self.tolerance) {
+                if passage.is_confirmed(problem, expansion, state, whole, self.tolerance) {
                     // Half of it would end at the singular position.
                     return (through, whole);
                 }

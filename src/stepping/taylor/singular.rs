@@ -7,7 +7,8 @@
 //! through: the share of the weakest constraint ([`rank`](crate::dynamics::rank)), which knows no masses, is
 //! followed along the low powers of the series to its minimum and on to where it is what it was, and the step
 //! ends there.  The series itself is that of a smooth motion; its late powers are noise times d^-k, so that
-//! it is summed to its smallest power only.
+//! it is summed to its smallest power only.  The finer the tolerance, the closer such a step begins: its
+//! powers are those of a shorter way, and noise in double-double lets it.
 //!
 //! Such a step is longer than the powers allow by themselves, so it is made only where it is confirmed: at
 //! its end the constraints and the energy balance hold, and the series about its end leads back to its start.
@@ -41,6 +42,14 @@ const CLOSEST: f64 = 1e-8;
 const HALVINGS: usize = 12;
 /// Largest share of the motion that the smallest power in such a step may have.
 const NOISE: f64 = 1e-6;
+/// Below this tolerance, and in double-double, it is [`ASTRAY`] times the tolerance, so that passages are
+/// little worse than other steps, or what rounding leaves of it: one of these numbers over the share of the
+/// weakest constraint, in doubles and in double-double.  Below what rounding leaves no passage is made:
+/// they are several times what it came to on parallelograms and kites.
+const FINE: f64 = 1e-15;
+const ROUNDING: [f64; 2] = [3e-14, 3e-28];
+/// Iterations in which a state in double-double is put back onto the constraints.
+const ROUNDS: usize = 3;
 /// Largest difference between the start and where the way back leads, over the tolerance; and the limits of
 /// that \[rad\]: a passage a little off is better than steps that end at the singular position, and none is
 /// worth more than this.
@@ -57,13 +66,15 @@ pub struct SingularPassage<T: Coefficient> {
     /// The series about a passage's end.
     back: Expansion<T>,
     end: State,
+    /// What states in double-double are put back onto the constraints with, made when first asked for.
+    exact: Option<Box<Kernel<DoubleDouble>>>,
 }
 
 impl<T: Coefficient> SingularPassage<T> {
     /// For the problem an expansion is of.
     pub fn new(mechanism: &Mechanism, coordinates: Coordinates, expansion: &Expansion<T>) -> Self {
         let back = Expansion::new(mechanism, coordinates, expansion.series().order(), false);
-        Self { kernel: Kernel::new(mechanism), back, end: State::default() }
+        Self { kernel: Kernel::new(mechanism), back, end: State::default(), exact: None }
     }
 
     /// How long a step must be to go through a singular position and come out as far from it as it is now;
@@ -74,6 +85,7 @@ impl<T: Coefficient> SingularPassage<T> {
         expansion: &Expansion<T>,
         state: &State,
         wanted: f64,
+        tolerance: f64,
     ) -> Option<f64> {
         let mechanism = problem.mechanism();
         let (series, n) = (expansion.series(), mechanism.coordinates());
@@ -109,7 +121,8 @@ impl<T: Coefficient> SingularPassage<T> {
             if now < least {
                 (least, fell) = (now, true);
             } else if fell && now >= here {
-                return (h > wanted && least < FALL * here && expansion.smallest(h) < NOISE).then_some(h);
+                let is_summed = expansion.smallest(h) < noise::<T>(tolerance, here);
+                return (h > wanted && least < FALL * here && is_summed).then_some(h);
             } else if !fell && now > here {
                 return None;
             }
@@ -117,9 +130,9 @@ impl<T: Coefficient> SingularPassage<T> {
         None
     }
 
-    /// Of a step from `start` to the time `end` that ends far closer to a singular position than it began, the
-    /// end of that part which leads to where passages are looked for, or closer by a little; `inside` writes
-    /// states inside the step.
+    /// Of a step from `start` to the time `end` that ends far closer to a singular position than it began,
+    /// the end of that part which leads to where passages are looked for, or closer by a little; `inside`
+    /// writes states inside the step.
     pub fn before(
         &mut self,
         mechanism: &Mechanism,
@@ -147,6 +160,33 @@ impl<T: Coefficient> SingularPassage<T> {
         Some(start.time + near)
     }
 
+    /// Puts a state in double-double back onto all constraints, as no projection does there: what it is off
+    /// them grows as the inverse of the distance from a singular position, and with every passage.
+    pub fn put_back(&mut self, mechanism: &Mechanism, state: &mut State) {
+        let n = mechanism.coordinates();
+        let kernel = self.exact.get_or_insert_with(|| Box::new(Kernel::new(mechanism)));
+        for round in 0..=ROUNDS {
+            let unknowns: Vec<_> = (0..2 * n).map(|i| state.unknown(i)).collect();
+            let (phi, omega) = unknowns.split_at(n);
+            kernel.linearise_at::<0>(mechanism, state.time, phi, omega);
+            if kernel.weakest.share < CLOSEST {
+                return;
+            }
+            // Rates come last, where the position is.
+            let from = if round == ROUNDS { n } else { 0 };
+            for r in 0..mechanism.constraints.len() {
+                kernel.multiplier[r] =
+                    if from == n { kernel.row_rate(r, omega) } else { kernel.rows[r].position };
+            }
+            kernel.solve_rows();
+            kernel.multiplier_accelerations();
+            for (k, &change) in kernel.load.iter().enumerate() {
+                let corrected = unknowns[from + k] - change;
+                (state.y[from + k], state.low[from + k]) = (corrected.hi, corrected.lo);
+            }
+        }
+    }
+
     /// True where a step of `h` \[s\], as it is summed, keeps the constraints and the energy balance, and the
     /// series about its end leads back.
     pub fn is_confirmed<P: Form + ?Sized>(
@@ -157,7 +197,7 @@ impl<T: Coefficient> SingularPassage<T> {
         h: f64,
         tolerance: f64,
     ) -> bool {
-        let Self { kernel, back, end } = self;
+        let Self { kernel, back, end, .. } = self;
         let mechanism = problem.mechanism();
         let n = mechanism.coordinates();
         let limit = (ASTRAY * tolerance).clamp(LIMITS[0], LIMITS[1]);
@@ -191,6 +231,16 @@ impl<T: Coefficient> SingularPassage<T> {
             off.abs() <= limit * size
         })
     }
+}
+
+/// Largest share of the motion that the smallest power may have at a tolerance, where the weakest constraint
+/// has this share.
+fn noise<T: Coefficient>(tolerance: f64, share: f64) -> f64 {
+    if T::IS_PLAIN && tolerance >= FINE {
+        return NOISE;
+    }
+    let rounding = ROUNDING[usize::from(!T::IS_PLAIN)] / share;
+    (ASTRAY * tolerance).max(rounding).min(NOISE)
 }
 
 /// True where a singular position may be ahead.
