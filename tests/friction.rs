@@ -2,7 +2,7 @@
 
 use super::formulas::{adaptive, run, scene};
 use driftless::Mechanism;
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Running, integrate};
 use driftless::scene::Scene;
 use driftless::stepping::Cause;
 use nalgebra::{DMatrix, DVector, Vector2};
@@ -1124,4 +1124,35 @@ fn random_scenes_agree_between_methods_and_lose_energy_as_coulomb_says() {
     );
     assert!(compared > count / 2 && transitions > count && impacts > count / 10 && resting > 0);
     assert!(!stops.contains_key(Cause::NotFinite.word()));
+}
+
+/// A crank-slider whose crank sticks: what else could slide has velocities that are rounding, which no
+/// interpolant resolves and which do not oscillate.
+#[test]
+fn a_mechanism_held_at_rest_is_searched_once() {
+    let scene = scene(
+        r#"{"name": "crank",
+        "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 2.116, "centre": [0.0905, 0], "inertia": 0.0441, "length": 0.181},
+            {"name": "b", "mass": 1.332, "centre": [0.3569, 0], "inertia": 0.0713, "length": 0.607}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}], "friction": {"radius": 0.095, "kinetic": 0.491, "static": 0.8347}},
+            {"name": "A", "between": [{"body": "a", "point": [0.181, 0]}, {"body": "b", "point": [0, 0]}], "friction": {"radius": 0.105, "kinetic": 0.128}}],
+        "sliders": [{"name": "P", "point": {"body": "b", "point": [0.607, 0]}, "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}, "friction": {"kinetic": 0.485, "static": 0.6305}}],
+        "torsion_springs": [{"name": "ts_b", "body": "b", "stiffness": 5.5, "free_angle": -1.505, "damping": 0.376}],
+        "start": {"a": {"phi": -0.356, "omega": 0.0}, "b": {"phi": 0.10411474894348223, "omega": 0.0}},
+        "until": 2.0,
+        "every": 1}"#,
+    );
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(3), MethodId::Radau(5)] {
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("a mechanism"));
+        let plan = Plan::new(&scene, &mechanism, &Request { method: Some(method), ..Request::default() })
+            .expect("a plan");
+        let start = mechanism.start(&scene);
+        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run");
+        let outcome = integrate(run, &mut |_| Ok(())).expect("samples");
+        assert_eq!((outcome.stop, outcome.last.t), (None, 2.0), "{method}");
+        let off =
+            (0..2).map(|k| (outcome.last.phi[k] - start.unwrapped(k)).abs().max(outcome.last.omega[k].abs()));
+        assert!(off.fold(0.0, f64::max) < 1e-12, "{method}: {:?}", outcome.last);
+    }
 }

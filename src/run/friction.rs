@@ -44,6 +44,8 @@ pub(super) struct FrictionWatch {
     kernel: RefCell<Kernel<f64>>,
     /// The regularity at the first place of the search under way, where it is far from zero.
     regularity: Cell<Option<f64>>,
+    /// The largest `(mu0 N)² + tau²` of every place that sticks in the search under way.
+    forces: RefCell<Vec<f64>>,
 }
 
 impl FrictionWatch {
@@ -55,6 +57,7 @@ impl FrictionWatch {
             kernel: kernel(),
             mechanism,
             regularity: Cell::new(None),
+            forces: RefCell::default(),
         })
     }
 
@@ -77,9 +80,22 @@ impl FrictionWatch {
         }
     }
 
+    /// The size of what a function's values are differences of: changes that are small beside it may be
+    /// rounding.  After [`values`](Self::values).
+    pub fn size(&self, function: usize) -> f64 {
+        match self.mechanism.modes.get(function) {
+            Some(FrictionMode::Slip(_) | FrictionMode::Strained(_)) => self.mechanism.speed_unit(function),
+            Some(FrictionMode::Stick(_)) => self.forces.borrow().get(function).copied().unwrap_or(0.0),
+            _ => 0.0,
+        }
+    }
+
     /// Begins to search a part of a step.
     pub fn search(&self) {
         self.regularity.set(None);
+        let mut forces = self.forces.borrow_mut();
+        forces.clear();
+        forces.resize(self.mechanism.frictions.len(), 0.0);
     }
 
     /// Relative velocities of what slides, which take no forces.
@@ -133,7 +149,7 @@ impl FrictionWatch {
         } else {
             Vec::new()
         };
-        let mut rows = kernel.friction_rows.chunks_exact(n);
+        let (mut rows, mut sizes) = (kernel.friction_rows.chunks_exact(n), self.forces.borrow_mut());
         let of_place = |(number, (friction, mode)): (usize, (&CompiledFriction, &FrictionMode))| match mode {
             FrictionMode::Open => 1.0,
             FrictionMode::Slip(_) | FrictionMode::Strained(_) => {
@@ -142,6 +158,9 @@ impl FrictionWatch {
             FrictionMode::Stick(_) => {
                 let [tau, pressing] = forces[number];
                 let most = friction.stiction * pressing;
+                if let Some(size) = sizes.get_mut(number) {
+                    *size = size.max(most * most + tau * tau);
+                }
                 most * most - tau * tau
             }
         };

@@ -151,10 +151,13 @@ impl EventDetector {
             false => !has_values(event),
         };
         let are_resolved: Vec<bool> = curves.iter().enumerate().map(is_resolved).collect();
-        let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
+        let (angles, part, first) = (self.mechanism.bodies.len(), (begin, span), self.before_friction());
         let unresolved = || (0..curves.len()).filter(|&event| !are_resolved[event]);
         let oscillate = || {
-            let size = |event: usize| self.memory.largest[event].max(curves[event].most());
+            let size = |event: usize| {
+                let of_parts = self.friction.iter().map(|watch| watch.size(event.wrapping_sub(first)));
+                of_parts.fold(self.memory.largest[event].max(curves[event].most()), f64::max)
+            };
             unresolved().any(|event| oscillates(&values[event], size(event)))
         };
         let has_border = unresolved().any(|event| !curves[event].most().is_finite());
