@@ -10,6 +10,7 @@ use driftless::dynamics::kernel::{Bias, Kernel};
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::{Natural, NaturalError};
 use driftless::dynamics::{Form, Motion, OdeSystem, State, Time};
+use driftless::run::{MethodId, Plan, Request};
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Sine, Start, Wall};
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
@@ -340,6 +341,39 @@ fn scenes_without_a_natural_form_are_refused_by_name() {
     thin.bars[1].inertia = 0.0;
     thin.start[1].phi = 0.0;
     assert_eq!(refused(&thin), NaturalError::Singular("bar2".into()));
+}
+
+/// A force of a formula that acts on some of its branches only is judged before the first step.
+#[test]
+fn laws_are_judged_on_all_branches() {
+    let refusal = |more: &str| {
+        let scene = crate::formulas::scene(&format!(
+            r#"{{"name": "stopper", "gravity": [0, -9.81], "bars": [{{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "bar", "point": [0, 0]}}]}}],
+            "points": [{{"name": "tip", "body": "bar", "point": [1, 0]}}],
+            "start": {{"bar": {{"phi": -0.3, "omega": 0}}}}, "until": 3, "every": 1, {more}}}"#
+        ));
+        let method = Some(MethodId::Rattle(Composition::Single));
+        let request = Request { method, step: Some(0.0025), ..Request::default() };
+        Plan::new(&scene, &compile(&scene), &request).err().map(|refusal| refusal.to_string())
+    };
+    let many: Vec<String> = (0..10).map(|k| format!("max(0, tip.x - {k})")).collect();
+    for law in [
+        "if(tip.y < -0.8, 500*(-0.8 - tip.y), 0)",
+        "if(tip.y < -0.8, if(t > 1, 5, 0), 0)",
+        "-100*max(0, -0.9 - tip.y)",
+        &format!("if(tip.y < -2, 1, 0)*({})", many.join(" + ")),
+    ] {
+        let force = format!(
+            r#""forces": [{{"name": "floor", "body": "bar", "point": [1, 0], "force": [0, "{law}"]}}]"#
+        );
+        let told = refusal(&force).unwrap_or_else(|| panic!("{law} is taken"));
+        assert!(told.contains("`floor`"), "{told}");
+    }
+    let of_place = r#""potentials": [{"name": "floor", "energy": "250*max(0, -0.8 - tip.y)^2"}]"#;
+    assert_eq!(refusal(of_place), None);
+    let of_turns = r#""potentials": [{"name": "floor", "energy": "1*max(0, -0.8 - tip.y)^2*bar.phi"}]"#;
+    assert!(refusal(of_turns).is_some_and(|told| told.contains("`floor`")));
 }
 
 // -----------------------------------------------------------------------------------------------------------------

@@ -15,6 +15,27 @@ const BRANCHES: usize = 8;
 const A_MOMENT: f64 = 1e-7;
 const A_WHILE: f64 = 1e-5;
 
+/// Conditions of which all combinations are tried; of more, each alone.
+const COMBINED: usize = 8;
+
+/// The branches on which laws are tried: all of few conditions; of many those where one condition differs
+/// from what all are now, from all false and from all true.
+fn branches(modes: &[bool]) -> Vec<Vec<bool>> {
+    let n = modes.len();
+    if n <= COMBINED {
+        return (0..1_usize << n).map(|bits| (0..n).map(|k| bits >> k & 1 == 1).collect()).collect();
+    }
+    let mut all = vec![modes.to_vec(), vec![false; n], vec![true; n]];
+    for base in all.clone() {
+        all.extend((0..n).map(|k| {
+            let mut modes = base.clone();
+            modes[k] = !modes[k];
+            modes
+        }));
+    }
+    all
+}
+
 /// A motion so much later \[s\], at these accelerations; those that are not given are zero.
 fn later(motion: &Motion, h: f64, accelerations: &[f64]) -> Motion {
     let mut later = motion.clone();
@@ -28,6 +49,18 @@ fn later(motion: &Motion, h: f64, accelerations: &[f64]) -> Motion {
 }
 
 impl Mechanism {
+    /// The name of a law that acts and has no potential of positions alone, on the present branches or on
+    /// others.
+    pub(crate) fn law_without_potential(&self) -> Option<&str> {
+        let laws = self.laws.as_ref().filter(|laws| !laws.modes.is_empty())?;
+        let acting = |name: &str| self.forces.iter().find(|force| force.name == name);
+        branches(&laws.modes).into_iter().find_map(|modes| {
+            let forces = laws.formulas.record(&laws.parameters, &modes).ok()?;
+            let mut without = forces.iter().filter(|force| !force.is_potential_of_place());
+            without.find_map(|force| acting(&force.name)).map(|force| force.name.as_str())
+        })
+    }
+
     /// The mechanism without some of its springs, torsion springs, applied forces, torques, motors, locks and
     /// walls, and with some of its hinges released, by name; these must be closed by rows.
     ///

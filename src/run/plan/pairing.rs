@@ -5,7 +5,7 @@ use crate::arithmetic::shown::{about, estimate};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::DENSE_LIMIT;
 use crate::dynamics::force::Vibration;
-use crate::dynamics::natural::Natural;
+use crate::dynamics::natural::{Natural, NaturalError};
 use crate::run::methods::{MethodId, Stabilization};
 
 /// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a
@@ -53,8 +53,12 @@ pub(super) fn pair(
             "--method dop853, or gauss16 for a fixed step",
         ));
     }
+    let on_branches = || match mechanism.law_without_potential() {
+        Some(name) => Err(NaturalError::Applied(name.to_owned())),
+        None => Natural::new(std::sync::Arc::new(mechanism.clone())),
+    };
     if matches!(method, MethodId::Rattle(_))
-        && let Err(error) = Natural::new(std::sync::Arc::new(mechanism.clone()))
+        && let Err(error) = on_branches()
     {
         return Err(mismatch(
             format!("{method} on this scene"),
