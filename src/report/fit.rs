@@ -13,7 +13,8 @@ pub fn options(found: &Fit) -> String {
     set.collect::<Vec<_>>().join(" ")
 }
 
-/// One object: `numbers`, `covariance`, `columns`, `chi_square`, `degrees_of_freedom`, `ended`, `doubts`, `set`.
+/// One object: `numbers`, `covariance`, `columns`, `chi_square`, `degrees_of_freedom`, `ended`, `doubts`,
+/// `set`.
 pub fn object(found: &Fit) -> Value {
     json!({
         "scene": found.scene.name,

@@ -17,8 +17,8 @@ pub(super) fn doubts(columns: &[FittedColumn]) -> Option<String> {
     let found: Vec<String> = columns.iter().filter_map(doubt).collect();
     (!found.is_empty()).then(|| {
         format!(
-            "{}: the scene does not explain the data with these numbers; other guesses or --segments may lead \
-                to a lower minimum",
+            "{}: the scene does not explain the data with these numbers; other guesses or --segments may \
+                lead to a lower minimum",
             found.join(", ")
         )
     })
