@@ -40,14 +40,12 @@ const CLOSER: f64 = 1.0 / 16.0;
 const CLOSEST: f64 = 1e-8;
 /// Halvings of the time in which a shorter step is looked for.
 const HALVINGS: usize = 12;
-/// Largest share of the motion that the smallest power in such a step may have.
-const NOISE: f64 = 1e-6;
-/// Below this tolerance, and in double-double, it is [`ASTRAY`] times the tolerance, so that passages are
-/// little worse than other steps, or what rounding leaves of it: one of these numbers over the share of the
-/// weakest constraint, in doubles and in double-double.  Below what rounding leaves no passage is made:
-/// they are several times what it came to on parallelograms and kites.
-const FINE: f64 = 1e-15;
+/// Largest share of the motion that the smallest power in such a step may have: [`ASTRAY`] times the
+/// tolerance, so that passages are little worse than other steps, or what rounding leaves, one of these
+/// numbers over the share of the weakest constraint, in doubles and in double-double; at most [`NOISE`].
+/// Below rounding no passage is made: they are several times what it came to on parallelograms and kites.
 const ROUNDING: [f64; 2] = [3e-14, 3e-28];
+const NOISE: f64 = 1e-6;
 /// Iterations in which a state in double-double is put back onto the constraints.
 const ROUNDS: usize = 3;
 /// Largest difference between the start and where the way back leads, over the tolerance; and the limits of
@@ -236,9 +234,6 @@ impl<T: Coefficient> SingularPassage<T> {
 /// Largest share of the motion that the smallest power may have at a tolerance, where the weakest constraint
 /// has this share.
 fn noise<T: Coefficient>(tolerance: f64, share: f64) -> f64 {
-    if T::IS_PLAIN && tolerance >= FINE {
-        return NOISE;
-    }
     let rounding = ROUNDING[usize::from(!T::IS_PLAIN)] / share;
     (ASTRAY * tolerance).max(rounding).min(NOISE)
 }
