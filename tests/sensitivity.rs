@@ -729,6 +729,37 @@ fn what_makes_no_sense_is_told() {
     }
 }
 
+/// A rotor that a spring k (phi - 0.1)^p sends back: it returns at the speed it came with, and is in contact for a time
+/// T ~ (J/k)^(1/(p+1)) w^((1-p)/(1+p)).
+#[test]
+fn a_spring_of_a_fractional_power_is_derived_through_its_zeros() {
+    for (p, tolerance) in [(0.5, 1e-8), (0.25, 1e-6)] {
+        let text = r#"{"name": "back", "gravity": [0, 0], "parameters": {"k": 30},
+            "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "torsion_springs": [{"name": "t", "body": "b", "torque": "k*max(0, angle - 0.1)^POWER"}],
+            "events": [{"name": "out", "when": "b.phi - 0.1", "direction": "falling"}],
+            "start": {"b": {"phi": 0, "omega": 1.7}}, "until": 2, "every": 1}"#;
+        let to = ["k", "b.omega", "b.phi"];
+        let template = template(&text.replace("POWER", &p.to_string()));
+        let found = derived(&template, &["event:out", "b.omega", "b.phi"], &to, 2.0);
+        let (k, w) = (30.0, 1.7);
+        let (out, contact) = (found.measures[0].value, found.measures[0].value - 0.1 / w);
+        let by_k = -contact / (p + 1.0) / k;
+        let by_w = -0.1 / (w * w) + (1.0 - p) / (1.0 + p) * contact / w;
+        let expected = [[by_k, by_w, -1.0 / w], [0.0, -1.0, 0.0], [w * by_k, w * by_w - (2.0 - out), -1.0]];
+        for (measure, expected) in found.measures.iter().zip(expected) {
+            for ((slope, expected), to) in measure.slopes.iter().zip(expected).zip(to) {
+                let off = (slope - expected).abs();
+                assert!(off <= tolerance, "{p}: {} by {to}: {slope} for {expected}", measure.name);
+            }
+        }
+        // The last digits of the angle count for more the smaller the power is.
+        let told = found.inputs.iter().map(|input| input.error).fold(0.0, f64::max);
+        assert!(told <= 1e-4 && (p > 0.4 || told >= 1e-7), "{p}: {told:e}");
+    }
+}
+
 /// A point that flies at (2, 3) m/s up to x = 1: the largest y is the last one, 3/2, and moves with the end.
 #[test]
 fn an_extreme_as_an_event_ends_the_run_moves_with_the_event() {

@@ -61,6 +61,11 @@ impl Step<'_> {
         (begin, (end - begin).hi)
     }
 
+    /// Its beginning and its end with the digits beyond a double.
+    pub(super) fn ends(&self) -> (Time, Time) {
+        self.0.span()
+    }
+
     /// The motion at a time with the digits beyond a double: in doubles the time of a short step late in a
     /// run has lost so many that the motion at it is no polynomial.
     pub(super) fn at_time(&mut self, time: Time) -> &Motion {

@@ -20,6 +20,20 @@ use crate::stepping::gauss::collocation;
 /// Stages.
 pub(super) const STAGES: usize = 6;
 
+/// Degrees from the last coefficient known to that of the error.
+const FALLS: i32 = STAGES as i32 + 1;
+
+/// How far a step is from being resolved.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Tails {
+    /// The last Legendre coefficient of K over the size of what is integrated.
+    pub last: f64,
+    /// What the step leaves, over the size of rates, to which dq counts over the unit of time or a step that
+    /// is longer: the coefficient of degree 12, as far as those of degree 3 to 5 fall.  Next to a pole or a
+    /// corner they hardly do.
+    pub rough: f64,
+}
+
 /// The method with its scratch space.
 pub(super) struct Collocation {
     /// Nodes in a step of length 1.
@@ -27,8 +41,8 @@ pub(super) struct Collocation {
     pub weights: Vec<f64>,
     /// a, and a a.
     coupling: [Vec<f64>; 2],
-    /// What the last Legendre coefficient takes of every stage.
-    last: Vec<f64>,
+    /// What the last three Legendre coefficients take of every stage.
+    last: [Vec<f64>; 3],
     system: Vec<f64>,
 }
 
@@ -39,59 +53,71 @@ impl Collocation {
             (0..STAGES).map(|j| coupling[k / STAGES * STAGES + j] * coupling[j * STAGES + k % STAGES]).sum()
         };
         let square = (0..STAGES * STAGES).map(entry).collect();
-        let degree = STAGES - 1;
-        let last = (nodes.iter().zip(&weights))
-            .map(|(node, weight)| (2 * degree + 1) as f64 * weight * legendre(degree, 2.0 * node - 1.0))
-            .collect();
+        let last = [STAGES - 3, STAGES - 2, STAGES - 1].map(|degree| {
+            (nodes.iter().zip(&weights))
+                .map(|(node, weight)| (2 * degree + 1) as f64 * weight * legendre(degree, 2.0 * node - 1.0))
+                .collect()
+        });
         Self { nodes, weights, coupling: [coupling, square], last, system: Vec::new() }
     }
 
-    /// Takes columns (dq, dw) of n coordinates through a step; `pull` has B and C at the nodes, n × 2n row by
+    /// Solves for a step of columns (dq, dw) of n coordinates; `pull` has B and C at the nodes, n × 2n row by
     /// row, one node after the other, `forcing` F of every column, node by node, empty for columns without.
     ///
-    /// `floors` are sizes of columns below which they need not be resolved.  Returns the last coefficient
-    /// over the size of what is integrated, and leaves the columns alone where it is above `limit`; NaN where
-    /// there is no solution.
-    pub fn step(
+    /// `floors` are sizes of columns below which they need not be resolved.  `None` where there is no
+    /// solution.
+    pub fn solve(
         &mut self,
-        h: f64,
+        (h, unit): (f64, f64),
         pull: &[f64],
-        columns: &mut [Vec<f64>],
+        columns: &[Vec<f64>],
         (forcing, floors): (&[Vec<f64>], &[f64]),
-        limit: f64,
-    ) -> f64 {
-        let Some(n) = columns.first().map(|column| column.len() / 2) else { return 0.0 };
+    ) -> Option<Tails> {
+        let mut tails = Tails::default();
+        let Some(n) = columns.first().map(|column| column.len() / 2) else { return Some(tails) };
         let (size, width) = (STAGES * n, STAGES * n + columns.len());
         self.fill(n, h, pull, columns, forcing);
         if !eliminate(size, width, &mut self.system) {
-            return f64::NAN;
+            return None;
         }
-        let Self { nodes, weights, last, system, .. } = self;
+        let Self { last, system, .. } = self;
         let stage = |i: usize, row: usize, k: usize| system[(i * n + row) * width + size + k];
-        let mut tail = 0.0_f64;
         for (k, (column, floor)) in columns.iter().zip(floors).enumerate() {
-            let (mut left, mut whole) = (0.0_f64, 0.0_f64);
+            let (mut left, mut earlier, mut whole, mut rates) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
             for row in 0..n {
-                left = left.max((0..STAGES).map(|i| last[i] * stage(i, row, k)).sum::<f64>().abs());
+                let part = |last: &[f64]| (0..STAGES).map(|i| last[i] * stage(i, row, k)).sum::<f64>().abs();
+                let [before, but_one, highest] = last.each_ref().map(|last| part(last));
+                (left, earlier) = (left.max(highest), earlier.max(before).max(but_one));
                 let most = (0..STAGES).fold(0.0, |most: f64, i| most.max(stage(i, row, k).abs()));
-                whole = whole.max(h * most).max(column[n + row].abs()).max(column[row].abs() / h);
+                let rate = (h * most).max(column[n + row].abs());
+                whole = whole.max(rate).max(column[row].abs() / h);
+                rates = rates.max(rate).max(column[row].abs() / h.max(unit));
             }
             if whole.is_nan() || left.is_nan() {
-                return f64::NAN;
+                return None;
             }
             if whole > 0.0 {
-                tail = tail.max(h * left / (whole + floor));
+                tails.last = tails.last.max(h * left / (whole + floor));
+            }
+            if rates > 0.0 && left > 0.0 {
+                let falls = (left / earlier).min(1.0).powi(FALLS);
+                tails.rough = tails.rough.max(falls * h * left / (rates + floor));
             }
         }
-        if tail > limit {
-            return tail;
-        }
+        Some(tails)
+    }
+
+    /// Takes the columns through the step that was solved for last.
+    pub fn take(&self, h: f64, columns: &mut [Vec<f64>]) {
+        let Some(n) = columns.first().map(|column| column.len() / 2) else { return };
+        let (size, width) = (STAGES * n, STAGES * n + columns.len());
+        let Self { nodes, weights, system, .. } = self;
         for (k, column) in columns.iter_mut().enumerate() {
             for row in 0..n {
                 let mut turn = 0.0;
                 let mut rate = 0.0;
                 for i in 0..STAGES {
-                    let slope = weights[i] * stage(i, row, k);
+                    let slope = weights[i] * system[(i * n + row) * width + size + k];
                     turn += (1.0 - nodes[i]) * slope;
                     rate += slope;
                 }
@@ -99,7 +125,6 @@ impl Collocation {
                 column[n + row] += h * rate;
             }
         }
-        tail
     }
 
     /// The equations of the stages, with their right sides.
@@ -155,7 +180,9 @@ mod tests {
                 let forcing =
                     method.nodes.iter().map(|node| libm::cos((k as f64 + node) * h)).collect::<Vec<_>>();
                 let pull = [-4.0, 0.0].repeat(STAGES);
-                assert!(method.step(h, &pull, &mut columns, (&[forcing], &[0.0]), 1.0) < 1.0);
+                let tails = method.solve((h, 1.0), &pull, &columns, (&[forcing], &[0.0]));
+                assert!(tails.is_some_and(|tails| tails.last < 1.0));
+                method.take(h, &mut columns);
             }
             let exact = libm::cos(2.0) / 3.0 + (0.3 - 1.0 / 3.0) * libm::cos(4.0) + 0.05 * libm::sin(4.0);
             (columns[0][0] - exact).abs()
@@ -169,7 +196,7 @@ mod tests {
         let method = Collocation::new();
         let sum = |degree: i32| {
             let powers = method.nodes.iter().map(|node| node.powi(degree));
-            powers.zip(&method.last).map(|(power, last)| power * last).sum::<f64>()
+            powers.zip(&method.last[2]).map(|(power, last)| power * last).sum::<f64>()
         };
         assert!((0..5).all(|degree| sum(degree).abs() < 1e-14) && sum(5).abs() > 1e-3);
     }

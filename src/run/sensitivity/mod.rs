@@ -21,6 +21,7 @@ mod collocation;
 mod crossing;
 mod expanded;
 mod extreme;
+mod fractional;
 mod lyapunov;
 mod measure;
 mod neighbours;
@@ -377,9 +378,10 @@ impl Study {
         let rows = rows.collect();
         let by_series = variation.expanded.is_some();
         let Self { scene, mut inputs, plan, .. } = self;
-        // Corners nearby may have asked for shorter distances on the way.
+        // Corners nearby may have asked for shorter distances on the way, and for steps that are shorter yet.
         for (input, neighbours) in inputs.iter_mut().zip(&variation.neighbours) {
             input.error = neighbours.as_ref().map_or(input.error, |neighbours| neighbours.error);
+            input.error = input.error.max(variation.rough);
         }
         Sensitivity { scene, inputs, measures, outputs, rows, until: plan.until, lost, steps, by_series }
     }

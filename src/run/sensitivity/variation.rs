@@ -22,6 +22,7 @@ use super::super::trust::Ground;
 use super::collocation::{Collocation, STAGES};
 use super::crossing::SetNumbers;
 use super::expanded::{self, Expansions};
+use super::fractional;
 use super::lyapunov::Dissipation;
 use super::neighbours::{Neighbour, Neighbours, residuals};
 use crate::dynamics::jacobian::Jacobian;
@@ -35,7 +36,7 @@ use std::ops::ControlFlow;
 use std::sync::Arc;
 
 /// The last Legendre coefficient over what is integrated, at most: the error is about its power 12/5.
-const LIMIT: f64 = 3e-6;
+pub(super) const LIMIT: f64 = 3e-6;
 /// Steps of this share of that of the motion are too short to go on with.
 const SHORTEST: f64 = 1e-6;
 /// Coordinates up to which the equations of all stages are solved at once.
@@ -70,10 +71,10 @@ pub(in crate::run) struct Variation {
     pub jumps: JumpLog,
     /// When columns were taken through something last, and how much later \[s\] each comes to it.
     pub(super) moment: Option<(Time, Vec<f64>)>,
-    method: Collocation,
-    pull: Vec<f64>,
-    forcing: Vec<Vec<f64>>,
-    now: f64,
+    pub(super) method: Collocation,
+    pub(super) pull: Vec<f64>,
+    pub(super) forcing: Vec<Vec<f64>>,
+    pub(super) now: f64,
     /// The longest step \[s\].
     reach: f64,
     /// Parts that do not act at the moment.
@@ -82,6 +83,8 @@ pub(in crate::run) struct Variation {
     pub steps: u64,
     pub tried: u64,
     pub most: u64,
+    /// What steps next to the zeros of fractional powers leave, over the rates of a column.
+    pub(super) rough: f64,
     /// Why they go no further.
     pub lost: Option<String>,
     /// What forces that depend on rates, and impacts, take off volumes, where somebody asks.
@@ -160,6 +163,7 @@ impl Variation {
             steps: 0,
             tried: 0,
             most: u64::MAX,
+            rough: 0.0,
             lost: None,
             dissipation: None,
         };
@@ -288,10 +292,20 @@ impl Variation {
     /// A step by collocation, and its last Legendre coefficient.
     fn collocated(&mut self, step: &mut Step, h: f64) -> f64 {
         self.look_at_nodes(step, h);
+        let unit = self.mechanism.units.time;
         let Self { method, pull, columns, forcing, neighbours, .. } = self;
         let floor = |neighbours: &Option<Neighbours>| neighbours.as_ref().map_or(0.0, |some| some.floor);
         let floors: Vec<f64> = neighbours.iter().map(floor).collect();
-        method.step(h, pull, columns, (forcing, &floors), LIMIT)
+        let Some(tails) = method.solve((h, unit), pull, columns, (forcing, &floors)) else { return f64::NAN };
+        if tails.rough > fractional::RESOLVED
+            && let Some(tail) = self.fractional_step(step, h, (&floors, tails))
+        {
+            return tail;
+        }
+        if tails.last <= LIMIT {
+            self.method.take(h, &mut self.columns);
+        }
+        tails.last
     }
 
     /// Jacobians and forcing at the nodes of a step.
