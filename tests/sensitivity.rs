@@ -760,6 +760,22 @@ fn a_spring_of_a_fractional_power_is_derived_through_its_zeros() {
     }
 }
 
+/// A kite folds into one line only while two of its sides are alike and two others; its start and its masses are free.
+#[test]
+fn numbers_of_a_loop_have_no_derivative_beyond_a_singular_position() {
+    let kite = example("kite");
+    let loops = ["hinges.A.between[1].point[0]", "hinges.A.between[1].point[1]"];
+    let before = derived(&kite, &["crank.phi"], &loops, 0.2);
+    assert!(before.lost.is_none() && before.measures[0].slopes.len() == 2, "{:?}", before.lost);
+    for number in loops {
+        let beyond = derived(&kite, &["crank.phi"], &[number], 0.5);
+        let why = beyond.measures[0].why.as_deref().unwrap_or_default();
+        assert!(why.contains("singular position") && why.contains(number), "{:?}", beyond.measures[0]);
+    }
+    let free = derived(&kite, &["crank.phi"], &["start.crank.omega", "bars.crank.mass"], 0.5);
+    assert_eq!(free.measures[0].slopes.len(), 2, "{:?}", free.lost);
+}
+
 /// A point that flies at (2, 3) m/s up to x = 1: the largest y is the last one, 3/2, and moves with the end.
 #[test]
 fn an_extreme_as_an_event_ends_the_run_moves_with_the_event() {

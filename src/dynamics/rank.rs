@@ -23,6 +23,9 @@ use super::schur::{DROPPED, NEAR, Weakest};
 use crate::arithmetic::Real;
 use std::borrow::Cow;
 
+/// Shares below this are rounding: such a constraint depends on others for as long as it acts, as those of
+/// places that stick side by side do, and says nothing of what is ahead.
+pub const PERMANENT: f64 = 1e-13;
 /// Rounds of the scaling.
 const ROUNDS: usize = 4;
 /// Pivots of S below this part of those of A owe it to masses and levers: so many digits are lost to them.

@@ -27,6 +27,7 @@ mod measure;
 mod neighbours;
 mod recorder;
 mod result;
+mod singular;
 mod variation;
 
 use expanded::Expansions;
@@ -323,6 +324,7 @@ impl Study {
         let begin = driver.motion();
         let numbers: Vec<&str> = self.inputs.iter().map(|input| input.path.as_str()).collect();
         variation.loosen(driver.holding(), &begin, &numbers);
+        variation.names = numbers.iter().map(|&number| number.to_owned()).collect();
         variation.begin(&begin);
         let mut recorder = SensitivityRecorder { times, next: 0, asked: &asked, seen: Vec::new() };
         if recorder.next() == Some(0.0) {

@@ -48,6 +48,8 @@ pub(in crate::run) struct Variation {
     pub mechanism: Arc<Mechanism>,
     /// All coordinates, then all rates, for every column.
     pub columns: Vec<Vec<f64>>,
+    /// The numbers that columns are of, where they are named.
+    pub names: Vec<String>,
     /// What moves each column beside the motion.
     pub neighbours: Vec<Option<Neighbours>>,
     /// Parameters that events set.
@@ -148,6 +150,7 @@ impl Variation {
             ground: None,
             mechanism: Arc::clone(mechanism),
             columns,
+            names: Vec::new(),
             neighbours,
             expanded: None,
             impacts: Vec::new(),
@@ -398,7 +401,9 @@ impl Observer for VariationObserver<'_, '_> {
         if has_crossed && variation.lost.is_none() {
             look.crossed(variation, step.at(begin), begin);
         }
-        while let Some(time) = look.next().filter(|&time| time <= end) {
+        let passage = variation.singular_passage(step, end);
+        let last = passage.map_or(end, |(time, _)| time);
+        while let Some(time) = look.next().filter(|&time| time <= last) {
             if variation.lost.is_some() || !variation.advance(step, time) {
                 return ControlFlow::Break(());
             }
@@ -408,6 +413,9 @@ impl Observer for VariationObserver<'_, '_> {
             if variation.lost.is_none() {
                 look.at(variation, motion, time);
             }
+        }
+        if let Some(passage) = passage {
+            variation.lose_at_passage(passage);
         }
         if variation.lost.is_some() || !variation.advance(step, end) {
             return ControlFlow::Break(());

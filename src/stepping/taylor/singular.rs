@@ -18,7 +18,7 @@
 use super::expansion::Expansion;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::rank::RankVerdict;
+use crate::dynamics::rank::{PERMANENT, RankVerdict};
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Form, Mechanism, State, Time};
@@ -28,9 +28,6 @@ const LOW: usize = 8;
 /// Points it is looked for at, and the longest way over the step wanted.
 const POINTS: usize = 96;
 const LONGEST: f64 = 12.0;
-/// Shares below this are rounding: such a constraint depends on others for as long as it acts, as those of
-/// places that stick side by side do, and says nothing of what is ahead.
-const PERMANENT: f64 = 1e-13;
 /// On a way through a singular position the share falls below this part of what it was; elsewhere it is small
 /// for other reasons, and the step is as any.
 const FALL: f64 = 0.1;
