@@ -690,6 +690,30 @@ fn chaos_is_told_from_regular_motion() {
     assert_eq!(regime("gentle", 60.0), Regime::Regular);
 }
 
+/// A motion shows nothing of the kind in its first turns, as chaotic ones do not; nor does growth that its own scatter
+/// tells from a power: of an oscillator whose stiffness swings, by e in 9.64 s (Floquet).
+#[test]
+fn short_runs_and_slow_growth_are_undecided() {
+    let regime = |template: &Template, until: f64| {
+        lyapunov(template, Some(until), Some(1e-10), &mut || false).expect("a spectrum").regime
+    };
+    for (name, until) in [("free", 0.01), ("free", 1.0), ("free", 4.0), ("wall", 1.0), ("wall", 3.0)] {
+        assert_eq!(regime(&example(name), until), Regime::Undecided, "{name} {until}");
+    }
+    for name in ["spring", "gentle", "hanging"] {
+        assert_eq!(regime(&example(name), 10.0), Regime::Regular, "{name}");
+    }
+    let rotor = r#"{"name": "rotor", "gravity": [0, 0],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "torques": [{"name": "q", "body": "b", "torque": "TORQUE"}],
+        "start": {"b": {"phi": 0, "omega": 0}}, "until": 50, "every": 1}"#;
+    let swings = template(&rotor.replace("TORQUE", "-(2+1.5*cos(2*t))*b.phi"));
+    assert_eq!(regime(&swings, 60.0), Regime::Undecided);
+    // What nothing drives grows with the time itself.
+    assert_eq!(regime(&template(&rotor.replace("\"TORQUE\"", "0")), 60.0), Regime::Regular);
+}
+
 #[test]
 fn bands_and_covariances_follow_from_the_jacobian() {
     let request = SensitivityRequest {

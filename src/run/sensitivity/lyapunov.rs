@@ -37,6 +37,12 @@ const BLOCKS: usize = 8;
 /// it is no faster than a power of the time: log 2 for each power.
 const EXPONENTIAL: f64 = 10.0;
 const POWER: f64 = 3.0;
+/// Standard deviations by which the largest exponent of a regular motion may lie above that of growth with
+/// the time itself.
+const ABOVE: f64 = 2.0;
+/// Radians by which the direction of the fastest growth, or a body, turns until a motion has shown what it is
+/// like; where nothing turns, growth or decay by a power does.
+const SHORT: f64 = 47.0;
 
 /// What the spectrum tells of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -200,6 +206,9 @@ struct Orthonormal {
     count: usize,
     until: f64,
     logs: Vec<f64>,
+    /// The first column and the angles at the last time \[rad\], and what they have turned by.
+    last: [Vec<f64>; 2],
+    turned: f64,
     rows: Vec<(f64, Vec<f64>)>,
     next: usize,
     /// Until when the columns have been followed \[s\], and what has been taken off volumes until then.
@@ -217,6 +226,8 @@ impl Orthonormal {
             count,
             until,
             logs: vec![0.0; count],
+            last: Default::default(),
+            turned: 0.0,
             rows: Vec::new(),
             next: 1,
             now: 0.0,
@@ -254,6 +265,15 @@ impl Orthonormal {
             };
             self.rate * half(&a[..n], &b[..n]) + half(&a[n..], &b[n..])
         };
+        let angles: Vec<f64> = (0..mechanism.bodies.len()).map(|k| motion.unwrapped(k)).collect();
+        if let ([last, before], [now, ..]) = (&self.last, &flat[..])
+            && !last.is_empty()
+        {
+            let sizes = product(last, last) * product(now, now);
+            let turned = libm::acos((product(last, now) / sizes.sqrt()).clamp(-1.0, 1.0));
+            let travel = angles.iter().zip(before).map(|(now, before)| (now - before).abs());
+            self.turned += travel.fold(turned, f64::max);
+        }
         for j in 0..self.count {
             let mut whole = 0.0;
             // Twice is enough.
@@ -275,6 +295,7 @@ impl Orthonormal {
                 column.iter_mut().for_each(|entry| *entry /= norm);
             }
         }
+        self.last = [flat.swap_remove(0), angles];
     }
 
     fn spectrum(self, scene: Scene, lost: Option<String>) -> Spectrum {
@@ -289,7 +310,9 @@ impl Orthonormal {
         let growth = middle.map(|(_, logs)| self.logs[first] - logs[first]);
         let regime = match growth {
             Some(growth) if growth >= EXPONENTIAL => Regime::Chaotic,
-            Some(growth) if growth <= POWER && rows.len() >= BLOCKS => Regime::Regular,
+            Some(growth) if growth <= POWER && self.is_a_power(t, mean[first], errors[first]) => {
+                Regime::Regular
+            }
             _ => Regime::Undecided,
         };
         let sorted = |values: &[f64]| order.iter().map(|&k| values[k]).collect::<Vec<f64>>();
@@ -306,6 +329,15 @@ impl Orthonormal {
             until: self.now,
             lost,
         }
+    }
+
+    /// True where a run of `t` \[s\] is long enough to tell exponential growth from that of a power, and the
+    /// largest exponent is none but by chance.
+    fn is_a_power(&self, t: f64, exponent: f64, error: f64) -> bool {
+        let is_still = self.turned < std::f64::consts::PI;
+        let has_grown = || self.logs.iter().any(|log| log.abs() >= POWER);
+        let has_shown = self.turned >= SHORT || is_still && has_grown();
+        has_shown && exponent - libm::log1p(t * self.rate.sqrt()) / t <= ABOVE * error
     }
 
     /// Standard deviations of the mean exponents, from parts of the run.
