@@ -751,6 +751,18 @@ fn what_makes_no_sense_is_told() {
         let error = sensitivity(&example("spring"), &request, &mut || false).expect_err(of).to_string();
         assert!(error.contains(told), "{error}");
     }
+    // How long a run is followed, and how often it is shown, is nothing of the mechanism.
+    let set = ["until=1", "every=0.5"].map(|text| text.parse().expect("an override"));
+    let spring = Template::read("examples/scenes/spring.json".as_ref(), &set).expect("a scene");
+    for to in ["until", "every"] {
+        let request = SensitivityRequest {
+            of: vec!["bar2.phi".parse().expect("a measure")],
+            to: vec![to.into()],
+            ..SensitivityRequest::default()
+        };
+        let error = sensitivity(&spring, &request, &mut || false).expect_err(to).to_string();
+        assert!(error.contains("no number of the mechanism"), "{error}");
+    }
 }
 
 /// A rotor that a spring k (phi - 0.1)^p sends back: it returns at the speed it came with, and is in contact for a time

@@ -23,8 +23,8 @@ pub struct WrittenNumber {
     pub uncertainty: f64,
 }
 
-/// Numbers of the format that are no input of the motion.
-const OUTPUT: [&str; 2] = ["until", "every"];
+/// Numbers of the format that are no input of the motion: how long it is followed, and how often it is shown.
+pub(crate) const OF_THE_RUN: [&str; 2] = ["until", "every"];
 
 impl Template {
     /// The numbers of the scene that its digits leave uncertain, in the order of its text.  `typed` are the
@@ -69,7 +69,7 @@ impl DigitSearch<'_> {
                     self.visit(node, &inner);
                 }
             }
-            Value::Number(value) if !OUTPUT.contains(&path) => {
+            Value::Number(value) if !OF_THE_RUN.contains(&path) => {
                 let Ok(unit) = FormatWalk { tree: self.tree }.unit(path) else { return };
                 let Some(uncertainty) = half_unit(self.digits(node)).filter(|half| half.is_finite()) else {
                     return;

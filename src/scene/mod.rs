@@ -29,6 +29,7 @@ mod template;
 mod write;
 
 pub use build::{SceneBuilder, ground, on};
+pub(crate) use digits::OF_THE_RUN;
 pub use digits::WrittenNumber;
 pub use error::{Refusal, SceneError};
 pub use friction::{Friction, FrictionPlace};

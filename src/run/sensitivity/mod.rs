@@ -48,7 +48,7 @@ use super::flip::FlipDetector;
 use super::plan::{LONGEST, Plan};
 use super::running::Outcome;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::scene::{Output, OutputNames, Scene, Template};
+use crate::scene::{OF_THE_RUN, Output, OutputNames, Scene, Template};
 use crate::stepping::Tolerance;
 use std::sync::Arc;
 
@@ -107,6 +107,14 @@ pub fn sensitivity(
     request: &SensitivityRequest,
     pause: &mut Pause,
 ) -> Result<Sensitivity, SensitivityError> {
+    for name in &request.to {
+        let path = template.variable(name)?.path;
+        if OF_THE_RUN.contains(&path.as_str()) {
+            let what = format!("no derivative by {path}: it is no number of the mechanism");
+            let hint = "name a start, a length, a mass, a parameter; rates of outputs are outputs themselves";
+            return Err(SensitivityError::Unsuited(format!("{what}\nhint: {hint}")));
+        }
+    }
     let study = Study::new(template, request)?;
     let mut asked = study.asked(request)?;
     study.find_times(&mut asked, pause)?;
