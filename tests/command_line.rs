@@ -636,6 +636,14 @@ fn a_sweep_tells_when_its_points_end() {
     }
 }
 
+#[test]
+fn an_uncertain_number_has_one_standard_deviation() {
+    let program = Program::with_scenes(&["spring"]);
+    let twice = "--uncertainty spring.stiffness=0.1 --uncertainty springs.spring.stiffness=0.2";
+    let told = "--uncertainty names springs.spring.stiffness twice";
+    program.run(&format!("sensitivity spring.json --of bar2.phi --at 0.1 {twice}")).exits(3).says(&[told]);
+}
+
 /// Lists of names are whole, or say how many more there are.
 #[test]
 fn lists_of_names_are_whole_or_say_how_many_are_left_out() {

@@ -62,6 +62,10 @@ fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<StudyFil
     }
     for (name, sigma) in &flags.uncertainty {
         let path = template.variable(name)?.path;
+        if deviations.iter().any(|(known, _)| *known == path) {
+            let text = format!("--uncertainty names {path} twice\nhint: name each number once");
+            return Err(Failure::new(Exit::Scene, text));
+        }
         deviations.push((path.clone(), *sigma));
         to.push(path);
     }
@@ -77,8 +81,10 @@ fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<StudyFil
         tolerance: flags.rtol,
     };
     let found = sensitivity(template, &request, &mut interrupt::is_asked)?;
-    let sigma =
-        |path: &str| deviations.iter().filter(|(known, _)| known == path).map(|(_, sigma)| *sigma).sum();
+    let sigma = |path: &str| {
+        let known = deviations.iter().find(|(known, _)| known == path);
+        known.map_or(0.0, |(_, sigma)| *sigma)
+    };
     let sigmas: Vec<f64> = match deviations.is_empty() {
         true => Vec::new(),
         false => found.inputs.iter().map(|input| sigma(&input.path)).collect(),

@@ -25,7 +25,7 @@ const HALVINGS: usize = 60;
 impl FitProblem<'_> {
     /// Looks for the minimum with this weight of continuity among the numbers that the scene takes, and tells
     /// how it ended.
-    pub fn minimize(self, columns: &[FittedColumn], weight: f64) -> Result<(Self, String), Lost> {
+    pub fn minimize(self, columns: &[FittedColumn], weight: f64) -> Result<(Self, &'static str), Lost> {
         let mut turns = 2 * self.held.len();
         let (mut problem, mut ended) = self.minimize_free(columns, weight)?;
         while turns > 0 && (problem.hold()? || problem.let_go()?) {

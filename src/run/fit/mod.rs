@@ -309,7 +309,7 @@ fn weighted<'a>(
     columns: &mut [FittedColumn],
     sizes: &[f64],
 ) -> Result<(FitProblem<'a>, String), Lost> {
-    let (mut ended, mut untold) = (String::new(), Vec::new());
+    let (mut ended, mut untold) = ("", Vec::new());
     for _ in 0..ROUNDS {
         let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
         let weights = if problem.has_segments() { &CONTINUITY[..] } else { &CONTINUITY[..1] };
@@ -325,6 +325,7 @@ fn weighted<'a>(
         }
         untold.extend(moving.into_iter().filter(|name| !untold.contains(name)).collect::<Vec<_>>());
     }
+    let mut ended = format!("{ended} after {} runs", problem.runs());
     if let Some(first) = untold.first() {
         ended += &format!("; the noise of {} is not told: --sigma {first}=… gives it", untold.join(", "));
     }

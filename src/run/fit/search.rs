@@ -45,7 +45,7 @@ impl FitProblem<'_> {
         mut self,
         columns: &[FittedColumn],
         weight: f64,
-    ) -> Result<(Self, String), Lost> {
+    ) -> Result<(Self, &'static str), Lost> {
         self.take(columns);
         (self.weight, self.was_refused, self.was_too_long) = (weight, false, false);
         self.found = self.evaluate();
@@ -59,11 +59,7 @@ impl FitProblem<'_> {
         }
         let search = LevenbergMarquardt::new().with_tol(TOLERANCE).with_patience(PATIENCE);
         let (mut problem, report) = search.minimize(self);
-        let is_over = report.termination.was_successful();
-        let ended = match is_over {
-            true => format!("converged after {} evaluations", report.number_of_evaluations),
-            false => format!("not converged after {} evaluations", report.number_of_evaluations),
-        };
+        let ended = if report.termination.was_successful() { "converged" } else { "not converged" };
         problem.found.as_ref().map_err(Clone::clone)?;
         problem.rebase()?;
         Ok((problem, ended))
