@@ -75,10 +75,8 @@ impl Variation {
     /// Ends the columns at such a passage.
     pub(super) fn lose_at_passage(&mut self, (time, column): (f64, usize)) {
         let name = self.names.get(column).map_or("a number of the loops", String::as_str);
-        let why = format!(
-            "no derivative by {name} beyond a singular position, which neighbouring mechanisms do not go through"
-        );
+        let why = "beyond a singular position, which neighbouring mechanisms do not go through";
         self.now = time;
-        self.lose(&why);
+        self.lose(&format!("no derivative by {name} {why}"));
     }
 }
