@@ -1007,3 +1007,28 @@ fn estimates_of_points_in_lanes_count_positions() {
         assert_eq!(count, 8);
     }
 }
+
+/// 0.35 w' = 0.01 sqrt(a - t), which has no value beyond a: the last state is kept, in lanes as alone, and the
+/// formula named.
+#[test]
+fn a_point_that_stops_tells_its_last_state() {
+    let text = r#"{"name": "rotor", "gravity": [0, 0], "parameters": {"a": 1},
+        "bars": [{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "torques": [{"name": "T", "body": "bar", "torque": "0.01*sqrt(a - t)"}],
+        "start": {"bar": {"phi": 0, "omega": 1}}, "until": 10, "every": 0.1}"#;
+    let template = Template::new(text.into(), "rotor".into(), &[]);
+    for method in ["taylor", "dp8"] {
+        let vary = vec!["a=1..7:5".parse().expect("a range")];
+        let plan = Sweep::new(&template, vary, &request(method, 10.0)).expect("a sweep");
+        for point in points(&plan, 1) {
+            let Status::Stopped(stop) = &point.status else { panic!("{method}: {point:?}") };
+            assert!(stop.what.contains("`T`"), "{method}: {stop:?}");
+            let a = point.values[0];
+            assert!((point.t - a).abs() < 1e-3 && point.energy < 1e-6, "{method}: {point:?}");
+            let rate = 1.0 + 0.01 / 0.35 * 2.0 / 3.0 * (a.powf(1.5) - (a - point.t).max(0.0).powf(1.5));
+            let off = (point.omega[0] - rate).abs();
+            assert!(off < 1e-6, "{method}: off by {off:e}");
+        }
+    }
+}

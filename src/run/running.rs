@@ -10,6 +10,7 @@ pub use self::outcome::{Outcome, RunError};
 pub use self::prepared::Run;
 use self::snapshot::moment;
 pub use self::snapshot::{ResumeError, Snapshot};
+pub(super) use self::stops::without_value;
 use self::stops::{advised, came_apart, drift_stop, foreign, missed, not_finite, not_given, uncounted};
 use super::clock::{Clock, still};
 use super::contact::ContactDriver;

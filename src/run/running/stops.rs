@@ -10,9 +10,9 @@ use super::super::sample::Sample;
 use super::Outcome;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::shown::estimate;
-use crate::dynamics::CompileError;
 use crate::dynamics::compile::quoted;
 use crate::dynamics::friction::paradox::{HINT, JAMS};
+use crate::dynamics::{CompileError, Mechanism, Motion};
 use crate::stepping::{Cause, StepError};
 
 /// Share of the output interval by which a row may be beside its time.
@@ -31,11 +31,9 @@ pub(super) fn advised(stop: StepError, at: &mut ContactDriver) -> StepError {
     if (shrinks || stop.cause == Cause::NotFinite) && at.jams() {
         return StepError { cause: Cause::Friction, what: JAMS.into(), hint: HINT.into(), ..stop };
     }
-    if (shrinks || stop.cause == Cause::NotFinite)
-        && let Some(part) = breaking_formula(at, stop.step)
-    {
-        let what = format!("the formula of `{part}` has no finite value here");
-        return StepError { what, hint: NO_VALUE.into(), ..stop };
+    let here = at.motion();
+    if let Some(stop) = without_value(&stop, &here, &at.whole, &at.off) {
+        return stop;
     }
     if !shrinks || !at.has_closed_loops() {
         return stop;
@@ -48,11 +46,24 @@ pub(super) fn advised(stop: StepError, at: &mut ContactDriver) -> StepError {
     }
 }
 
+/// The same stop with the part whose formula has no finite value there, where it comes of one.
+pub(in crate::run) fn without_value(
+    stop: &StepError,
+    here: &Motion,
+    mechanism: &Mechanism,
+    off: &[String],
+) -> Option<StepError> {
+    if !matches!(stop.cause, Cause::StepTooSmall | Cause::NotFinite) {
+        return None;
+    }
+    let part = breaking_formula(here, mechanism, off, stop.step)?;
+    let what = format!("the formula of `{part}` has no finite value here");
+    Some(StepError { what, hint: NO_VALUE.into(), ..stop.clone() })
+}
+
 /// The part whose formula has no finite value where the run has stopped, or within a step of it, or grows
 /// without bound there.
-fn breaking_formula(at: &mut ContactDriver, step: f64) -> Option<String> {
-    let here = at.motion();
-    let mechanism = &at.whole;
+fn breaking_formula(here: &Motion, mechanism: &Mechanism, off: &[String], step: f64) -> Option<String> {
     let laws = mechanism.laws.as_ref()?;
     let unit = mechanism.units.time;
     let values = |seconds: f64| {
@@ -66,7 +77,7 @@ fn breaking_formula(at: &mut ContactDriver, step: f64) -> Option<String> {
             all.map(|(name, value)| (name.to_owned(), value)).collect::<Vec<_>>()
         })
     };
-    let acts = |name: &String| !at.off.contains(name);
+    let acts = |name: &String| !off.contains(name);
     let steps = (-14..=-4).map(|decade| 10_f64.powi(decade) * unit).chain([step, 10.0 * step]);
     let lost = std::iter::once(0.0).chain(steps).find_map(|seconds| {
         values(seconds).into_iter().find(|(name, value)| acts(name) && !value.is_finite())

@@ -11,6 +11,7 @@ use crate::run::allowance::{Allowance, AllowanceMoment, EnergyLimit};
 use crate::run::driver::MOST_TURNS;
 use crate::run::flip;
 use crate::run::plan::Plan;
+use crate::run::running::without_value;
 use crate::stepping::taylor::batch::{BatchMember, TakenStep, read};
 use crate::stepping::{Cause, StepError};
 use std::f64::consts::PI;
@@ -115,7 +116,10 @@ impl Lane {
             hint: hint.into(),
         };
         let stopped = match &member.stopped {
-            Some(stopped) => Some(stopped.clone()),
+            Some(stopped) => {
+                let named = without_value(stopped, motion, member.mechanism, &[]);
+                Some(named.unwrap_or_else(|| stopped.clone()))
+            }
             None if point.energy.is_nan() => Some(stop(
                 Cause::NotFinite,
                 "the energy is not finite".into(),

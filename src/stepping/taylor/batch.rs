@@ -401,6 +401,7 @@ impl<T: LaneKernel> WideCode for Integration<'_, '_, T> {
             self.lanes.kernel.expand::<W>(order);
             self.lanes.choose_steps::<W>(order, self.batch.tolerance);
             self.lanes.look_ahead(order, self.members, self.observer);
+            self.lanes.keep_last(self.members);
             self.lanes.kernel.finish::<W>(order, &self.lanes.clock.taken);
             let ends = self.lanes.clock.ends::<W>();
             self.lanes.arrive(order, self.members, &ends, self.until, self.observer);

@@ -122,6 +122,17 @@ impl<T: LaneKernel> LaneSlots<T> {
         }
     }
 
+    /// Writes the states of lanes whose steps cannot be taken, before these make others of them.
+    pub(super) fn keep_last(&self, members: &mut [BatchMember]) {
+        for lane in 0..LANES {
+            let Some(index) = self.members[lane] else { continue };
+            let member = &mut members[index];
+            if self.failure(lane, &member.statistics).is_err() {
+                self.kernel.write_state(lane, &mut member.state);
+            }
+        }
+    }
+
     /// Records the steps just taken, which end at these times, and frees the lanes of trajectories that have
     /// ended.
     pub(super) fn arrive(
@@ -140,17 +151,17 @@ impl<T: LaneKernel> LaneSlots<T> {
                 self.kernel.write_state(lane, &mut member.state);
                 continue;
             }
-            let (mut time, step) = (from, self.clock.taken.0[lane]);
-            match self.failure(lane, &member.statistics) {
-                Err(stop) => member.stopped = Some(stop),
-                Ok(()) => {
-                    let is_last = step == self.clock.left.0[lane];
-                    time = if is_last { until } else { Time { hi: ends[0].0[lane], lo: ends[1].0[lane] } };
-                    self.clock.set(lane, time);
-                    member.statistics.steps += 1;
-                    member.statistics.evaluations += 1;
-                }
+            if let Err(stop) = self.failure(lane, &member.statistics) {
+                (member.stopped, member.state.time) = (Some(stop), from);
+                self.release(lane);
+                continue;
             }
+            let step = self.clock.taken.0[lane];
+            let is_last = step == self.clock.left.0[lane];
+            let time = if is_last { until } else { Time { hi: ends[0].0[lane], lo: ends[1].0[lane] } };
+            self.clock.set(lane, time);
+            member.statistics.steps += 1;
+            member.statistics.evaluations += 1;
             let series = |body: usize, after: f64| self.kernel.at(order, lane, body, after);
             let ends = |body: usize| self.kernel.ends(lane, body);
             self.inside.get_mut().forget();
@@ -163,8 +174,7 @@ impl<T: LaneKernel> LaneSlots<T> {
                 }
             };
             let passage = TakenStep::new(from, step, &ends, &series, &motion);
-            let is_over =
-                member.stopped.is_some() || observer.step(index, &passage) == Going::Enough || time >= until;
+            let is_over = observer.step(index, &passage) == Going::Enough || time >= until;
             self.kernel.wrap(lane, &mut member.state.turns);
             if is_over {
                 self.kernel.write_state(lane, &mut member.state);
