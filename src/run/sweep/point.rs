@@ -88,15 +88,6 @@ impl Ready {
     }
 }
 
-impl SweepPoint {
-    /// Takes from where the bodies of its mechanism end what their angles do not tell.
-    fn place(&mut self, mechanism: &Mechanism) {
-        if mechanism.has_translations() {
-            self.centres = mechanism.centres(&self.phi, &self.omega);
-        }
-    }
-}
-
 impl Sweep {
     /// Runs one point; the same as in a whole sweep.
     pub fn point(&self, index: u64) -> Option<SweepPoint> {
@@ -280,10 +271,13 @@ impl Sweep {
                     .constraints
                     .iter()
                     .map(|(_, [position, velocity])| [position.max, velocity.max]);
+                if mechanism.has_translations() {
+                    let centres = outcome.last.centre.iter().zip(&outcome.last.velocity);
+                    point.centres = centres.map(|(&centre, &velocity)| [centre, velocity]).collect();
+                }
                 point.t = outcome.last.t;
                 point.phi = outcome.last.phi;
                 point.omega = outcome.last.omega;
-                point.place(&mechanism);
                 point.energy = outcome.drift.energy.max;
                 point.constraint = levels.reduce(|a, b| [larger(a[0], b[0]), larger(a[1], b[1])]);
                 point.steps = outcome.statistics.steps;
@@ -347,7 +341,12 @@ impl Sweep {
                 let mut point = lanes.swap_remove(number).point;
                 point.trust = judge.as_mut().map(|judge| judge.remove(number));
                 point.extremes = ensemble.extremes(number);
-                point.place(members[number].mechanism);
+                let mechanism = members[number].mechanism;
+                if mechanism.has_translations() {
+                    // Of winding angles rounding leaves too little.
+                    let [phi, omega] = motion.rounded();
+                    point.centres = mechanism.centres(&phi, &omega);
+                }
                 found.push(point);
                 members.swap_remove(number);
                 ensemble.swap_remove(number);
