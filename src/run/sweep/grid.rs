@@ -4,6 +4,9 @@ use crate::scene::number;
 use std::str::FromStr;
 use std::sync::Arc;
 
+/// Digits of numbers that are taken as they are written.
+const DIGITS: u32 = 15;
+
 /// A value that is varied: `bar1.phi=-pi..pi:512`.
 ///
 /// ```
@@ -61,7 +64,8 @@ impl FromStr for Vary {
 }
 
 impl Vary {
-    /// Value number `index`: both ends exactly, and opposite ends give opposite values.
+    /// Value number `index`: both ends exactly, opposite ends give opposite values, and decimals of at most 15
+    /// digits are what one writes.
     pub fn value(&self, index: u64) -> f64 {
         let last = self.count - 1;
         match index {
@@ -69,7 +73,9 @@ impl Vary {
             index if index >= last => self.to,
             index => {
                 let share = |index: u64| index as f64 / last as f64;
-                if self.from == -self.to {
+                if let Some(value) = written([self.from, self.to], index, last) {
+                    value
+                } else if self.from == -self.to {
                     self.to * (index as f64 - (last - index) as f64) / last as f64
                 } else {
                     self.from * share(last - index) + self.to * share(index)
@@ -77,6 +83,37 @@ impl Vary {
             }
         }
     }
+}
+
+/// A number as an integer and a power of ten, as it is written in at most [`DIGITS`] digits.
+fn decimal(x: f64) -> Option<(i128, i32)> {
+    let text = format!("{x:e}");
+    let (mantissa, exponent) = text.split_once('e')?;
+    let (whole, rest) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let number: i128 = format!("{whole}{rest}").parse().ok()?;
+    let exponent = exponent.parse::<i32>().ok()? - rest.len() as i32;
+    (number.abs() < 10_i128.pow(DIGITS)).then_some((number, exponent))
+}
+
+/// The value `index` of `last` steps between two ends where these and it are written in so many digits: what
+/// one writes.
+fn written([from, to]: [f64; 2], index: u64, last: u64) -> Option<f64> {
+    let ((from, p), (to, q)) = (decimal(from)?, decimal(to)?);
+    let mut exponent = p.min(q);
+    let times = |number: i128, power: i32| {
+        10_i128.checked_pow((power - exponent) as u32).and_then(|ten| number.checked_mul(ten))
+    };
+    let [from, to] = [times(from, p)?, times(to, q)?];
+    let (index, last) = (i128::from(index), i128::from(last));
+    let mut sum = from.checked_mul(last - index)?.checked_add(to.checked_mul(index)?)?;
+    for _ in 0..DIGITS {
+        if sum % last == 0 {
+            break;
+        }
+        (sum, exponent) = (sum.checked_mul(10)?, exponent - 1);
+    }
+    let is_short = sum % last == 0 && (sum / last).abs() < 10_i128.pow(DIGITS);
+    is_short.then(|| format!("{}e{exponent}", sum / last).parse().ok()).flatten()
 }
 
 /// Points of several values varied at once: a grid, numbered so that the first varies slowest, or a list.
@@ -189,6 +226,27 @@ mod tests {
             (0..11).map(|i| tenths.value(i)).collect::<Vec<_>>(),
             [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
         );
+    }
+
+    #[test]
+    fn decimals_are_what_one_writes_and_others_keep_their_bits() {
+        for (text, written) in [
+            ("a=-0.4..1.2:9", vec![-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.2]),
+            ("a=0.1..0.7:7", vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]),
+            ("a=-0.3..0.3:7", vec![-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3]),
+            ("a=1e-9..7e-9:4", vec![1e-9, 3e-9, 5e-9, 7e-9]),
+            ("a=2e20..1e20:5", vec![2e20, 1.75e20, 1.5e20, 1.25e20, 1e20]),
+            ("a=1e-300..1e300:3", vec![1e-300, 0.5 * 1e300, 1e300]),
+        ] {
+            let vary: Vary = text.parse().expect("a range");
+            let values: Vec<f64> = (0..vary.count).map(|i| vary.value(i)).collect();
+            assert_eq!(values, written, "{text}");
+            assert!(values.iter().all(|value| *value != 0.0 || value.is_sign_positive()), "{text}");
+        }
+        let third: Vary = "a=0.1..1.1:4".parse().expect("a range");
+        assert_eq!(third.value(1), 0.1 * (2.0 / 3.0) + 1.1 * (1.0 / 3.0));
+        let pi: Vary = "a=0..pi:8".parse().expect("a range");
+        assert!((0..8).all(|i| pi.value(i) == PI * (i as f64 / 7.0) || i == 7));
     }
 
     #[test]
