@@ -20,8 +20,8 @@ use crate::run::saltation::Side;
 pub(super) const RESOLVED: f64 = 1e-12;
 /// Share of what a step of (dq, dw) leaves that one of ρ may leave to be worth it, where it is not resolved.
 const BETTER: f64 = 0.5;
-/// Such a step is divided as one with a tail of so many times the limit, unless it is below this share of that
-/// of the motion.
+/// Such a step is divided as one with a tail of so many times the limit, unless it is below this share of
+/// that of the motion.
 const DIVIDE: f64 = 1e5;
 const SHORTEST: f64 = 1e-5;
 

@@ -1,8 +1,8 @@
 //! Singular positions on the way: a motion goes through them, motions of neighbouring loops do not.
 //!
-//! Where all links of a loop lie in line, as a parallelogram or a kite does, links that are a little longer or
-//! shorter no longer reach that position, or no longer leave it on the same branch.  Numbers that enter the
-//! constraints have no derivative from there on; starts, masses and forces have.
+//! Where all links of a loop lie in line, as a parallelogram or a kite does, links that are a little longer
+//! or shorter no longer reach that position, or no longer leave it on the same branch.  Numbers that enter
+//! the constraints have no derivative from there on; starts, masses and forces have.
 
 use super::neighbours::{Neighbour, residuals};
 use super::variation::{Variation, plain};
@@ -20,8 +20,8 @@ const PLACES: usize = 32;
 const ROUNDS: usize = 60;
 
 impl Variation {
-    /// When a step up to `end` \[s\] goes through a singular position that a number changes, and the column of
-    /// that number.
+    /// When a step up to `end` \[s\] goes through a singular position that a number changes, and the column
+    /// of that number.
     pub(super) fn singular_passage(&self, step: &mut Step, end: f64) -> Option<(f64, usize)> {
         let has_effect = self.neighbours.iter().flatten().any(|neighbours| !neighbours.levels.is_empty());
         if self.mechanism.constraints.is_empty() || !has_effect {

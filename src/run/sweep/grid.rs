@@ -64,8 +64,8 @@ impl FromStr for Vary {
 }
 
 impl Vary {
-    /// Value number `index`: both ends exactly, opposite ends give opposite values, and decimals of at most 15
-    /// digits are what one writes.
+    /// Value number `index`: both ends exactly, opposite ends give opposite values, and decimals of at most
+    /// 15 digits are what one writes.
     pub fn value(&self, index: u64) -> f64 {
         let last = self.count - 1;
         match index {
