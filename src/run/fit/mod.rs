@@ -253,8 +253,9 @@ pub fn fit(
         pause,
     );
     problem.guess_states(&columns)?;
-    let (mut problem, ended) = weighted(problem, &mut columns, &sizes)?;
+    let (mut problem, [ended, untold]) = weighted(problem, &mut columns, &sizes)?;
     let covariance = problem.covariance(&columns)?;
+    let ended = format!("{ended} after {} runs{untold}", problem.runs());
     let (values, held) = (problem.values(), problem.held());
     let scene = template.filled(problem.variables(), &values)?;
     let numbers = first.inputs.iter().enumerate().map(|(k, input)| FittedNumber {
@@ -303,12 +304,13 @@ fn varied(template: &Template, request: &FitRequest) -> Result<Vec<Variable>, Fi
     Ok(variables)
 }
 
-/// The minimum with the noise of the columns that is found there, and how the search for it ended.
+/// The minimum with the noise of the columns that is found there, how the search for it ended, and what is not
+/// told.
 fn weighted<'a>(
     mut problem: FitProblem<'a>,
     columns: &mut [FittedColumn],
     sizes: &[f64],
-) -> Result<(FitProblem<'a>, String), Lost> {
+) -> Result<(FitProblem<'a>, [String; 2]), Lost> {
     let (mut ended, mut untold) = ("", Vec::new());
     for _ in 0..ROUNDS {
         let least = columns.iter().fold(f64::INFINITY, |least, column| least.min(column.sigma));
@@ -325,11 +327,10 @@ fn weighted<'a>(
         }
         untold.extend(moving.into_iter().filter(|name| !untold.contains(name)).collect::<Vec<_>>());
     }
-    let mut ended = format!("{ended} after {} runs", problem.runs());
-    if let Some(first) = untold.first() {
-        ended += &format!("; the noise of {} is not told: --sigma {first}=… gives it", untold.join(", "));
-    }
-    Ok((problem, ended))
+    let untold = untold
+        .first()
+        .map(|first| format!("; the noise of {} is not told: --sigma {first}=… gives it", untold.join(", ")));
+    Ok((problem, [ended.into(), untold.unwrap_or_default()]))
 }
 
 /// Numbers of the outputs of the columns.
