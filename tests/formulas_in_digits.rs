@@ -1,6 +1,8 @@
 //! Formulas of time and state in many digits, against closed forms in integer arithmetic of another crate.
 
-use crate::many_digits::{cosine, fixed, last, mean, near, number, one, pi, root, source, text, times};
+use crate::many_digits::{
+    begun, cosine, fixed, last, mean, near, number, one, pi, root, source, text, times,
+};
 use num_bigint::BigInt;
 
 /// A rotor of moment of inertia 0.7 kg m² and what acts on it.
@@ -123,4 +125,15 @@ fn every_smooth_function_is_carried_in_laws_and_motors() {
     for k in 0..2 {
         near(&number(many.bodies[k][0]), &fixed(&format!("{:.15}", plain.last.phi[k])), 11);
     }
+}
+
+/// A root of a rate stops where the rate passes zero, after 2 (1 - ln 2) s of w' = -1 - √w from 1, and says so.
+#[test]
+fn a_root_of_a_rate_says_what_to_do_at_its_zero() {
+    let flow = r#""torques": [{"name": "flow", "body": "rotor",
+        "torque": "-0.7 - 0.7*sign(rotor.omega)*sqrt(abs(rotor.omega))"}]"#;
+    let stop =
+        begun(&source(&rotor(flow, "0", "1"), &[], "1", "1"), 20).row(1, &mut || false).expect_err("a stop");
+    assert!(stop.hint.contains("in doubles"), "{stop:?}");
+    assert!((stop.t - 2.0 * (1.0 - 2f64.ln())).abs() < 1e-12, "{stop:?}");
 }

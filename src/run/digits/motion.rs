@@ -334,7 +334,13 @@ impl<const W: usize> DigitsMotion<W> {
             if self.series.regularity().abs() < JAMMED {
                 return Err(self.stop(Cause::Friction, step, JAMS, HINT));
             }
-            let hint = "more digits carry nearer to a singular position";
+            let hint = match self.probe {
+                Some(_) => {
+                    "a root of a rate does not pass zero in many digits: run it in doubles; elsewhere more \
+                    digits carry nearer to a singular position"
+                }
+                None => "more digits carry nearer to a singular position",
+            };
             return Err(self.stop(
                 Cause::StepTooSmall,
                 step,
