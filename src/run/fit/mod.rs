@@ -304,8 +304,8 @@ fn varied(template: &Template, request: &FitRequest) -> Result<Vec<Variable>, Fi
     Ok(variables)
 }
 
-/// The minimum with the noise of the columns that is found there, how the search for it ended, and what is not
-/// told.
+/// The minimum with the noise of the columns that is found there, how the search for it ended, and what is
+/// not told.
 fn weighted<'a>(
     mut problem: FitProblem<'a>,
     columns: &mut [FittedColumn],
