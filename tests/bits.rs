@@ -36,7 +36,7 @@ const ENDS: &[End] = &[
     ("branch", "taylor", 1e-10, None, 3.0, 0xbae9_ee99_71b5_7629),
     ("andrews", "taylor", 1e-10, None, 0.03, 0x797c_b012_266b_31dd),
     ("andrews", "dp8", 1e-9, None, 0.03, 0x58df_f5b6_13da_4c77),
-    ("four_bars", "taylor", 1e-10, None, 5.0, 0xc575_925e_61a0_515d),
+    ("four_bars", "taylor", 1e-10, None, 5.0, 0x13b0_6b2e_c9c0_28dd),
     ("cart_pole", "gauss16", 1.0 / 64.0, None, 3.0, 0x68fd_f759_0216_66d1),
     ("quick_return", "rattle4", 1.0 / 2048.0, None, 1.0, 0x0aa5_bece_66cf_3919),
     ("kite", "dp8", 1e-9, None, 1.0, 0xd3ec_18b1_b364_6223),

@@ -404,18 +404,18 @@ fn every_file_named_exists() {
 }
 
 #[test]
-fn the_rooms_stand_in_the_order_that_imports_follow() {
+fn modules_stand_in_the_order_that_imports_follow() {
     let imports = std::fs::read_to_string(root().join(".ci/imports")).expect(".ci/imports");
-    let rooms = imports
+    let modules = imports
         .lines()
-        .find_map(|line| line.strip_prefix("rooms=("))
-        .expect("the rooms")
+        .find_map(|line| line.strip_prefix("modules=("))
+        .expect("the modules")
         .trim_end_matches(')');
     let text = Page::one("docs/architecture.md").text;
     let rows: Vec<_> = text
         .lines()
         .filter_map(|line| line.strip_prefix("| `").and_then(|rest| rest.split_once("/` |")))
-        .map(|(room, _)| room)
+        .map(|(module, _)| module)
         .collect();
-    assert_eq!(rows, rooms.split_whitespace().collect::<Vec<_>>(), "docs/architecture.md");
+    assert_eq!(rows, modules.split_whitespace().collect::<Vec<_>>(), "docs/architecture.md");
 }

@@ -43,6 +43,9 @@ const HALVINGS: usize = 12;
 /// Below rounding no passage is made: they are several times what it came to on parallelograms and kites.
 const ROUNDING: [f64; 2] = [3e-14, 3e-28];
 const NOISE: f64 = 1e-6;
+/// The least tolerance that counts for that in doubles and in double-double: from 1e-12 to 1e-15 the way to a
+/// passage of `four_bars` takes three times as many steps, whose rounding is as much as it gains.
+const LEAST: [f64; 2] = [1e-12, 0.0];
 /// Iterations in which a state in double-double is put back onto the constraints.
 const ROUNDS: usize = 3;
 /// Largest difference between the start and where the way back leads, over the tolerance; and the limits of
@@ -231,8 +234,8 @@ impl<T: Coefficient> SingularPassage<T> {
 /// Largest share of the motion that the smallest power may have at a tolerance, where the weakest constraint
 /// has this share.
 fn noise<T: Coefficient>(tolerance: f64, share: f64) -> f64 {
-    let rounding = ROUNDING[usize::from(!T::IS_PLAIN)] / share;
-    (ASTRAY * tolerance).max(rounding).min(NOISE)
+    let kind = usize::from(!T::IS_PLAIN);
+    (ASTRAY * tolerance.max(LEAST[kind])).max(ROUNDING[kind] / share).min(NOISE)
 }
 
 /// True where a singular position may be ahead.
