@@ -174,6 +174,7 @@ impl LaneStages {
                 (3, false) => hardware.run(CanonicalRates::<_, 3, false>(both, of)),
                 (4, false) => hardware.run(CanonicalRates::<_, 4, false>(both, of)),
                 (_, false) => hardware.run(CanonicalRates::<_, 0, false>(both, of)),
+                (2, true) => hardware.run(CanonicalRates::<_, 2, true>(both, of)),
                 (_, true) => hardware.run(CanonicalRates::<_, 0, true>(both, of)),
             },
         }

@@ -21,6 +21,8 @@ pub(super) struct LaneSlots<T> {
     has_stops: [bool; LANES],
     /// True where one is in the step, which is not taken: the trajectory leaves.
     is_leaving: [bool; LANES],
+    /// Lanes whose step cannot be taken.
+    is_failing: [bool; LANES],
     /// Room for motions inside a step.
     inside: RefCell<Interior>,
 }
@@ -34,6 +36,7 @@ impl<T: LaneKernel> LaneSlots<T> {
             kernel: Box::new(kernel),
             has_stops: [false; LANES],
             is_leaving: [false; LANES],
+            is_failing: [false; LANES],
             inside: RefCell::default(),
         }
     }
@@ -123,11 +126,12 @@ impl<T: LaneKernel> LaneSlots<T> {
     }
 
     /// Writes the states of lanes whose steps cannot be taken, before these make others of them.
-    pub(super) fn keep_last(&self, members: &mut [BatchMember]) {
+    pub(super) fn keep_last(&mut self, members: &mut [BatchMember]) {
         for lane in 0..LANES {
             let Some(index) = self.members[lane] else { continue };
             let member = &mut members[index];
-            if self.failure(lane, &member.statistics).is_err() {
+            self.is_failing[lane] = self.failure(lane, &member.statistics).is_err();
+            if self.is_failing[lane] {
                 self.kernel.write_state(lane, &mut member.state);
             }
         }
@@ -151,7 +155,9 @@ impl<T: LaneKernel> LaneSlots<T> {
                 self.kernel.write_state(lane, &mut member.state);
                 continue;
             }
-            if let Err(stop) = self.failure(lane, &member.statistics) {
+            if self.is_failing[lane]
+                && let Err(stop) = self.failure(lane, &member.statistics)
+            {
                 (member.stopped, member.state.time) = (Some(stop), from);
                 self.release(lane);
                 continue;
