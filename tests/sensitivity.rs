@@ -32,6 +32,16 @@ pub fn assert_near(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance * size, "{what}: {found:e} instead of {expected:e}");
 }
 
+/// Values of measures, and their derivatives by two numbers to a tolerance.
+fn assert_measures(found: &Sensitivity, expected: &[(f64, [f64; 2])], tolerance: f64) {
+    for (measure, (value, slopes)) in found.measures.iter().zip(expected) {
+        assert_near(measure.value, *value, 1e-9, &measure.name);
+        assert_eq!(measure.slopes.len(), 2, "{}: {:?}", measure.name, measure.why);
+        let slopes = measure.slopes.iter().zip(slopes);
+        slopes.for_each(|(found, expected)| assert_near(*found, *expected, tolerance, &measure.name));
+    }
+}
+
 /// K and E of modulus k, by the arithmetic-geometric mean.
 fn elliptic(k: f64) -> [f64; 2] {
     let (mut a, mut b, mut sum, mut power) = (1.0_f64, (1.0 - k * k).sqrt(), 0.5 * k * k, 0.5);
@@ -691,7 +701,7 @@ fn chaos_is_told_from_regular_motion() {
 }
 
 /// A motion shows nothing of the kind in its first turns, as chaotic ones do not; nor does growth that its own scatter
-/// tells from a power: of an oscillator whose stiffness swings, by e in 9.64 s (Floquet).
+/// tells from a power: of an oscillator whose stiffness oscillates, by e in 9.64 s (Floquet).
 #[test]
 fn short_runs_and_slow_growth_are_undecided() {
     let regime = |template: &Template, until: f64| {
@@ -708,8 +718,8 @@ fn short_runs_and_slow_growth_are_undecided() {
         "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
         "torques": [{"name": "q", "body": "b", "torque": "TORQUE"}],
         "start": {"b": {"phi": 0, "omega": 0}}, "until": 50, "every": 1}"#;
-    let swings = template(&rotor.replace("TORQUE", "-(2+1.5*cos(2*t))*b.phi"));
-    assert_eq!(regime(&swings, 60.0), Regime::Undecided);
+    let mathieu = template(&rotor.replace("TORQUE", "-(2+1.5*cos(2*t))*b.phi"));
+    assert_eq!(regime(&mathieu, 60.0), Regime::Undecided);
     // What nothing drives grows with the time itself.
     assert_eq!(regime(&template(&rotor.replace("\"TORQUE\"", "0")), 60.0), Regime::Regular);
 }
@@ -868,11 +878,7 @@ fn extremes_at_an_event_move_with_it() {
         (k * te * (2.0 - te / 2.0), [te * (2.0 - te / 2.0), k * (2.0 - te)]),
         (k * angle, [angle, k * te * (2.0 - te / 2.0)]),
     ];
-    for (measure, (value, slopes)) in found.measures.iter().zip(expected) {
-        assert_near(measure.value, value, 1e-9, &measure.name);
-        let slopes = measure.slopes.iter().zip(slopes);
-        slopes.for_each(|(found, expected)| assert_near(*found, expected, 1e-9, &measure.name));
-    }
+    assert_measures(&found, &expected, 1e-9);
 }
 
 /// A torque that changes its sign at p0, from a to -a: outputs of the same signal jump there.  Up to then J w²/2 = a phi,
@@ -894,12 +900,7 @@ fn extremes_are_derived_on_the_side_of_a_jump_that_has_them() {
         (a, [1.0, 0.0]),
         (-a, [-1.0, 0.0]),
     ];
-    for (measure, (value, slopes)) in found.measures.iter().zip(expected) {
-        assert_near(measure.value, value, 1e-9, &measure.name);
-        assert_eq!(measure.slopes.len(), 2, "{}: {:?}", measure.name, measure.why);
-        let slopes = measure.slopes.iter().zip(slopes);
-        slopes.for_each(|(found, expected)| assert_near(*found, expected, 1e-8, &measure.name));
-    }
+    assert_measures(&found, &expected, 1e-8);
 }
 
 /// The same of time: the torque rises to a tc and falls to -a tc there; and a ball that falls from rest at h, of which

@@ -166,7 +166,7 @@ fn points_of_loops_are_judged_in_lanes() {
     }
 }
 
-/// Output times anywhere near the singular positions of two parallelograms, whose bars swing as one pendulum:
+/// Output times anywhere near the singular positions of two parallelograms, whose bars move as one pendulum:
 /// three bars about their ends, and two that are carried along.
 #[test]
 fn output_times_close_to_singular_positions_leave_a_point_where_it_is() {

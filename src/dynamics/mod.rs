@@ -420,6 +420,18 @@ impl Motion {
         [&self.phi, &self.omega].map(|all| all.iter().map(|x| x.hi).collect())
     }
 
+    /// The motion so much later \[s\], at these accelerations; those that are not given are zero.
+    pub(crate) fn later(&self, h: f64, accelerations: &[f64]) -> Self {
+        let mut later = self.clone();
+        later.time = later.time + h;
+        for (k, (phi, omega)) in later.phi.iter_mut().zip(&mut later.omega).enumerate() {
+            let acceleration = accelerations.get(k).copied().filter(|a| a.is_finite()).unwrap_or(0.0);
+            *phi += *omega * DoubleDouble::from(h) + DoubleDouble::from(0.5 * h * h * acceleration);
+            *omega += DoubleDouble::from(h * acceleration);
+        }
+        later
+    }
+
     /// The winding angle of a body \[rad\].
     pub fn unwrapped(&self, body: usize) -> f64 {
         angle::unwrapped(self.phi[body], self.turns[body])

@@ -25,7 +25,7 @@ use std::borrow::Cow;
 
 /// Shares below this are rounding: such a constraint depends on others for as long as it acts, as those of
 /// places that stick side by side do, and says nothing of what is ahead.
-pub const PERMANENT: f64 = 1e-13;
+const PERMANENT: f64 = 1e-13;
 /// Rounds of the scaling.
 const ROUNDS: usize = 4;
 /// Pivots of S below this part of those of A owe it to masses and levers: so many digits are lost to them.
@@ -219,6 +219,13 @@ impl RankVerdict {
     /// The least share of the constraints that are not left out.
     pub fn kept(&self) -> f64 {
         self.kept
+    }
+
+    /// The least share but for constraints that depended on others at the first position of a way already,
+    /// and still do.
+    pub fn share_since(&self, first: &Self) -> f64 {
+        let is_as_ever = first.share() < PERMANENT && self.is_left_out == first.is_left_out;
+        if is_as_ever { self.kept() } else { self.share() }
     }
 
     /// The weakest constraint where S has been factored with `mass` as its own and these reciprocal pivots

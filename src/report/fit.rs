@@ -26,7 +26,7 @@ pub fn object(found: &Fit) -> Value {
             .map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>(),
         "columns": found.columns.iter().map(|column| json!({
             "name": column.name, "unit": column.unit, "sigma": column.sigma, "is_given": column.is_given,
-            "rms": rms(column),
+            "rms": column.rms(),
         })).collect::<Vec<_>>(),
         "ignored": found.ignored,
         "chi_square": found.chi_square,
@@ -46,12 +46,6 @@ fn residuals(column: &FittedColumn) -> impl Iterator<Item = Option<f64>> {
         .iter()
         .zip(&column.model)
         .map(|(measured, model)| measured.map(|measured| measured - model))
-}
-
-/// NaN of a column without values.
-fn rms(column: &FittedColumn) -> f64 {
-    let squares: f64 = column.residuals().map(|residual| residual * residual).sum();
-    (squares / column.count() as f64).sqrt()
 }
 
 /// The page.
@@ -80,7 +74,7 @@ pub fn text(found: &Fit) -> String {
                 return vec![name, "no values".into(), String::new()];
             }
             let sigma = format!("{}{}", rough(column.sigma), if column.is_given { "" } else { " (found)" });
-            vec![name, rough(rms(column)), sigma]
+            vec![name, rough(column.rms()), sigma]
         })
         .collect();
     page.entry("columns", "residuals and the noise they were weighted with");

@@ -1,7 +1,6 @@
 //! Parts that events let act or rest: motors, locks and joints are released and put back.
 
 use super::{CompileError, Laws, Mechanism, Switches};
-use crate::arithmetic::DoubleDouble;
 use crate::dynamics::Motion;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::kernel::{Bias, Kernel};
@@ -34,18 +33,6 @@ fn branches(modes: &[bool]) -> Vec<Vec<bool>> {
         }));
     }
     all
-}
-
-/// A motion so much later \[s\], at these accelerations; those that are not given are zero.
-fn later(motion: &Motion, h: f64, accelerations: &[f64]) -> Motion {
-    let mut later = motion.clone();
-    later.time = later.time + h;
-    for (k, (phi, omega)) in later.phi.iter_mut().zip(&mut later.omega).enumerate() {
-        let acceleration = accelerations.get(k).copied().filter(|a| a.is_finite()).unwrap_or(0.0);
-        *phi += *omega * DoubleDouble::from(h) + DoubleDouble::from(0.5 * h * h * acceleration);
-        *omega += DoubleDouble::from(h * acceleration);
-    }
-    later
 }
 
 impl Mechanism {
@@ -207,11 +194,11 @@ impl Mechanism {
         }
         let [phi, omega] = motion.rounded();
         let fastest = omega.iter().fold(1.0, |most: f64, omega| most.max(omega.abs()));
-        let mut after = vec![self.law_modes(&later(motion, A_MOMENT / fastest, &[]))];
+        let mut after = vec![self.law_modes(&motion.later(A_MOMENT / fastest, &[]))];
         if with_forces {
             let mut kernel = Kernel::<f64>::new(self);
             kernel.accelerate::<0>(self, motion.time, &phi, &omega, Bias::default());
-            after.push(self.law_modes(&later(motion, A_WHILE / fastest, &kernel.load[..phi.len()])));
+            after.push(self.law_modes(&motion.later(A_WHILE / fastest, &kernel.load[..phi.len()])));
         }
         let changes = |k: usize| zeros[k] && after.iter().any(|after| after[k] != here[k]);
         self.on((0..here.len()).map(|k| here[k] ^ changes(k)).collect())

@@ -25,14 +25,11 @@ pub(super) fn doubts(columns: &[FittedColumn]) -> Option<String> {
 }
 
 fn doubt(column: &FittedColumn) -> Option<String> {
-    let (name, count) = (&column.name, column.count() as f64);
-    if count == 0.0 {
-        return None;
-    }
-    let rms = (column.residuals().map(|residual| residual * residual).sum::<f64>() / count).sqrt();
+    // Without values it is no number, and above nothing.
+    let (name, rms) = (&column.name, column.rms());
     let over = |size: f64| format!("{:.*}", usize::from(rms < 10.0 * size), rms / size);
     if column.is_given {
-        let chance = (1.0 + DEVIATIONS * (2.0 / count).sqrt()).sqrt();
+        let chance = (1.0 + DEVIATIONS * (2.0 / column.count() as f64).sqrt()).sqrt();
         let sigma = column.sigma;
         return (rms > FAR.max(chance) * sigma)
             .then(|| format!("the residuals of {name} are {} times its sigma", over(sigma)));

@@ -144,6 +144,12 @@ impl FittedColumn {
         self.measured.iter().zip(&self.model).filter_map(|(measured, model)| Some((*measured)? - model))
     }
 
+    /// Root mean square of the residuals; NaN of a column without values.
+    pub(crate) fn rms(&self) -> f64 {
+        let squares: f64 = self.residuals().map(|residual| residual * residual).sum();
+        (squares / self.count() as f64).sqrt()
+    }
+
     /// How many values there are.
     pub(crate) fn count(&self) -> usize {
         self.measured.iter().flatten().count()

@@ -26,9 +26,9 @@ const DIVIDE: f64 = 1e5;
 const SHORTEST: f64 = 1e-5;
 
 impl Variation {
-    /// A step of ρ by collocation where one of the columns has such tails; its tail in units of [`LIMIT`], or
-    /// that of a step to be divided.  `None` where ρ has no smaller one, time itself acts, or
-    /// no formula has branches.
+    /// A step of ρ by collocation where one of the columns has such tails; its last Legendre coefficient, or
+    /// one of a step to be divided.  `None` where ρ has no smaller tail, time itself acts, or no formula has
+    /// branches.
     pub(super) fn fractional_step(
         &mut self,
         step: &mut Step,

@@ -131,13 +131,9 @@ pub(in crate::run) fn outputs(variation: &mut Variation, motion: &Motion) -> Der
 /// after it, for 1: a formula may jump where a law does.
 pub(super) fn outputs_beside(variation: &mut Variation, motion: &Motion, sense: f64) -> Derived {
     let mechanism = &variation.mechanism;
-    let Side { mut phi, mut omega, acceleration, .. } = Side::new(mechanism, motion);
-    let late = sense * BESIDE * mechanism.units.time;
-    for ((phi, omega), by) in phi.iter_mut().zip(&mut omega).zip(&acceleration) {
-        *phi += late * (*omega + 0.5 * late * by);
-        *omega += late * by;
-    }
-    let at = (motion.time + late, &phi[..], &omega[..]);
+    let Side { acceleration, .. } = Side::new(mechanism, motion);
+    let (t, phi, omega) = plain(&motion.later(sense * BESIDE * mechanism.units.time, &acceleration));
+    let at = (t, &phi[..], &omega[..]);
     let branches = shown(mechanism, &mut Kernel::new(mechanism), motion, at, |outputs, moment| {
         outputs.branches(moment, &mut OutputScratch::default(), &[])
     });

@@ -7,7 +7,6 @@
 use super::neighbours::{Neighbour, residuals};
 use super::variation::{Variation, plain};
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::rank::PERMANENT;
 use crate::dynamics::schur::NEAR;
 use crate::run::observer::Step;
 use crate::stepping::search::golden_sections;
@@ -35,9 +34,7 @@ impl Variation {
         };
         let first = verdict(begin);
         let mut share = |time: f64| {
-            let verdict = verdict(time);
-            let is_as_ever = first.share() < PERMANENT && verdict.is_left_out == first.is_left_out;
-            let share = if is_as_ever { verdict.kept() } else { verdict.share() };
+            let share = verdict(time).share_since(&first);
             if share < least.0 {
                 least = (share, time);
             }

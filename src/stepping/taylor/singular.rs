@@ -18,7 +18,6 @@
 use super::expansion::Expansion;
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::Kernel;
-use crate::dynamics::rank::{PERMANENT, RankVerdict};
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Form, Mechanism, State, Time};
@@ -99,12 +98,7 @@ impl<T: Coefficient> SingularPassage<T> {
             kernel.independence_at(mechanism, state.time, &phi, &state.y[n..2 * n])
         };
         let first = verdict(0.0);
-        let is_permanent = first.share() < PERMANENT;
-        let share_of = |verdict: &RankVerdict| {
-            let is_as_ever = is_permanent && verdict.is_left_out == first.is_left_out;
-            if is_as_ever { verdict.kept() } else { verdict.share() }
-        };
-        let here = share_of(&first);
+        let here = first.share_since(&first);
         if here >= NEAR {
             return None;
         }
@@ -112,7 +106,7 @@ impl<T: Coefficient> SingularPassage<T> {
         let (mut least, mut fell) = (here, false);
         for point in 1..=POINTS {
             let h = LONGEST * wanted * (point as f64 / POINTS as f64);
-            let now = share_of(&verdict(h));
+            let now = verdict(h).share_since(&first);
             if now.is_nan() {
                 return None;
             }
