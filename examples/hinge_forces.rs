@@ -18,7 +18,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         &scene,
         &Request { until: Some(1.0), every: Some(0.05), ..Request::default() },
         &mut |sample| {
-            kernel.accelerate::<0>(
+            kernel.accelerations(
                 &mechanism,
                 Time::from(sample.t),
                 &sample.phi,

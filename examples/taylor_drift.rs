@@ -7,7 +7,8 @@
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::Kernel;
-use driftless::dynamics::{Form, Mechanism, Motion, Time};
+use driftless::dynamics::{Mechanism, Motion, Time};
+use driftless::run::Problem;
 use driftless::scene::read_scene;
 use driftless::stepping::{Integrator, Seen, Taylor};
 use std::sync::Arc;
@@ -32,26 +33,22 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut scene = read_scene("examples/scenes/free.json".as_ref(), &[])?;
         scene.start[1].phi += 1e-3 * start as f64;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
-        let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+        let problem: &mut dyn Problem = &mut Elimination::<0>::new(Arc::clone(&mechanism));
         let mut state = problem.state(&mechanism.start(&scene));
         let mut method = Taylor::<f64>::with_order(tolerance, 24);
         method.extended = extended;
         let mut kernel = Kernel::<DoubleDouble>::without_rows(&mechanism);
-        let mut energy = |problem: &mut Elimination<0>, state: &_| {
+        let mut energy = |problem: &mut dyn Problem, state: &_| {
             let mut motion = Motion::default();
             problem.read(state, &mut motion);
             mechanism.energy(&mut kernel, &motion.phi, &motion.omega).total()
         };
-        let first = energy(&mut problem, &state);
+        let first = energy(problem, &state);
         for (&time, errors) in times.iter().zip(&mut errors) {
-            method.advance(
-                &mut problem,
-                &mut state,
-                Time::from(time),
-                &mut Default::default(),
-                &mut |_, _| Ok(Seen::Kept),
-            )?;
-            errors.push((energy(&mut problem, &state) - first).hi / mechanism.energy_scale);
+            method.advance(problem, &mut state, Time::from(time), &mut Default::default(), &mut |_, _| {
+                Ok(Seen::Kept)
+            })?;
+            errors.push((energy(problem, &state) - first).hi / mechanism.energy_scale);
         }
     }
     let spent = begin.elapsed().as_secs_f64();

@@ -6,6 +6,7 @@ use crate::common;
 use common::{compile, shipped};
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::{Form, Mechanism, State, Time};
+use driftless::run::Problem;
 use driftless::scene::{Scene, parse_scene};
 use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::taylor::batch::{Batch, BatchMember, Going};
@@ -72,10 +73,10 @@ fn one_to_six_bodies_agree_with_double_double() {
                 .integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
             for (member, (mechanism, start)) in members.iter().zip(mechanisms.iter().zip(&starts)) {
                 let mut exact = start.clone();
-                let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
+                let problem: &mut dyn Problem = &mut Elimination::<0>::new(Arc::clone(mechanism));
                 let mut statistics = Default::default();
                 Taylor::reference()
-                    .advance(&mut problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| {
+                    .advance(problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| {
                         Ok(Seen::Kept)
                     })
                     .expect("an end");
@@ -160,9 +161,9 @@ fn agree_with_double_double_whoever_is_beside(all: &[(Arc<Mechanism>, State)], u
     };
     let exact = |(mechanism, state): &(Arc<Mechanism>, State)| {
         let (mut exact, mut statistics) = (state.clone(), Default::default());
-        let mut problem = Elimination::<0>::new(Arc::clone(mechanism));
+        let problem: &mut dyn Problem = &mut Elimination::<0>::new(Arc::clone(mechanism));
         Taylor::reference()
-            .advance(&mut problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
+            .advance(problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
             .expect("an end");
         exact
     };
@@ -427,11 +428,11 @@ fn a_flip_is_found_within_its_step_and_ends_the_trajectory() {
     let end = members[0].state.time.hi;
     assert!(time < end && end < time + 0.5 && end < 20.0);
     // The same moment by the scalar method.
-    let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+    let problem: &mut dyn Problem = &mut Elimination::<0>::new(Arc::clone(&mechanism));
     let mut state = start(&mechanism, &scene);
     let mut statistics = Default::default();
     Taylor::reference()
-        .advance(&mut problem, &mut state, Time::from(time), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+        .advance(problem, &mut state, Time::from(time), &mut statistics, &mut |_, _| Ok(Seen::Kept))
         .expect("an end");
     let apart = (state.y[body].abs() - target.abs()).abs();
     assert!(apart < 1e-10, "{apart:e}");
@@ -475,10 +476,10 @@ fn symmetric_releases_and_equilibria_are_no_trap() {
         let mut members = [BatchMember::new(&mechanism, start(&mechanism, &scene))];
         Batch::new(tight()).integrate(&mut members, Time::from(1.0), &mut |_, _| Going::On);
         let mut exact = start(&mechanism, &scene);
-        let mut problem = Elimination::<0>::new(Arc::clone(&mechanism));
+        let problem: &mut dyn Problem = &mut Elimination::<0>::new(Arc::clone(&mechanism));
         let mut statistics = Default::default();
         Taylor::reference()
-            .advance(&mut problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| Ok(Seen::Kept))
+            .advance(problem, &mut exact, Time::from(1.0), &mut statistics, &mut |_, _| Ok(Seen::Kept))
             .expect("an end");
         for i in 0..4 {
             let error = (members[0].state.unknown(i) - exact.unknown(i)).hi.abs();

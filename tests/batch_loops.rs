@@ -8,6 +8,7 @@ use driftless::arithmetic::{Complex, DoubleDouble};
 use driftless::dynamics::constraint::{ConstraintArguments, RowMeasure};
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, State, Time};
+use driftless::run::Problem;
 use driftless::scene::{Scene, parse_scene};
 use driftless::stepping::taylor::ExpansionKernel;
 use driftless::stepping::taylor::batch::{Batch, BatchMember, Going, TakenStep};
@@ -129,9 +130,9 @@ pub fn agree_with_double_double(scene: &str, all: &[(Arc<Mechanism>, State)], un
     let until = Time::from(until);
     let exact = |(mechanism, state): &(Arc<Mechanism>, State)| {
         let (mut exact, mut statistics) = (state.clone(), Default::default());
-        let mut problem = Multiplier::<0, true>::new(Arc::clone(mechanism));
+        let problem: &mut dyn Problem = &mut Multiplier::<0, true>::new(Arc::clone(mechanism));
         Taylor::reference()
-            .advance(&mut problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
+            .advance(problem, &mut exact, until, &mut statistics, &mut |_, _| Ok(Seen::Kept))
             .expect("an end");
         exact
     };

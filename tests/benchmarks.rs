@@ -45,7 +45,7 @@ fn check(case: &Value) {
     let mechanism = Mechanism::new(&scene).expect("a valid scene");
     let (phi, omega) = ([start[0][0], start[1][0]], [start[0][1], start[1][1]]);
     let mut kernel = Kernel::<f64>::new(&mechanism);
-    kernel.accelerate::<0>(&mechanism, Default::default(), &phi, &omega, Bias::default());
+    kernel.accelerations(&mechanism, Default::default(), &phi, &omega, Bias::default());
     let mut accelerations = Vec::new();
     for k in 0..mechanism.bodies.len() {
         let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);
@@ -105,7 +105,7 @@ fn two_instants_with_a_guided_end() {
     let start = mechanism.start(&scene);
     let plain = |exact: &[DoubleDouble]| exact.iter().map(|x| x.hi).collect::<Vec<f64>>();
     let mut kernel = Kernel::<f64>::new(&mechanism);
-    kernel.accelerate::<0>(&mechanism, start.time, &plain(&start.phi), &plain(&start.omega), Bias::default());
+    kernel.accelerations(&mechanism, start.time, &plain(&start.phi), &plain(&start.omega), Bias::default());
     let expected = numbers(&cases[1]["accelerations"]);
     assert!(
         (kernel.load[0] - expected[2]).abs() < 1e-11 && (kernel.load[1] - expected[5]).abs() < 1e-11,

@@ -144,7 +144,7 @@ fn slide(y: [f64; 4], h: f64) -> [f64; 4] {
 fn pressure(scene: &Scene, sample: &Sample) -> f64 {
     let mechanism = compile(scene).holding(&[0]);
     let mut kernel = Kernel::<f64>::new(&mechanism);
-    kernel.accelerate::<0>(&mechanism, sample.t.into(), &sample.phi, &sample.omega, Bias::default());
+    kernel.accelerations(&mechanism, sample.t.into(), &sample.phi, &sample.omega, Bias::default());
     -kernel.multiplier[mechanism.standing_rows()] / mechanism.energy_scale
 }
 

@@ -14,6 +14,7 @@ use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time};
+use driftless::run::Problem;
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use nalgebra::SVector;
@@ -48,9 +49,9 @@ fn error(mechanism: &Mechanism, found: &Motion, reference: &Motion) -> f64 {
 const LOOKS: u64 = 8;
 
 /// Integrates one step a window and returns the motion at every look.
-fn steps<F: OdeSystem + Form>(
-    method: &mut impl Integrator<F>,
-    form: &mut F,
+fn steps(
+    method: &mut dyn Integrator<dyn Problem>,
+    form: &mut (dyn Problem + 'static),
     start: &Motion,
     count: u64,
 ) -> Vec<Motion> {
@@ -86,9 +87,9 @@ fn reference<const WORK: bool>(mechanism: &Arc<Mechanism>, start: &Motion) -> Ve
 }
 
 /// The slope of the error for these numbers of steps.
-fn measured<F: OdeSystem + Form>(
-    method: &mut impl Integrator<F>,
-    form: &mut F,
+fn measured(
+    method: &mut dyn Integrator<dyn Problem>,
+    form: &mut (dyn Problem + 'static),
     start: &Motion,
     reference: &[Motion],
     counts: &[u64],
@@ -117,7 +118,7 @@ fn measured<F: OdeSystem + Form>(
 }
 
 /// All four methods on one form.
-fn check<F: OdeSystem + Form>(form: &mut F, start: &Motion, reference: &[Motion]) {
+fn check(form: &mut (dyn Problem + 'static), start: &Motion, reference: &[Motion]) {
     let slopes = [
         (measured(&mut Dp5::new(LOOSE), form, start, reference, FIFTH), 5.0),
         (measured(&mut Dopri5::new(LOOSE), form, start, reference, FIFTH), 5.0),
@@ -193,13 +194,13 @@ fn the_crates_own_dop853_loses_its_order_where_time_matters_and_ours_does_not() 
         let h = END / count as f64;
         let y = (0..count).fold(exact(0.0), |y, k| raw_step(k as f64 * h, y, h));
         raw.push((h, (y - exact(END)).abs()));
-        let integrate = |method: &mut dyn Integrator<Bernoulli>| {
+        let integrate = |method: &mut dyn Integrator<dyn OdeSystem>| {
             let mut state = State::new(&[DoubleDouble::from(exact(0.0))], 0);
             state.memory = vec![h];
             let mut statistics = Statistics::default();
             for row in 1..=count {
                 let until = DoubleDouble::product(h, row as f64);
-                let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
+                let watch = &mut |_: &mut (dyn OdeSystem + 'static), _: &mut State| Ok(Seen::Kept);
                 assert_eq!(
                     method.advance(&mut Bernoulli { level: None }, &mut state, until, &mut statistics, watch),
                     Ok(Reached::Until)
@@ -224,11 +225,11 @@ fn the_time_of_an_event_has_the_order_of_a_step() {
     // y falls from pi/2 to 3 pi/2.  The worst of several events at three fifths of a step, against chance
     // cancellation.
     const EVENTS: [f64; 4] = [2.4, 2.6, 2.8, 3.0];
-    let locate = |method: &mut dyn Integrator<Bernoulli>, h: f64, event: f64| {
+    let locate = |method: &mut dyn Integrator<dyn OdeSystem>, h: f64, event: f64| {
         let start = event - 0.6 * h;
         let mut state = State::new(&[DoubleDouble::from(exact(start))], 0);
         (state.time, state.memory) = (Time::from(start), vec![h]);
-        let watch = &mut |_: &mut Bernoulli, _: &mut State| Ok(Seen::Kept);
+        let watch = &mut |_: &mut (dyn OdeSystem + 'static), _: &mut State| Ok(Seen::Kept);
         let reached = method.advance(
             &mut Bernoulli { level: Some(event) },
             &mut state,
@@ -240,7 +241,7 @@ fn the_time_of_an_event_has_the_order_of_a_step() {
         assert!((state.y[0] - exact(event)).abs() < 1e-15, "the state lies on the event");
         (state.time.hi - event).abs()
     };
-    let sweep = |method: &mut dyn Integrator<Bernoulli>, steps: &[f64]| -> f64 {
+    let sweep = |method: &mut dyn Integrator<dyn OdeSystem>, steps: &[f64]| -> f64 {
         let points: Vec<(f64, f64)> = steps
             .iter()
             .map(|&h| (h, EVENTS.iter().map(|&event| locate(method, h, event)).fold(0.0, f64::max)))

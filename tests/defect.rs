@@ -11,7 +11,7 @@ use driftless::dynamics::constraint::angle_equation;
 use driftless::dynamics::kernel::Kernel;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
-use driftless::run::{Limits, MethodId, Outcome, Request, Stabilization};
+use driftless::run::{Limits, MethodId, Outcome, Problem, Request, Stabilization};
 use driftless::scene::{Law, Scene};
 use driftless::stabilization::{Projected, projection};
 use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
@@ -132,7 +132,7 @@ fn the_stabilizers_energy_is_the_jump_it_makes() {
     let mechanism = common::compile(&scene);
     let mut start = mechanism.start(&scene);
     start.omega[0] = start.omega[0] + OFF;
-    let end = |method: &mut dyn Integrator<Multiplier<2, true>>| {
+    let end = |method: &mut dyn Integrator<dyn Problem>| {
         let mut form = Multiplier::<2, true>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);
         state.memory = vec![1e-3];
@@ -209,13 +209,11 @@ fn a_failed_projection_is_a_typed_stop() {
     let mut contradictory: Mechanism = (*mechanism).clone();
     contradictory.constraints.push(angle_equation("lock", 0, None, Law::constant(0.5)));
     let contradictory = Arc::new(contradictory);
-    let mut form = Multiplier::<2, true>::new(Arc::clone(&contradictory));
+    let form: &mut dyn Problem = &mut Multiplier::<2, true>::new(Arc::clone(&contradictory));
     let mut state = form.state(&start);
     let mut method = Projected::new(Dp8::new(Tolerance::default()));
-    let stop =
-        method.advance(&mut form, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| {
-            Ok(Seen::Kept)
-        });
+    let stop = method
+        .advance(form, &mut state, Time::from(1.0), &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept));
     let stop = stop.expect_err("a stop");
     assert_eq!(stop.cause, Cause::ProjectionFailed);
     assert!(stop.what.contains("motor") || stop.what.contains("lock"), "{stop}");

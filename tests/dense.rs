@@ -5,13 +5,13 @@ use crate::common;
 
 use common::{compile, order, shipped};
 use driftless::arithmetic::DoubleDouble;
-use driftless::dynamics::{State, Time};
+use driftless::dynamics::{OdeSystem, State, Time};
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::scene::Scene;
 use driftless::stepping::{Dp5, Dp8, Integrator, Radau, Statistics, Tolerance};
 
 /// The largest error inside one step of `h` from an exact state, over several steps and places in them.
-fn inside(method: &mut dyn Integrator<Bernoulli>, h: f64) -> f64 {
+fn inside(method: &mut dyn Integrator<dyn OdeSystem>, h: f64) -> f64 {
     let mut worst = 0.0_f64;
     for begin in [0.2, 0.7, 1.3, 2.1] {
         let mut from = State::new(&[DoubleDouble::from(exact(begin))], 0);
@@ -40,7 +40,7 @@ fn the_solution_inside_a_step_has_the_order_of_its_polynomial() {
     let radau = |stages, tolerance| Radau::new(stages, tolerance).expect("a method");
     // Newton's iteration of the implicit ones is as exact as their tolerance: a tight one, which a first step
     // proposed below the error keeps.
-    let methods: [(&mut dyn Integrator<Bernoulli>, f64, &[f64]); 3] = [
+    let methods: [(&mut dyn Integrator<dyn OdeSystem>, f64, &[f64]); 3] = [
         (&mut Dp5::new(LOOSE), 5.0, &[0.12, 0.1, 0.08, 0.06, 0.04, 0.03]),
         (&mut Dp8::new(LOOSE), 8.0, &[0.8, 0.6, 0.5, 0.4, 0.3]),
         (&mut radau(3, Tolerance { relative: 1e-7, absolute: 1e-7 }), 4.0, &[0.04, 0.03, 0.02, 0.015, 0.01]),

@@ -269,7 +269,7 @@ fn hinges_carry_a_spring_from_outside_as_one_of_the_scene() {
     let (phi, omega) = ([0.7, -1.1], [2.0, -3.0]);
     let forces = [own, other].map(|mechanism| {
         let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, Default::default(), &phi, &omega, Bias::default());
+        kernel.accelerations(&mechanism, Default::default(), &phi, &omega, Bias::default());
         mechanism.hinge_forces(Default::default(), &kernel, &phi, &omega)
     });
     for (own, other) in forces[0].iter().zip(&forces[1]) {

@@ -51,13 +51,7 @@ fn largest(numbers: impl IntoIterator<Item = f64>) -> f64 {
 /// The f64 kernel after an evaluation at a motion.
 fn evaluate(mechanism: &Mechanism, motion: &Motion) -> Kernel<f64> {
     let mut kernel = Kernel::new(mechanism);
-    kernel.accelerate::<0>(
-        mechanism,
-        motion.time,
-        &plain(&motion.phi),
-        &plain(&motion.omega),
-        Bias::default(),
-    );
+    kernel.accelerations(mechanism, motion.time, &plain(&motion.phi), &plain(&motion.omega), Bias::default());
     kernel
 }
 

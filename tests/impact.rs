@@ -8,8 +8,8 @@ use crate::common;
 
 use common::{PENDULUM_SQUARED, compile, pendulum, quarter_period, run, shipped};
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Form, Mechanism, State, Time};
-use driftless::run::{MethodId, Outcome, Plan, Request};
+use driftless::dynamics::{Mechanism, State, Time};
+use driftless::run::{MethodId, Outcome, Plan, Problem, Request};
 use driftless::scene::{Law, Motor, Scene, Wall};
 use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Tolerance};
 use std::f64::consts::PI;
@@ -126,16 +126,13 @@ fn the_state_at_a_strike_lies_on_the_wall_to_rounding() {
     for (angle, start) in [(0.0, 1.0), (0.5, 2.0), (-0.7, 1.2)] {
         let scene = bouncing(angle, start, 1.0);
         let mechanism = compile(&scene);
-        let mut form = Multiplier::<1, false>::new(Arc::clone(&mechanism));
+        let form: &mut dyn Problem = &mut Multiplier::<1, false>::new(Arc::clone(&mechanism));
         let mut state: State = form.state(&mechanism.start(&scene));
         let mut method = Dp8::new(Tolerance { relative: 1e-8, absolute: 1e-8 });
-        let reached = method.advance(
-            &mut form,
-            &mut state,
-            Time::from(10.0),
-            &mut Statistics::default(),
-            &mut |_, _| Ok(Seen::Kept),
-        );
+        let reached =
+            method.advance(form, &mut state, Time::from(10.0), &mut Statistics::default(), &mut |_, _| {
+                Ok(Seen::Kept)
+            });
         assert_eq!(reached, Ok(Reached::Event(0)));
         let gap = mechanism.contacts[0].row.gap(&[driftless::arithmetic::Complex::unit(state.y[0])]);
         assert!(gap.abs() < 1e-14, "{gap:e} m");

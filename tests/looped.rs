@@ -18,6 +18,7 @@ use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
 use driftless::dynamics::schur::NEAR;
 use driftless::dynamics::{Form, Mechanism, Motion, OdeSystem, State, Time};
+use driftless::run::Problem;
 use driftless::stabilization::Projected;
 use driftless::stepping::composition::Composition;
 use driftless::stepping::rattle::Rattle;
@@ -39,12 +40,17 @@ fn looped(mechanism: &Arc<Mechanism>) -> Looped {
     Looped::new(Arc::clone(mechanism)).expect("a small mechanism with loops")
 }
 
+/// The same without its type.
+fn problem(mechanism: &Arc<Mechanism>) -> Box<dyn Problem> {
+    Box::new(looped(mechanism))
+}
+
 /// A run to a time: the motion there, the steps, and the largest violation of a row after any of them,
 /// relative to 0.1 m and to 0.1 m times the fastest rate.
 fn run<P: Form + ?Sized>(
     problem: &mut P,
     start: &Motion,
-    method: &mut impl Integrator<P>,
+    method: &mut dyn Integrator<P>,
     until: f64,
 ) -> (Motion, Statistics, f64) {
     let mut state = problem.state(start);
@@ -82,8 +88,7 @@ fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
     for (name, until) in [("andrews", 0.03), ("four_bars", 3.0), ("kite", 0.5), ("slider_crank_torque", 1.0)]
     {
         let (mechanism, start) = started(name);
-        let Some(mut form) = Looped::new(Arc::clone(&mechanism)) else { panic!("{name} does not fit") };
-        let mut portable = looped(&mechanism).portable();
+        let (mut form, mut portable) = (problem(&mechanism), looped(&mechanism).portable());
         let mut angles = Multiplier::<0, true>::new(Arc::clone(&mechanism));
         let mut state = form.state(&start);
         let mut method = Projected::new(Dp8::new(both(1e-9)));
@@ -91,11 +96,11 @@ fn the_natural_solve_gives_the_accelerations_of_the_angle_form() {
         let (mut rows, n) = (Rows::<f64>::new(&mechanism), mechanism.bodies.len());
         let mut statistics = Statistics::default();
         let reached = method.advance(
-            &mut form,
+            &mut *form,
             &mut state,
             Time::from(until),
             &mut statistics,
-            &mut |form: &mut Looped, state: &mut State| {
+            &mut |form: &mut (dyn Problem + 'static), state: &mut State| {
                 form.rhs(state.time, &state.y, &mut rates[0]);
                 angles.rhs(state.time, &state.y, &mut rates[1]);
                 portable.rhs(state.time, &state.y, &mut rates[2]);
@@ -129,18 +134,22 @@ fn projection_in_natural_coordinates_lands_where_that_in_angles_does() {
             start.phi[k] += DoubleDouble::of(off * (1.7 * k as f64).cos());
             start.omega[k] += DoubleDouble::of(off * (2.3 * k as f64).sin());
         }
-        let mut angles = Multiplier::<0, true>::new(Arc::clone(&mechanism));
+        let angles: &mut dyn Problem = &mut Multiplier::<0, true>::new(Arc::clone(&mechanism));
         let mut ends = [angles.state(&start), angles.state(&start)];
         let method = || Projected::new(Dp8::new(both(1e-9)));
         let (mut statistics, until) = (Statistics::default(), Time::from(1e-9));
         assert_eq!(
-            method().advance(&mut angles, &mut ends[0], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)),
+            method().advance(angles, &mut ends[0], until, &mut statistics, &mut |_, _| Ok(Seen::Kept)),
             Ok(Reached::Until)
         );
         assert_eq!(
-            method().advance(&mut looped(&mechanism), &mut ends[1], until, &mut statistics, &mut |_, _| Ok(
-                Seen::Kept
-            )),
+            method().advance(
+                &mut *problem(&mechanism),
+                &mut ends[1],
+                until,
+                &mut statistics,
+                &mut |_, _| Ok(Seen::Kept)
+            ),
             Ok(Reached::Until)
         );
         let moved =
@@ -163,7 +172,7 @@ fn adaptive_methods_take_the_squeezing_mechanism_to_its_known_end() {
     let (mechanism, start) = started("andrews");
     for (tolerance, bound) in [(1e-9, 1e-8), (1e-13, 1e-11)] {
         let (end, _, residual) =
-            run(&mut looped(&mechanism), &start, &mut Projected::new(Dp8::new(both(tolerance))), 0.03);
+            run(&mut *problem(&mechanism), &start, &mut Projected::new(Dp8::new(both(tolerance))), 0.03);
         assert!(error(&end) < bound, "{tolerance:e}: {:e}", error(&end));
         assert!(residual < 1e-13, "{residual:e}");
         assert!((end.omega[0].hi - reference()[1][0]).abs() < 1e3 * bound);
@@ -177,12 +186,12 @@ fn the_series_takes_the_squeezing_mechanism_to_its_known_end() {
         for projected in [false, true] {
             let mut method = taylor(tolerance, ExpansionKernel::Fastest);
             let (end, _, residual) = if projected {
-                run(&mut looped(&mechanism), &start, &mut Projected::new(method), 0.03)
+                run(&mut *problem(&mechanism), &start, &mut Projected::new(method), 0.03)
             } else {
-                run(&mut looped(&mechanism), &start, &mut method, 0.03)
+                run(&mut *problem(&mechanism), &start, &mut method, 0.03)
             };
             let series = taylor(tolerance, ExpansionKernel::Series);
-            let (other, ..) = run(&mut looped(&mechanism), &start, &mut Projected::new(series), 0.03);
+            let (other, ..) = run(&mut *problem(&mechanism), &start, &mut Projected::new(series), 0.03);
             assert!(error(&end) < bound, "{tolerance:e}: {:e}", error(&end));
             assert!(residual < 1e-13, "{residual:e}");
             assert!((end.work - other.work).hi.abs() < 10.0 * bound, "{:?} {:?}", end.work, other.work);
@@ -194,7 +203,7 @@ fn the_series_takes_the_squeezing_mechanism_to_its_known_end() {
 fn the_series_has_the_same_bits_without_the_processors_instructions() {
     let (mechanism, start) = started("andrews");
     let end =
-        |kernel: ExpansionKernel| run(&mut looped(&mechanism), &start, &mut taylor(1e-9, kernel), 0.01).0;
+        |kernel: ExpansionKernel| run(&mut *problem(&mechanism), &start, &mut taylor(1e-9, kernel), 0.01).0;
     assert_eq!(end(ExpansionKernel::Fastest), end(ExpansionKernel::Portable));
 }
 
@@ -202,22 +211,22 @@ fn the_series_has_the_same_bits_without_the_processors_instructions() {
 #[test]
 fn the_series_is_its_own_dense_output() {
     let (mechanism, start) = started("andrews");
-    let mut form = looped(&mechanism);
+    let mut form = problem(&mechanism);
     let mut taylor = Taylor::<f64>::new(both(1e-10));
     let mut state = form.state(&start);
     let (mut from, mut statistics) = (state.clone(), Statistics::default());
     while state.time.hi < 0.02 {
         from.clone_from(&state);
         taylor
-            .advance(&mut form, &mut state, Time::from(0.03), &mut statistics, &mut |_, _| Ok(Seen::Enough))
+            .advance(&mut *form, &mut state, Time::from(0.03), &mut statistics, &mut |_, _| Ok(Seen::Enough))
             .expect("a step");
     }
     let middle = from.time + 0.4 * (state.time - from.time).hi;
     let mut inside = State::default();
-    taylor.interpolate(&mut form, &from, middle, &mut inside);
+    taylor.interpolate(&mut *form, &from, middle, &mut inside);
     let mut found = Motion::default();
     form.read(&inside, &mut found);
-    let (exact, ..) = run(&mut looped(&mechanism), &start, &mut Taylor::<f64>::new(both(1e-10)), middle.hi);
+    let (exact, ..) = run(&mut *problem(&mechanism), &start, &mut Taylor::<f64>::new(both(1e-10)), middle.hi);
     assert!(distance(&found, &exact) < 1e-7, "{:e}", distance(&found, &exact));
     assert!(found.unwrapped(0) > 7.0);
 }
@@ -287,11 +296,11 @@ fn rattle_keeps_energy_less_work_of_driven_mechanisms() {
         );
         assert_eq!(reached, Ok(Reached::Until), "{name}");
         assert!(worst < 1e-6, "{name}: {worst:e}");
-        let mut field = Multiplier::<0, true>::new(Arc::clone(&mechanism));
+        let field: &mut dyn Problem = &mut Multiplier::<0, true>::new(Arc::clone(&mechanism));
         let (other, ..) = {
             let mut state = field.state(&start);
             let reached = Projected::new(Dp8::new(both(1e-11))).advance(
-                &mut field,
+                field,
                 &mut state,
                 Time::from(until),
                 &mut Statistics::default(),

@@ -144,7 +144,7 @@ fn mechanism(n: usize, seed: u64) -> Option<Scene> {
 fn is_sound(mechanism: &Mechanism, motion: &Motion) -> bool {
     let mut kernel = Kernel::<f64>::new(mechanism);
     let (phi, omega) = numbers(motion);
-    kernel.accelerate::<0>(mechanism, Time::default(), &phi, &omega, Bias::default());
+    kernel.accelerations(mechanism, Time::default(), &phi, &omega, Bias::default());
     // Of rows that depend on others everywhere each form may leave out another one; light members cost both
     // forms digits.
     let share =
@@ -190,7 +190,7 @@ fn sound(n: usize, seed: u64) -> Result<Sound, TestCaseError> {
     prop_assume!(is_sound(&mechanism, &motion));
     let (phi, omega) = numbers(&motion);
     let mut kernel = Kernel::<f64>::new(&mechanism);
-    kernel.accelerate::<0>(&mechanism, Time::default(), &phi, &omega, Bias::default());
+    kernel.accelerations(&mechanism, Time::default(), &phi, &omega, Bias::default());
     Ok(Sound { scene, mechanism, motion, kernel })
 }
 

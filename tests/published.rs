@@ -16,7 +16,7 @@ fn solve(scene: &Scene) -> ([f64; 6], Vec<f64>, Vec<Complex<f64>>) {
     let phi: Vec<f64> = scene.start.iter().map(|start| start.phi).collect();
     let omega: Vec<f64> = scene.start.iter().map(|start| start.omega).collect();
     let mut kernel = Kernel::<f64>::new(mechanism);
-    kernel.accelerate::<0>(mechanism, Default::default(), &phi, &omega, Bias::default());
+    kernel.accelerations(mechanism, Default::default(), &phi, &omega, Bias::default());
     let mut found = [0.0; 6];
     for k in 0..mechanism.bodies.len() {
         let centre = mechanism.centre(k).acceleration(&kernel.z, &omega, &kernel.load);

@@ -263,7 +263,7 @@ proptest! {
         let phi: Vec<f64> = scene.start.iter().map(|start| start.phi).collect();
         let omega: Vec<f64> = scene.start.iter().map(|start| start.omega).collect();
         let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, time, &phi, &omega, Bias::default());
+        kernel.accelerations(&mechanism, time, &phi, &omega, Bias::default());
         let natural = Natural::new(mechanism.clone()).unwrap();
         let z: Vec<Complex<f64>> = phi.iter().map(|&phi| Complex::unit(phi)).collect();
         let rate: Vec<Complex<f64>> = z.iter().zip(&omega).map(|(z, &omega)| z.left().times(omega)).collect();

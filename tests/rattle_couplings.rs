@@ -197,7 +197,7 @@ fn natural_coordinates_and_angles_tell_the_same_accelerations() {
         let whole: Vec<f64> = (0..start.phi.len()).map(|k| start.unwrapped(k)).collect();
         let omega: Vec<f64> = start.omega.iter().map(|omega| omega.hi).collect();
         let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, Time::default(), &whole, &omega, Bias::default());
+        kernel.accelerations(&mechanism, Time::default(), &whole, &omega, Bias::default());
         let natural = Natural::new(mechanism.clone()).expect("a natural form");
         let bodies = mechanism.bodies.len();
         let (mut z, mut rate) =

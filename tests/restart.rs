@@ -7,8 +7,8 @@ use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::canonical::Canonical;
 use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
-use driftless::dynamics::{Form, Motion, OdeSystem, State, Time};
-use driftless::run::{MethodId, Request, Stabilization};
+use driftless::dynamics::{Form, Motion, State, Time};
+use driftless::run::{MethodId, Problem, Request, Stabilization};
 use driftless::stabilization::{Baumgarte, Projected};
 use driftless::stepping::gauss::Gauss;
 use driftless::stepping::{Dop853, Dopri5, Dp5, Dp8, Integrator, Seen, Statistics, Taylor, Tolerance};
@@ -20,7 +20,7 @@ const EVERY: f64 = 0.0625;
 
 /// Forty intervals in one go, and in two halves by another method object and another form from a clone of the
 /// state.
-fn check<F: OdeSystem + Form, M: Integrator<F>>(
+fn check<F: Problem + 'static, M: Integrator<dyn Problem>>(
     form: &dyn Fn() -> F,
     method: &dyn Fn() -> M,
     start: &Motion,
@@ -132,7 +132,7 @@ fn a_run_with_its_rates_turned_round_comes_back() {
 fn a_time_that_lies_behind_is_refused() {
     let (mechanism, start) = common::started("free");
     let mut form = Multiplier::<2, false>::new(Arc::clone(&mechanism));
-    let methods: [Box<dyn Integrator<Multiplier<2, false>>>; 4] = [
+    let methods: [Box<dyn Integrator<dyn Problem>>; 4] = [
         Box::new(Dp5::new(TOLERANCE)),
         Box::new(Dp8::new(TOLERANCE)),
         Box::new(Dopri5::new(TOLERANCE)),

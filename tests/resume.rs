@@ -9,7 +9,7 @@ use common::shipped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism};
 use driftless::run::{
-    Limits, METHODS, MethodId, Outcome, Plan, Request, Run, Running, Sample, Snapshot, Stabilization,
+    Limits, METHODS, MethodId, Outcome, Plan, Problem, Request, Run, Running, Sample, Snapshot, Stabilization,
 };
 use driftless::scene::Scene;
 use driftless::stepping::composition::Composition::Single;
@@ -194,7 +194,7 @@ fn so_do_rows_inside_one_step() {
 /// A method whose effort is used up stops at the same place where it was cut short on the way.
 #[test]
 fn effort_is_not_allowed_anew() {
-    fn stops_at<M: Integrator<Multiplier<2, false>>>(mut method: M, seen: Seen) -> f64 {
+    fn stops_at(mut method: impl Integrator<dyn Problem>, seen: Seen) -> f64 {
         let (mechanism, start) = common::started("free");
         let mut form = Multiplier::<2, false>::new(mechanism);
         let mut state = form.state(&start);

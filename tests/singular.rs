@@ -246,7 +246,7 @@ fn linkage(random: &mut Random) -> (Kind, Value) {
 /// constraint is left out or called singular.
 fn accelerations(mechanism: &Arc<Mechanism>, phi: &[f64], omega: &[f64]) -> (Vec<Vec<f64>>, bool) {
     let mut kernel = Kernel::<f64>::new(mechanism);
-    kernel.accelerate::<0>(mechanism, Time::default(), phi, omega, Bias::default());
+    kernel.accelerations(mechanism, Time::default(), phi, omega, Bias::default());
     let rows = mechanism.constraints.len();
     let is_sound = (0..rows).all(|r| !kernel.is_left_out(r)) && kernel.weakest.share > 1e-2;
     let mut found = vec![kernel.load.clone()];

@@ -10,7 +10,7 @@ use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::kernel::Kernel as Energies;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism, Motion, State, Time};
-use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Sample, integrate};
+use driftless::run::{Limits, MethodId, Outcome, Plan, Problem, Request, Run, Sample, integrate};
 use driftless::scene::{Bar, Hinge, Place, Scene, Sine, Spring, Start};
 use driftless::stabilization::Projected;
 use driftless::stepping::taylor::ExpansionKernel;
@@ -19,7 +19,7 @@ use driftless::stepping::{Dp8, Integrator, Reached, Seen, Statistics, Taylor, To
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
 
-pub fn end<M: Integrator<Elimination<0>>>(scene: &Scene, mut method: M, until: f64) -> Motion {
+pub fn end(scene: &Scene, mut method: impl Integrator<dyn Problem>, until: f64) -> Motion {
     let mechanism = compile(scene);
     let mut problem = Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(scene));
@@ -255,15 +255,15 @@ fn a_symmetric_release_takes_no_step_too_long() {
     let mechanism = compile(&scene);
     for kernel in [ExpansionKernel::Fastest, ExpansionKernel::Series] {
         for order in [16, 20, 24] {
-            let mut problem = Elimination::<0>::new(mechanism.clone());
+            let problem: &mut dyn Problem = &mut Elimination::<0>::new(mechanism.clone());
             let mut state = problem.state(&mechanism.start(&scene));
             let mut times = Vec::new();
-            let mut watch = |_: &mut Elimination<0>, state: &mut State| {
+            let mut watch = |_: &mut (dyn Problem + 'static), state: &mut State| {
                 times.push(state.time);
                 Ok(Seen::Kept)
             };
             on(kernel, 1e-12, order)
-                .advance(&mut problem, &mut state, Time::from(1.0), &mut Statistics::default(), &mut watch)
+                .advance(problem, &mut state, Time::from(1.0), &mut Statistics::default(), &mut watch)
                 .expect("an end");
             let after_one = end(&scene, on(kernel, 1e-12, order), times[0].hi);
             let exact = end(&scene, Taylor::reference(), times[0].hi);
@@ -290,14 +290,16 @@ fn a_run_continued_from_a_stored_state_has_the_same_bits() {
     for (name, scene) in fast_scenes() {
         let mechanism = compile(&scene);
         let mut problem = Elimination::<0>::new(mechanism.clone());
-        let integrate =
-            |problem: &mut Elimination<0>, state: &mut State, method: &mut Taylor<f64>, until: f64| {
-                method
-                    .advance(problem, state, Time::from(until), &mut Statistics::default(), &mut |_, _| {
-                        Ok(Seen::Kept)
-                    })
-                    .expect("an end");
-            };
+        let integrate = |problem: &mut (dyn Problem + 'static),
+                         state: &mut State,
+                         method: &mut Taylor<f64>,
+                         until: f64| {
+            method
+                .advance(problem, state, Time::from(until), &mut Statistics::default(), &mut |_, _| {
+                    Ok(Seen::Kept)
+                })
+                .expect("an end");
+        };
         let mut method = on(ExpansionKernel::Fastest, 1e-15, 20);
         let mut whole = problem.state(&mechanism.start(&scene));
         integrate(&mut problem, &mut whole, &mut method, 3.0);
@@ -333,10 +335,10 @@ fn energy_stays_at_rounding_for_a_thousand_seconds() {
 fn numbers_out_of_range_are_a_typed_stop() {
     let scene = shipped("free", &["start.bar1.omega=1e30"]);
     let mechanism = compile(&scene);
-    let mut problem = Elimination::<0>::new(mechanism.clone());
+    let problem: &mut dyn Problem = &mut Elimination::<0>::new(mechanism.clone());
     let mut state = problem.state(&mechanism.start(&scene));
     let stop = on(ExpansionKernel::Fastest, 1e-12, 20).advance(
-        &mut problem,
+        problem,
         &mut state,
         Time::from(1.0),
         &mut Statistics::default(),
@@ -507,10 +509,10 @@ impl FourBar {
 const FOUR_BAR: FourBar = FourBar { length: [0.3, 1.0, 0.8], mass: [0.5, 1.2, 0.9] };
 
 /// Integrates a mechanism by multipliers.
-fn bordered<M: Integrator<Multiplier<0, true>>>(
+fn bordered(
     mechanism: &Arc<Mechanism>,
     start: &Motion,
-    mut method: M,
+    mut method: impl Integrator<dyn Problem>,
     until: f64,
 ) -> Motion {
     let mut form = Multiplier::<0, true>::new(Arc::clone(mechanism));
@@ -697,9 +699,9 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
         let mechanism = compile(&scene);
         let (row, horizon) = (Time::from(1.0), Time::from(3.0));
         // To the first step that passes the row, and the row.
-        let pass = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {
+        let pass = |form: &mut (dyn Problem + 'static), method: &mut Taylor<f64>, state: &mut State| {
             let mut from = state.clone();
-            let mut watch = |_: &mut Elimination<0>, state: &mut State| {
+            let mut watch = |_: &mut (dyn Problem + 'static), state: &mut State| {
                 if state.time >= row {
                     return Ok(Seen::Enough);
                 }
@@ -712,7 +714,7 @@ fn a_march_goes_on_bit_for_bit_from_where_its_last_step_began() {
             method.interpolate(form, &from, row, &mut inside);
             (from, inside)
         };
-        let finish = |form: &mut Elimination<0>, method: &mut Taylor<f64>, state: &mut State| {
+        let finish = |form: &mut (dyn Problem + 'static), method: &mut Taylor<f64>, state: &mut State| {
             method
                 .advance(form, state, horizon, &mut Statistics::default(), &mut |_, _| Ok(Seen::Kept))
                 .expect("an end");

@@ -15,7 +15,7 @@ use driftless::dynamics::elimination::Elimination;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::natural::Natural;
 use driftless::dynamics::{Form, Mechanism, Motion};
-use driftless::run::{Drift, Limits, METHODS, MethodId, Outcome, Plan, Request, Sample};
+use driftless::run::{Drift, Limits, METHODS, MethodId, Outcome, Plan, Problem, Request, Sample};
 use driftless::scene::{Scene, parse_scene};
 use driftless::stabilization::{Projected, SymmetricGauss};
 use driftless::stepping::composition::Composition;
@@ -375,23 +375,23 @@ fn methods_forget_the_motion_before_a_jump_and_keep_the_step() {
         (mechanism, start)
     };
     let (mechanism, start) = of("spring");
-    let mut form = Elimination::<0>::new(Arc::clone(&mechanism));
-    forgets(|| Dp5::new(tolerance), &mut form, &start, 0.3, true);
-    forgets(|| Dp8::new(tolerance), &mut form, &start, 0.3, true);
-    forgets(|| Dopri5::new(tolerance), &mut form, &start, 0.3, true);
-    forgets(|| Dop853::new(tolerance), &mut form, &start, 0.3, true);
-    forgets(|| Radau::new(3, tolerance).expect("a method"), &mut form, &start, 0.3, true);
-    forgets(|| Radau::new(5, tolerance).expect("a method"), &mut form, &start, 0.3, true);
-    forgets(|| Taylor::<f64>::new(tolerance), &mut form, &start, 0.3, false);
-    let mut form = Canonical::<0, true>::new(Arc::clone(&mechanism));
-    forgets(|| Gauss::new(3, 0.01).expect("a method"), &mut form, &start, 0.3, false);
+    let form: &mut dyn Problem = &mut Elimination::<0>::new(Arc::clone(&mechanism));
+    forgets(|| Dp5::new(tolerance), form, &start, 0.3, true);
+    forgets(|| Dp8::new(tolerance), form, &start, 0.3, true);
+    forgets(|| Dopri5::new(tolerance), form, &start, 0.3, true);
+    forgets(|| Dop853::new(tolerance), form, &start, 0.3, true);
+    forgets(|| Radau::new(3, tolerance).expect("a method"), form, &start, 0.3, true);
+    forgets(|| Radau::new(5, tolerance).expect("a method"), form, &start, 0.3, true);
+    forgets(|| Taylor::<f64>::new(tolerance), form, &start, 0.3, false);
+    let form: &mut dyn Problem = &mut Canonical::<0, true>::new(Arc::clone(&mechanism));
+    forgets(|| Gauss::new(3, 0.01).expect("a method"), form, &start, 0.3, false);
     let mut form = Natural::new(mechanism).expect("a form");
     forgets(|| Rattle::new(Composition::Single, 0.01), &mut form, &start, 0.3, false);
     let (mechanism, start) = of("andrews");
-    let mut form = Multiplier::<0, true>::new(mechanism);
-    forgets(|| Projected::new(Dp8::new(tolerance)), &mut form, &start, 0.003, true);
-    forgets(|| Projected::new(Radau::new(3, tolerance).expect("a method")), &mut form, &start, 0.003, true);
-    forgets(|| SymmetricGauss::new(Gauss::new(2, 1e-4).expect("a method")), &mut form, &start, 0.003, false);
+    let form: &mut dyn Problem = &mut Multiplier::<0, true>::new(mechanism);
+    forgets(|| Projected::new(Dp8::new(tolerance)), form, &start, 0.003, true);
+    forgets(|| Projected::new(Radau::new(3, tolerance).expect("a method")), form, &start, 0.003, true);
+    forgets(|| SymmetricGauss::new(Gauss::new(2, 1e-4).expect("a method")), form, &start, 0.003, false);
 }
 
 /// Random trees, with and without motors, by every adaptive method at every tolerance: none is taken for

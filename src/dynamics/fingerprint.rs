@@ -21,7 +21,7 @@ impl Mechanism {
         let [phi, omega] = motion.rounded();
         let mut kernel = Kernel::<f64>::new(self);
         let energy = self.energy(&mut kernel, &phi, &omega);
-        kernel.accelerate::<0>(self, motion.time, &phi, &omega, Bias::default());
+        kernel.accelerations(self, motion.time, &phi, &omega, Bias::default());
         let z = self.elements(&phi);
         let at = ConstraintArguments { phi: &phi, z: &z, omega: &omega };
         let forces = self.with_all_parts().forces.iter();

@@ -322,6 +322,11 @@ impl<T: Real> Kernel<T> {
 }
 
 impl Kernel<f64> {
+    /// [`Kernel::accelerate`] for any number of bodies, compiled once: what is inlined elsewhere is large.
+    pub fn accelerations(&mut self, mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64], bias: Bias) {
+        self.accelerate::<0>(mechanism, t, phi, omega, bias);
+    }
+
     /// The stretches of all springs for the evaluations that follow, at angles and translational coordinates
     /// given with what they leave out \[rad, m\].
     ///

@@ -37,8 +37,8 @@ impl<const N: usize, const WORK: bool> Multiplier<N, WORK> {
         !self.mechanism.frictions.is_empty()
     }
 
-    /// y' with a stabilizer's bias in every row.
-    #[inline(always)]
+    /// y' with a stabilizer's bias in every row; compiled once for all who ask.
+    #[inline(never)]
     pub fn biased_rate(&mut self, t: Time, y: &[f64], rate: &mut [f64], bias: Bias) {
         let n = size::<N>(self.mechanism.coordinates());
         let (phi, omega) = (&y[..n], &y[n..2 * n]);
@@ -133,7 +133,8 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
         for (gap, contact) in gaps.iter_mut().zip(&mechanism.contacts) {
             *gap = contact.gap(t, &y[..n], &self.kernel.z);
         }
-        if !mechanism.held.is_empty() {
+        // What is held is a row.
+        if WORK && !mechanism.held.is_empty() {
             self.kernel.accelerate::<N>(mechanism, t, &y[..n], &y[n..2 * n], Bias::default());
         }
         // What is held ends where the wall would have to pull.

@@ -136,7 +136,7 @@ pub fn inspect(scene: &Scene, mechanism: &Mechanism) -> Inspection {
 pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
     let [phi, omega] = start.rounded();
     let mut kernel = Kernel::<f64>::new(mechanism);
-    kernel.accelerate::<0>(mechanism, start.time, &phi, &omega, Bias::default());
+    kernel.accelerations(mechanism, start.time, &phi, &omega, Bias::default());
     let (t, energy_scale) = (start.time.hi, mechanism.energy_scale);
     let mut found = Inspection { t, energy_scale, ..Inspection::default() };
     let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);

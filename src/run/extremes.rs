@@ -238,7 +238,7 @@ impl ExtremesDetector {
         winding.extend((0..phi.len()).map(|k| motion.unwrapped(k)));
         let Some(outputs) = &mechanism.outputs else { return R::default() };
         if outputs.needs_equations() {
-            kernel.accelerate::<0>(mechanism, motion.time, phi, omega, Bias::default());
+            kernel.accelerations(mechanism, motion.time, phi, omega, Bias::default());
         } else {
             kernel.place(mechanism, phi);
         }

@@ -140,7 +140,7 @@ impl FrictionWatch {
             return values;
         }
         let (kernel, n) = (&mut *self.kernel.borrow_mut(), phi.len());
-        kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
+        kernel.accelerations(mechanism, motion.time, &phi, &omega, Bias::default());
         if !is_sticking && kernel.regularity > REGULAR {
             self.regularity.set(Some(kernel.regularity));
         }
@@ -176,7 +176,7 @@ impl FrictionWatch {
         let mechanism = &*self.mechanism;
         let kernel = &mut *self.kernel.borrow_mut();
         let mut force = |time: Time, phi: &[f64], omega: &[f64]| {
-            kernel.accelerate::<0>(mechanism, time, phi, omega, Bias::default());
+            kernel.accelerations(mechanism, time, phi, omega, Bias::default());
             (kernel.friction_forces(mechanism, time, phi, omega)[place][0], kernel.load.clone())
         };
         let [phi, omega] = motion.rounded();
@@ -250,7 +250,7 @@ impl ContactDriver {
         let motion = self.motion();
         let [phi, omega] = motion.rounded();
         let mut kernel = Kernel::<f64>::new(&self.mechanism);
-        kernel.accelerate::<0>(&self.mechanism, motion.time, &phi, &omega, Bias::default());
+        kernel.accelerations(&self.mechanism, motion.time, &phi, &omega, Bias::default());
         kernel.regularity.abs() < JAMMED
     }
 

@@ -188,7 +188,7 @@ impl Sampler {
         if self.holding.constraints.is_empty() && mechanism.outputs.is_none() {
             self.plain.unit_vectors::<0>(mechanism, &self.phi);
         } else {
-            self.plain.accelerate::<0>(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
+            self.plain.accelerations(&self.holding, motion.time, &self.phi, &self.omega, Bias::default());
         }
         if mechanism.constraints.iter().any(ConstraintEquation::moves) {
             self.holding.share_multipliers(motion.time, &mut self.plain, &self.phi, &self.omega);

@@ -66,9 +66,15 @@ impl Dense {
         {
             local.copy_from_slice(powers);
             shift(local, centre);
-            let terms = |skip: usize| local.iter().enumerate().skip(skip).rev();
-            *first = terms(1).fold(0.0, |sum, (m, a)| sum * radius + m as f64 * a.abs());
-            *second = terms(2).fold(0.0, |sum, (m, a)| sum * radius + (m * (m - 1)) as f64 * a.abs());
+            (*first, *second) = (0.0, 0.0);
+            for (m, a) in local.iter().enumerate().rev() {
+                if m > 0 {
+                    *first = *first * radius + m as f64 * a.abs();
+                }
+                if m > 1 {
+                    *second = *second * radius + (m * (m - 1)) as f64 * a.abs();
+                }
+            }
         }
     }
 }

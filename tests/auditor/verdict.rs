@@ -49,7 +49,7 @@ pub fn run(text: &str, request: &Request) -> Result<Ran, String> {
     let outcome = outcome.map_err(|error: RunError| format!("run: {error}"))?;
     let mut kernel = Kernel::<f64>::new(&mechanism);
     let forces = samples.iter().map(|sample| {
-        kernel.accelerate::<0>(&mechanism, Time::from(sample.t), &sample.phi, &sample.omega, Bias::default());
+        kernel.accelerations(&mechanism, Time::from(sample.t), &sample.phi, &sample.omega, Bias::default());
         let found = mechanism.joint_forces(Time::from(sample.t), &kernel, &sample.phi, &sample.omega);
         (found.hinges.iter().map(|force| [force.re, force.im]).collect(), found.multipliers)
     });

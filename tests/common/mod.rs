@@ -3,7 +3,7 @@
 
 use driftless::arithmetic::DoubleDouble;
 use driftless::dynamics::{Mechanism, Motion, State};
-use driftless::run::{Limits, Outcome, Plan, Request, Run, integrate};
+use driftless::run::{Limits, Outcome, Plan, Problem, Request, Run, integrate};
 use driftless::scene::{Bar, Hinge, Law, Motor, Place, Scene, Spring, Start};
 use driftless::stepping::{Integrator, Reached, Seen, Statistics};
 use std::f64::consts::{FRAC_PI_2, TAU};
@@ -183,9 +183,9 @@ pub fn order(points: &[(f64, f64)], floor: f64, ceiling: f64) -> f64 {
 
 /// Integrates a problem from one output time to the next, `every` \[s\] apart, and asserts that nothing stops
 /// it.
-pub fn go<P: ?Sized>(
-    method: &mut impl Integrator<P>,
-    problem: &mut P,
+pub fn go(
+    method: &mut dyn Integrator<dyn Problem>,
+    problem: &mut (dyn Problem + 'static),
     state: &mut State,
     every: f64,
     rows: std::ops::RangeInclusive<u64>,

@@ -83,7 +83,7 @@ mod tests {
 
     fn evaluated(mechanism: &Mechanism, phi: f64) -> Kernel<f64> {
         let mut kernel = Kernel::new(mechanism);
-        kernel.accelerate::<0>(mechanism, Time::default(), &[phi, phi, phi, 0.0], &[0.0; 4], Bias::default());
+        kernel.accelerations(mechanism, Time::default(), &[phi, phi, phi, 0.0], &[0.0; 4], Bias::default());
         kernel
     }
 

@@ -197,7 +197,7 @@ impl Mechanism {
         let mut after = vec![self.law_modes(&motion.later(A_MOMENT / fastest, &[]))];
         if with_forces {
             let mut kernel = Kernel::<f64>::new(self);
-            kernel.accelerate::<0>(self, motion.time, &phi, &omega, Bias::default());
+            kernel.accelerations(self, motion.time, &phi, &omega, Bias::default());
             after.push(self.law_modes(&motion.later(A_WHILE / fastest, &kernel.load[..phi.len()])));
         }
         let changes = |k: usize| zeros[k] && after.iter().any(|after| after[k] != here[k]);

@@ -137,7 +137,7 @@ impl Evidence for InDoubles<'_> {
         let Self { mechanism: free, at } = *self;
         let mechanism = free.moving(closed, modes);
         let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, at.t, at.phi, at.omega, Bias::default());
+        kernel.accelerations(&mechanism, at.t, at.phi, at.omega, Bias::default());
         if !kernel.load.iter().chain(&kernel.multiplier).all(|x| x.is_finite()) {
             return None;
         }

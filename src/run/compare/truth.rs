@@ -191,7 +191,7 @@ fn is_in_doubles(mechanism: &Mechanism) -> bool {
 /// Accelerations of all coordinates at a motion.
 fn acceleration(mechanism: &Mechanism, kernel: &mut Kernel<f64>, motion: &Motion) -> Vec<f64> {
     let [phi, omega] = motion.rounded();
-    kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
+    kernel.accelerations(mechanism, motion.time, &phi, &omega, Bias::default());
     kernel.load.clone()
 }
 

@@ -63,7 +63,7 @@ pub(in crate::run) struct Flight {
 /// How a motion changes at a time, of coordinates and rates.
 fn motion_rates(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> MotionRates<f64> {
     let mut kernel = Kernel::<f64>::new(mechanism);
-    kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
+    kernel.accelerations(mechanism, t, phi, omega, Bias::default());
     let (power, _) = kernel.powers(mechanism, t, phi, omega);
     let lost = kernel.friction_power(omega);
     MotionRates { accelerations: kernel.load[..phi.len()].to_vec(), power, lost }

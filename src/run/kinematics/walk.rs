@@ -155,7 +155,7 @@ impl DriveWalk {
     fn accelerate(&mut self) {
         let (mechanism, n) = (&*self.mechanism, self.alpha.len());
         let (phi, omega) = (&self.state.y[..n], &self.state.y[n..2 * n]);
-        self.kernel.accelerate::<0>(mechanism, self.state.time, phi, omega, Bias::default());
+        self.kernel.accelerations(mechanism, self.state.time, phi, omega, Bias::default());
         mechanism.share_multipliers(self.state.time, &mut self.kernel, phi, omega);
         self.alpha.copy_from_slice(&self.kernel.load);
         self.is_beside_limit = self.solve_beside_limit();

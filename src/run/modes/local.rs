@@ -55,7 +55,7 @@ impl<'a> Local<'a> {
 
     /// The same at these coordinates and rates.
     pub(super) fn pull_moving(&mut self, [phi, omega]: [&[f64]; 2], t: Time) -> DVector<f64> {
-        self.kernel.accelerate::<0>(self.mechanism, t, phi, omega, Bias::default());
+        self.kernel.accelerations(self.mechanism, t, phi, omega, Bias::default());
         DVector::from_iterator(phi.len(), self.kernel.load.iter().zip(&self.unit).map(|(a, unit)| a / unit))
     }
 

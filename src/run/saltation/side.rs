@@ -30,7 +30,7 @@ impl Side {
     pub fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
         let mut side = Self::resting(motion);
         let mut kernel = Kernel::<f64>::new(mechanism);
-        kernel.accelerate::<0>(mechanism, motion.time, &side.phi, &side.omega, Bias::default());
+        kernel.accelerations(mechanism, motion.time, &side.phi, &side.omega, Bias::default());
         side.acceleration = kernel.load;
         side
     }

@@ -43,7 +43,7 @@ fn friction(mechanism: &Mechanism, place: usize, t: Time, [phi, omega]: [&[f64];
         modes[place] = mode;
         let mechanism = mechanism.moving(&mechanism.held, &modes);
         let mut kernel = Kernel::<f64>::new(&mechanism);
-        kernel.accelerate::<0>(&mechanism, t, phi, omega, Bias::default());
+        kernel.accelerations(&mechanism, t, phi, omega, Bias::default());
         dot(&row, &kernel.load)
     };
     let unit = mechanism.speed_unit(place) / mechanism.units.time;

@@ -100,7 +100,7 @@ impl Variation {
     fn is_timed(&self, motion: &Motion, later: f64) -> bool {
         let ((t, phi, omega), mut kernel) = (plain(motion), Kernel::<f64>::new(&self.mechanism));
         let [now, then] = [t, t + later].map(|t| {
-            kernel.accelerate::<0>(&self.mechanism, t, &phi, &omega, Bias::default());
+            kernel.accelerations(&self.mechanism, t, &phi, &omega, Bias::default());
             kernel.load.clone()
         });
         now != then

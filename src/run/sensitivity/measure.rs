@@ -97,7 +97,7 @@ fn shown<R: Default>(
 ) -> R {
     let Some(outputs) = &mechanism.outputs else { return R::default() };
     if outputs.needs_equations() {
-        kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default());
+        kernel.accelerations(mechanism, t, phi, omega, Bias::default());
     } else {
         kernel.place(mechanism, phi);
     }

@@ -54,7 +54,7 @@ impl Neighbour {
         match mechanism.size() {
             1 => kernel.accelerate::<1>(mechanism, t, phi, omega, Bias::default()),
             2 => kernel.accelerate::<2>(mechanism, t, phi, omega, Bias::default()),
-            _ => kernel.accelerate::<0>(mechanism, t, phi, omega, Bias::default()),
+            _ => kernel.accelerations(mechanism, t, phi, omega, Bias::default()),
         }
         &self.kernel.load
     }

@@ -105,7 +105,7 @@ impl Torques {
         let Self { kernel, of } = self;
         for (torques, motion) in of.iter_mut().zip(motions) {
             let [phi, omega] = motion.rounded();
-            kernel.accelerate::<0>(mechanism, motion.time, &phi, &omega, Bias::default());
+            kernel.accelerations(mechanism, motion.time, &phi, &omega, Bias::default());
             mechanism.share_multipliers(motion.time, kernel, &phi, &omega);
             torques.clear();
             let multipliers = kernel.multiplier.iter().enumerate();

@@ -53,7 +53,7 @@ impl DriveWalk {
             return false;
         }
         (0..n).for_each(|k| omega[k] = rates[k] * size(mechanism, k));
-        self.kernel.accelerate::<0>(mechanism, time, &phi, &omega, Bias::default());
+        self.kernel.accelerations(mechanism, time, &phi, &omega, Bias::default());
         kernel.accelerate_free::<0>(mechanism, time, &phi, &omega);
         kernel.rows_at(mechanism, time, &phi, &omega);
         let convective = DVector::from_fn(n, |r, _| -kernel.rows[r].convective);

@@ -257,7 +257,7 @@ impl DistanceSearch<'_> {
         ];
         let mut kernel = Kernel::<f64>::new(mechanism);
         for (t, phi, omega) in (0..STATES.len()).map(|number| self.state(number)) {
-            kernel.accelerate::<0>(mechanism, t, &phi, &omega, Bias::default());
+            kernel.accelerations(mechanism, t, &phi, &omega, Bias::default());
             groups.push(kernel.load.clone());
             let (positions, rates) = residuals(mechanism, t, &phi, &omega);
             groups.extend([positions, rates]);
