@@ -36,11 +36,13 @@ fn inside(method: &mut dyn Integrator<dyn OdeSystem>, h: f64) -> f64 {
 /// more in a single step.
 #[test]
 fn the_solution_inside_a_step_has_the_order_of_its_polynomial() {
+    /// A method, its order, and its steps.
+    type Case<'a> = (&'a mut dyn Integrator<dyn OdeSystem>, f64, &'a [f64]);
     const LOOSE: Tolerance = Tolerance { relative: 1e6, absolute: 1e6 };
     let radau = |stages, tolerance| Radau::new(stages, tolerance).expect("a method");
     // Newton's iteration of the implicit ones is as exact as their tolerance: a tight one, which a first step
     // proposed below the error keeps.
-    let methods: [(&mut dyn Integrator<dyn OdeSystem>, f64, &[f64]); 3] = [
+    let methods: [Case; 3] = [
         (&mut Dp5::new(LOOSE), 5.0, &[0.12, 0.1, 0.08, 0.06, 0.04, 0.03]),
         (&mut Dp8::new(LOOSE), 8.0, &[0.8, 0.6, 0.5, 0.4, 0.3]),
         (&mut radau(3, Tolerance { relative: 1e-7, absolute: 1e-7 }), 4.0, &[0.04, 0.03, 0.02, 0.015, 0.01]),
