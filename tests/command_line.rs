@@ -641,7 +641,22 @@ fn an_uncertain_number_has_one_standard_deviation() {
     let program = Program::with_scenes(&["spring"]);
     let twice = "--uncertainty spring.stiffness=0.1 --uncertainty springs.spring.stiffness=0.2";
     let told = "--uncertainty names springs.spring.stiffness twice";
-    program.run(&format!("sensitivity spring.json --of bar2.phi --at 0.1 {twice}")).exits(3).says(&[told]);
+    program.run(&format!("sensitivity spring.json --of bar2.phi --at 0.1 {twice}")).exits(2).says(&[told]);
+}
+
+/// Too many rows are the fault of whoever asks for them: the scene or an option.
+#[test]
+fn too_many_rows_are_refused_where_they_are_asked_for() {
+    let program = Program::with_scenes(&["free"]);
+    let mut scene = record(&program, "free.json");
+    scene["every"] = serde_json::json!(1e-9);
+    program.write("fine.json", &scene.to_string());
+    program.run("run fine.json --until 3").exits(3).says(&[
+        "an output interval of",
+        "3e9 rows",
+        "at most 1e9",
+    ]);
+    program.run("run free.json --until 3 --every 1e-9").exits(2).says(&["--every: 3e9 rows", "at most 1e9"]);
 }
 
 /// Lists of names are whole, or say how many more there are.

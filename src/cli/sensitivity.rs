@@ -64,7 +64,7 @@ fn derivatives(template: &Template, flags: &SensitivityFlags) -> Result<StudyFil
         let path = template.variable(name)?.path;
         if deviations.iter().any(|(known, _)| *known == path) {
             let text = format!("--uncertainty names {path} twice\nhint: name each number once");
-            return Err(Failure::new(Exit::Scene, text));
+            return Err(Failure::new(Exit::Usage, text));
         }
         deviations.push((path.clone(), *sigma));
         to.push(path);

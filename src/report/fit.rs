@@ -189,7 +189,7 @@ pub fn charts(found: &Fit) -> Result<Vec<(&'static str, Picture)>, ChartError> {
     };
     let fits = chart(
         "Fitted motion and data",
-        "dots: data, line: fitted motion",
+        "dots: data, line: fitted motion at the times of the data",
         found.columns.iter().map(fitted).collect(),
     );
     let residuals =

@@ -28,7 +28,7 @@ pub fn closest(scene: &Scene, closest: &Closest) -> Result<Picture, ChartError> 
     let caption = match closest.apart {
         Some(apart) => vec![
             format!("{} rad or sizes of the mechanism from what is given", figure(apart)),
-            format!("{closed} of {tried} guesses close all loops"),
+            format!("{closed} of {tried} guesses lead to closed loops, none nearer"),
         ],
         None => {
             vec![format!("none of {tried} guesses closes all loops"), "joints shown on one body".to_owned()]

@@ -175,11 +175,12 @@ impl Plan {
         notes.extend(cut_short(method, step, rate, until, max_evaluations));
         let rows = rows(until, every);
         if rows > MAX_ROWS {
-            return Err(usage(
-                "--every",
-                format!("{} rows would be written; at most {MAX_ROWS:e}", count(rows)),
-                "a longer output interval",
-            ));
+            let reason = format!("{} rows would be written; at most {MAX_ROWS:e}", count(rows));
+            let hint = "a longer output interval";
+            return Err(match request.every {
+                Some(_) => usage("--every", reason, hint),
+                None => mismatch(format!("an output interval of {every} s up to {until} s"), &reason, hint),
+            });
         }
         let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.constraints.len()) as f64;
         if request.every.is_none() && numbers > MOST_NUMBERS {

@@ -31,7 +31,7 @@ impl std::fmt::Display for Closest {
             Some(apart) => write!(
                 f,
                 "closest: {}, {apart:.3} rad or sizes of the mechanism from what is given; {closed} of \
-                    {tried} guesses close all loops",
+                    {tried} guesses lead to configurations that close all loops, none nearer",
                 self.written
             ),
             None => write!(f, "closest: {}; none of {tried} guesses closes all loops", self.written),

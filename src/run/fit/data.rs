@@ -87,7 +87,11 @@ impl Data {
                 Some(t) if t >= 0.0 && last.is_none_or(|last| t > last) => data.times.push(t),
                 t => {
                     let t = t.map_or("empty".to_owned(), |t| t.to_string());
-                    let what = format!("line {line}, column t: {t} does not come after the time before");
+                    let why = match last {
+                        Some(last) => format!("does not come after {last}, the time before"),
+                        None => "is no time from the start on".to_owned(),
+                    };
+                    let what = format!("line {line}, column t: {t} {why}");
                     return Err(fail(what, "times in seconds, from 0 on and rising"));
                 }
             }
@@ -141,7 +145,8 @@ mod tests {
             ("bar1.phi\n1\n", "name one `t [s]`"),
             ("t [s];bar1.phi [rad]\n0;1\n", "separated by commas, not by semicolons"),
             ("t [s]\tbar1.phi [rad]\n0\t1\n", "separated by commas, not by tabs"),
-            ("t,a\n0,1\n0,2\n", "line 3, column t: 0"),
+            ("t,a\n0,1\n0,2\n", "line 3, column t: 0 does not come after 0, the time before"),
+            ("t,a\n-0.1,1\n0,2\n", "line 2, column t: -0.1 is no time from the start on"),
             ("t,a\n0,one\n", "line 2, column a: `one`"),
             ("t,a\n", "no rows"),
             ("t,a\n0,1,2\n", "data.csv"),
