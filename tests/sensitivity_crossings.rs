@@ -70,24 +70,57 @@ fn what_rests_without_a_load_is_derived_by_its_start_rate() {
     assert!(held.measures[0].slopes.is_empty());
 }
 
-/// A start of v slides by |v| v/(2 mu g); beside a force that moves it from rest one of -v loses
-/// (F - mu m g)/(F + mu m g) of what one of v gains.
+/// A start of v slides by |v| v/(2 mu g), which has no slope at 0; beside a force that moves it from rest one of
+/// -v loses (F - mu m g)/(F + mu m g) of what one of v gains.
 #[test]
-fn what_rests_under_a_load_has_no_derivative_by_its_start_rate() {
-    for force in [0.0, 10.0] {
-        let scene = format!(
+fn what_slides_off_from_rest_has_no_derivative_by_its_start_rate() {
+    let scene = |force: f64| {
+        format!(
             r#"{{"name": "block", "gravity": [0, -10], "until": 1, "every": 1, {BLOCK},
             "forces": [{{"name": "pull", "body": "block", "point": [0, 0], "force": [{force}, 0]}}],
             "start": {{"block": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}}}}}"#
-        );
-        let found = derived(&template(&scene), &["block.x"], &["start.block.velocity[0]"], 1.0);
-        let why = found.measures[0].why.clone().expect("there is none");
-        assert!(
-            why.contains("no derivative by start.block.velocity[0]: rail is at rest under dry friction"),
-            "{why}"
-        );
+        )
+    };
+    assert_slopes(&scene(0.0), "block.x", 1.0, &[("start.block.velocity[0]", 0.0)]);
+    let found = derived(&template(&scene(10.0)), &["block.x"], &["start.block.velocity[0]"], 1.0);
+    let why = found.measures[0].why.clone().expect("there is none");
+    assert!(
+        why.contains("no derivative by start.block.velocity[0]: rail is at rest under dry friction"),
+        "{why}"
+    );
+    for force in [0.0, 10.0] {
         let others = ["bars.block.mass", "start.block.origin[0]", "sliders.rail.friction.kinetic"];
-        assert_eq!(derived(&template(&scene), &["block.x"], &others, 1.0).lost, None);
+        assert_eq!(derived(&template(&scene(force)), &["block.x"], &others, 1.0).lost, None);
+    }
+}
+
+/// A block of 2 kg that sticks to a cart of 3 kg which rolls freely: friction stops it there whatever its sense,
+/// and both share its momentum.
+#[test]
+fn what_sticks_stops_neighbouring_starts() {
+    let slider = |name: &str, body: &str, on: &str, friction: &str| {
+        format!(
+            r#"{{"name": "{name}", "point": {{"body": "{body}", "point": [0, 0]}}, "angle": "locked"{friction},
+            "rail": {{"body": "{on}", "point": [0, 0], "direction": [1, 0]}}}}"#
+        )
+    };
+    for force in [0.0, 1.5] {
+        let scene = format!(
+            r#"{{"name": "cart", "gravity": [0, -10], "until": 2, "every": 2,
+            "bars": [{{"name": "cart", "mass": 3, "centre": [0, 0], "inertia": 1, "length": 1}},
+                {{"name": "block", "mass": 2, "centre": [0, 0], "inertia": 1, "length": 1}}],
+            "sliders": [{}, {}],
+            "forces": [{{"name": "pull", "body": "block", "point": [0, 0], "force": [{force}, 0]}}],
+            "start": {{"cart": {{"phi": 0, "origin": [0, 0], "velocity": [0.5, 0]}},
+                "block": {{"phi": 0, "origin": [0, 0], "velocity": [0.5, 0]}}}}}}"#,
+            slider("rail", "cart", "ground", ""),
+            slider("bed", "block", "cart", r#", "friction": {"kinetic": 0.2, "static": 0.3}"#),
+        );
+        for body in ["cart", "block"] {
+            let numbers =
+                [("start.block.velocity[0]", 2.0 * 2.0 / 5.0), ("start.cart.velocity[0]", 2.0 * 3.0 / 5.0)];
+            assert_slopes(&scene, &format!("{body}.x"), 2.0, &numbers);
+        }
     }
 }
 

@@ -1,9 +1,15 @@
 //! Start rates of what rests under dry friction.
 //!
 //! Where a number moves the rate of a place that is at rest at the start, neighbouring motions slide there at
-//! once, in one sense for larger values of it and in the other one for smaller values.  Friction that presses
-//! takes different amounts off both, and there is no derivative.  Where nothing presses the neighbours slide
-//! without friction: the place is open beside the motion, which it neither holds nor moves.
+//! once, in one sense for larger values of it and in the other one for smaller values.
+//!
+//! A place that sticks stops them after a time and way of the first and second order.  Rates change by
+//! M⁻¹ Gᵀ y, with y the impulses of the rows less those of the motion itself, and no row of what sticks moves
+//! in the end: y follows from that alone, whatever the sense, and columns lose their rates there as they are
+//! put onto the constraints.  Where a place slides off from rest, or a point that rests on a wall would leave
+//! it while they slide, friction takes different amounts off both, and there is no derivative.  Where nothing
+//! presses the neighbours go on sliding without friction: the place is open beside the motion, which it
+//! neither holds nor moves.
 
 use super::variation::{Variation, plain};
 use crate::dynamics::constraint::ConstraintArguments;
@@ -50,6 +56,14 @@ fn friction(mechanism: &Mechanism, place: usize, t: Time, [phi, omega]: [&[f64];
     (along(FrictionMode::Slip(sign)) - along(FrictionMode::Open)).abs() / unit
 }
 
+/// True where every point that rests on a wall is pressed onto it.
+fn rests(mechanism: &Mechanism, t: Time, [phi, omega]: [&[f64]; 2]) -> bool {
+    let mut kernel = Kernel::<f64>::new(mechanism);
+    kernel.accelerations(mechanism, t, phi, omega, Bias::default());
+    let multipliers = &kernel.multiplier[mechanism.standing_rows()..];
+    mechanism.held.iter().zip(multipliers).all(|(&held, &row)| mechanism.contacts[held].pressure(row) > 0.0)
+}
+
 /// Rates of the places at rest along a column, zero where they are rounding or a place is not at rest.
 fn rates(mechanism: &Mechanism, motion: &Motion, column: &[f64]) -> Vec<f64> {
     let (t, phi, omega) = plain(motion);
@@ -85,7 +99,8 @@ fn rates(mechanism: &Mechanism, motion: &Motion, column: &[f64]) -> Vec<f64> {
     (0..mechanism.frictions.len()).map(of_place).collect()
 }
 
-/// The place at rest at which these rates of places meet friction, by number.
+/// The place at rest at which friction resists these rates of places without bringing them back to rest
+/// whatever their sense, by number.
 fn resisting(mechanism: &Mechanism, motion: &Motion, column: &[f64], rates: &[f64]) -> Option<usize> {
     let (t, phi, omega) = plain(motion);
     let n = phi.len();
@@ -101,8 +116,10 @@ fn resisting(mechanism: &Mechanism, motion: &Motion, column: &[f64], rates: &[f6
         [1.0, -1.0].into_iter().any(|sign| {
             let by = sign * SPEED * mechanism.speed_unit(place) / rates[place].abs();
             let omega: Vec<f64> = omega.iter().zip(&column[n..]).map(|(w, entry)| w + by * entry).collect();
-            let sense = sign * rates[place].signum();
-            friction(&slides(sign), place, t, [&phi, &omega], sense) > NO_FRICTION
+            let (sliding, sense) = (slides(sign), sign * rates[place].signum());
+            let stops = matches!(mechanism.modes[place], FrictionMode::Stick(_))
+                && rests(&sliding, t, [&phi, &omega]);
+            !stops && friction(&sliding, place, t, [&phi, &omega], sense) > NO_FRICTION
         })
     };
     (0..rates.len()).filter(|&place| rates[place] != 0.0).find(resists)
@@ -112,7 +129,7 @@ impl Variation {
     /// Takes out of force beside the motion, which begins so beside this mechanism, what sticks without a
     /// load where columns, each that of a number, move it.
     ///
-    /// Where there is a load there is no derivative.
+    /// Where there is a load they lose these rates, or there is no derivative.
     pub fn loosen(&mut self, mechanism: &Arc<Mechanism>, motion: &Motion, numbers: &[&str]) {
         for (column, number) in self.columns.clone().iter().zip(numbers) {
             let rates = rates(mechanism, motion, column);
@@ -124,7 +141,12 @@ impl Variation {
                 ));
             }
             let sticks = |place: &usize| matches!(mechanism.modes[*place], FrictionMode::Stick(_));
-            self.loose.extend((0..rates.len()).filter(|&place| rates[place] != 0.0).filter(sticks));
+            let is_loose = |&place: &usize| {
+                let (t, phi, omega) = plain(motion);
+                friction(mechanism, place, t, [&phi, &omega], 1.0) <= NO_FRICTION
+            };
+            let moved = (0..rates.len()).filter(|&place| rates[place] != 0.0);
+            self.loose.extend(moved.filter(sticks).filter(is_loose));
         }
     }
 

@@ -114,7 +114,7 @@ pub(super) fn taken(
 ) -> Result<(f64, f64, Vec<f64>), String> {
     if let Measure::Impact(wall) = &asked.measure {
         let first = variation.impacts.iter().find(|impact| impact.wall == *wall);
-        let first = first.ok_or("there is no impact")?;
+        let first = first.ok_or(if variation.lost.is_some() { "" } else { "there is no impact" })?;
         return Ok((first.t, first.t, first.slopes.clone()));
     }
     let t = asked.t.clone()?;
