@@ -495,6 +495,32 @@ fn a_walkers_leg_is_found_from_guesses_far_off() {
     assert!(counts[0] == 100 && counts[1] >= 70 && counts[2] >= 35 && single >= 3, "{counts:?}");
 }
 
+/// The closest start of a linkage with a geared wheel keeps the gear's law, and is one.
+#[test]
+fn the_closest_start_keeps_the_law_of_a_gear() {
+    let text = std::fs::read_to_string("examples/scenes/four_bar_motor.json").expect("a shipped scene");
+    let mut scene: Value = serde_json::from_str(&text).expect("JSON");
+    let mut add = |key: &str, one: Value| scene[key].as_array_mut().expect("a list").push(one);
+    add("bars", json!({"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1}));
+    let between = [json!({"body": "ground", "point": [-1, 0]}), json!({"body": "wheel", "point": [0, 0]})];
+    add("hinges", json!({"name": "W", "between": between}));
+    add("motors", json!({"name": "gear", "body": "wheel", "law": "-1.5*rocker.phi"}));
+    let lists = ["bars", "hinges", "motors"].map(|key| (key.to_owned(), scene[key].clone()));
+    let starting = |start: Value| {
+        let start = std::iter::once(("start".to_owned(), start));
+        with("four_bar_motor", Value::Object(lists.iter().cloned().chain(start).collect()))
+    };
+    let far = starting(json!({"coupler": {"phi": 2.5}, "rocker": {"phi": -1}}));
+    let CompileError::Impossible { closest, .. } = refused(&far) else { panic!("{:?}", refused(&far)) };
+    let of = |name: &str| far.bars.iter().position(|bar| bar.name == name).expect("a bar");
+    let [rocker, wheel] = ["rocker", "wheel"].map(|name| closest.q[of(name)]);
+    assert!((wheel + 1.5 * rocker).abs() < 1e-12 && wheel.abs() > PI, "{closest:?}");
+    let written: Value = serde_json::from_str(&format!("{{{}}}", closest.written)).expect("JSON");
+    let near = starting(written["start"].clone());
+    let there = found(&compiled(&near), &near);
+    assert!((there[of("wheel")].0 - wheel).abs() < 1e-3, "{there:?} {closest:?}");
+}
+
 /// A gear and a rack give what they drive from the angle of a bar, however far that is.
 #[test]
 fn what_gears_and_racks_give_is_found_however_large_it_is() {

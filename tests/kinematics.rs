@@ -556,3 +556,42 @@ fn wheels_of_large_ratios_go_with_the_rest() {
         assert!((phi[3] - coupler).abs() < 1e-9 && (phi[4] - rocker).abs() < 1e-9, "{drive}: {phi:?}");
     }
 }
+
+/// Other ways to assemble a mechanism have geared wheels where the gear has them: a scene that starts there is
+/// taken as it is.
+#[test]
+fn other_assemblies_have_geared_wheels_where_their_gears_have_them() {
+    let text = |start: &str| {
+        format!(
+            r#"{{"name": "geared", "gravity": [0, 0],
+            "bars": [{{"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1, "length": 1}},
+                     {{"name": "crank", "length": {A}, "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+                     {{"name": "coupler", "length": {B}, "mass": 1, "centre": [0, 0], "inertia": 0.1}},
+                     {{"name": "rocker", "length": {C}, "mass": 1, "centre": [0, 0], "inertia": 0.1}}],
+            "hinges": [{{"name": "W", "between": [{{"body": "ground", "point": [3, 0]}}, {{"body": "wheel", "point": [0, 0]}}]}},
+                       {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "crank", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "crank", "point": [{A}, 0]}}, {{"body": "coupler", "point": [0, 0]}}]}},
+                       {{"name": "C", "between": [{{"body": "coupler", "point": [{B}, 0]}}, {{"body": "rocker", "point": [{C}, 0]}}]}},
+                       {{"name": "D", "between": [{{"body": "ground", "point": [{D}, 0]}}, {{"body": "rocker", "point": [0, 0]}}]}}],
+            "motors": [{{"name": "M", "body": "crank", "law": {{"start": 0.4, "rate": 1}}}},
+                       {{"name": "gear", "body": "wheel", "law": "-1.5*rocker.phi"}}],
+            "start": {{{start}}}, "until": 1, "every": 1}}"#
+        )
+    };
+    let scene = |start: &str| parse_scene(&text(start), "scene.json", &[]);
+    let [coupler, rocker] = closed(0.4);
+    let first = scene(&format!(r#""coupler": {{"phi": {coupler:?}}}, "rocker": {{"phi": {rocker:?}}}"#))
+        .unwrap_or_else(|error| panic!("{error}"));
+    let others = over(&first, "M", 4).branches;
+    assert!(!others.is_empty());
+    for phi in &others {
+        assert!((phi[0] + 1.5 * phi[3]).abs() < 1e-12, "{phi:?}");
+        let start = format!(
+            r#""wheel": {{"phi": {:?}}}, "coupler": {{"phi": {:?}}}, "rocker": {{"phi": {:?}}}"#,
+            phi[0], phi[2], phi[3]
+        );
+        let there = scene(&start).unwrap_or_else(|error| panic!("{error}"));
+        let mechanism = Mechanism::new(&there).unwrap_or_else(|error| panic!("{start}: {error}"));
+        assert!(mechanism.assembly.changes.is_empty(), "{:?}", mechanism.assembly.changes);
+    }
+}

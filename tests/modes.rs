@@ -464,6 +464,34 @@ fn whole_turns_between_bodies_held_to_each_other_are_kept() {
     }
 }
 
+/// Two bars geared 2:3 stand beside each other in as many ways as in two turns of the first: all equilibria
+/// of V = g (0.3 sin a - 0.1 sin 1.5 a) in them, each once, with the second where the gear has it.
+#[test]
+fn geared_bars_have_the_equilibria_of_all_their_turns() {
+    let scene = parsed(
+        r#"{"name": "geared", "gravity": [0, -9.81],
+            "bars": [{"name": "a", "mass": 1, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6},
+                {"name": "b", "mass": 1, "centre": [0.1, 0], "inertia": 0.02, "length": 0.3}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+                {"name": "B", "between": [{"body": "ground", "point": [1, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "motors": [{"name": "gear", "body": "b", "law": "-1.5*a.phi"}],
+            "start": {"a": {"phi": 0.5, "omega": 0}, "b": {"phi": -0.75}}, "until": 1, "every": 0.1}"#,
+    );
+    let slope = |a: f64| 9.81 * (0.3 * a.cos() - 0.15 * (1.5 * a).cos());
+    let ends = (0..4000).map(|i| [PI / 1e3 * (f64::from(i) + 0.3), PI / 1e3 * (f64::from(i) + 1.3)]);
+    let roots: Vec<f64> = ends.filter(|[a, b]| slope(*a) * slope(*b) < 0.0).map(|[a, _]| a).collect();
+    let found = found(&scene, 64).equilibria;
+    assert!(roots.len() == 4 && found.len() == 4, "{roots:?} {found:?}");
+    for one in &found {
+        let [a, b] = [one.phi[0], one.phi[1]];
+        assert!((b + 1.5 * a).abs() < 1e-12 && slope(a).abs() < 1e-10, "{one:?}");
+        let potential = 9.81 * (0.3 * a.sin() - 0.1 * (1.5 * a).sin());
+        assert!((one.potential - potential).abs() < 1e-12, "{one:?}");
+        let near = roots.iter().filter(|root| (a.rem_euclid(2.0 * TAU) - **root).abs() < 0.01).count();
+        assert_eq!(near, 1, "{one:?}");
+    }
+}
+
 /// A spring with a free length that has none pushes in no direction: the top of its cone is no equilibrium.
 #[test]
 fn no_equilibrium_is_where_a_spring_has_no_length() {

@@ -194,7 +194,7 @@ pub fn kinematics(
     let all = SolvedRange::new(sides, approaches);
     let rows = &all.positions[all.rows.clone()];
     let mut found = Kinematics {
-        branches: mechanism.other_assemblies(&scene, ATTEMPTS).0,
+        branches: mechanism.other_assemblies(&scene, ATTEMPTS, 1.0).0,
         left_out: left_out(&scene),
         is_closed: is_turn && rows.first().zip(rows.last()).is_some_and(|(a, b)| a.is_as(b, &mechanism)),
         dead_centres: Vec::new(),

@@ -205,8 +205,10 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     }
     let start = mechanism.start(scene);
     let [first, _] = start.rounded();
-    let (others, asked) = mechanism.other_assemblies(scene, starts);
-    let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST).0 } else { Vec::new() };
+    // Wheels come to all their positions beside one another after some turns only.
+    let turns = mechanism.turns_of_gears();
+    let (others, asked) = mechanism.other_assemblies(scene, starts, turns);
+    let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST, turns).0 } else { Vec::new() };
     let mut search = EquilibriumSearch::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
     if search.local.depends_on_time(&first) {
         return Err(ModesError::Forced);

@@ -14,7 +14,7 @@ const OPEN: f64 = 1e-6;
 /// The configuration that comes closest to what a scene asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Closest {
-    /// Coordinates, angles in [-π, π] \[rad, m\].
+    /// Coordinates, angles in [-π, π] but where gears count turns \[rad, m\].
     pub q: Vec<f64>,
     /// The start as a scene gives it: `"start": {"crank": {"phi": 0.3}}`.
     pub written: String,
@@ -69,17 +69,20 @@ impl AssemblyProblem<'_> {
     }
 
     fn closest(&self, q: &[DoubleDouble], apart: Option<f64>, guesses: [usize; 2]) -> Closest {
-        let bodies = self.mechanism.bodies.len();
-        let q: Vec<f64> =
-            (q.iter().enumerate()).map(|(k, q)| if k < bodies { q.reduced().0.hi } else { q.hi }).collect();
+        let geared = self.mechanism.geared_bodies();
+        let q: Vec<f64> = (0..q.len()).map(|k| self.principal(q, k, &geared)).collect();
         let entry = |(body, phi): (&Body, &f64)| {
             format!("\"{}\": {{\"phi\": {}}}", body.name, (phi * 1e4).round() / 1e4)
         };
-        // What a motor gives is not to be given.
+        // What a motor or a gear gives is not to be given.
         let is_driven = |body: usize| {
             let drives = |row: &ConstraintEquation| {
-                row.law.is_some()
-                    && matches!(row.measure, RowMeasure::Angle { body: driven, .. } if driven == body)
+                let turned = match (&row.measure, &row.aim) {
+                    (_, Some(aim)) => aim.angles.first().copied(),
+                    (&RowMeasure::Angle { body, .. }, _) if row.law.is_some() => Some(body),
+                    _ => None,
+                };
+                turned == Some(body)
             };
             self.mechanism.constraints.iter().any(drives)
         };
@@ -192,7 +195,6 @@ impl AssemblyProblem<'_> {
     }
 
     fn shown(&self, found: &ClosedStart, k: usize) -> f64 {
-        let q = &found.q[k];
-        if k < self.mechanism.bodies.len() { q.reduced().0.hi } else { q.hi }
+        self.principal(&found.q, k, &self.mechanism.geared_bodies())
     }
 }

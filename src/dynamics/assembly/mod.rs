@@ -16,6 +16,7 @@ mod change;
 mod failure;
 mod guess;
 mod newton;
+mod others;
 mod rank;
 mod rates;
 mod slow;
@@ -50,11 +51,6 @@ const CLEARLY: f64 = 1.25;
 const DISTINCT: f64 = 1e-4;
 /// What is left of a measured row, once those before it are taken off, counts as zero below this.
 const DEPENDENT: f64 = 1e-9;
-/// A search for other assemblies goes on where the squares of violations fall by this factor in a few
-/// iterations …
-const HOPEFUL: f64 = 4.0;
-/// … and is finished where what is left of them is below this \[rad, or levers\].
-const NEARLY: f64 = 1e-3;
 /// Up to so many coordinates redundant rows are told from singular ones, and rounding is spread over all that
 /// is given.
 const DENSE: usize = 100;
@@ -149,48 +145,6 @@ impl Mechanism {
         self.assembly = assembly;
         self.check_start(scene)?;
         Ok(self)
-    }
-
-    /// Other positions that close all rows at the start's time, of which that of the motors is one: angles
-    /// and translational coordinates of each, found from so many guesses of a fixed set; and how many guesses
-    /// there were, how many led to no position, and how many to one that was known.
-    pub(crate) fn other_assemblies(&self, scene: &Scene, guesses: usize) -> (Vec<Vec<f64>>, [usize; 3]) {
-        let start: Vec<DoubleDouble> = self.start(scene).phi;
-        let given = |_: usize| Given { phi: false, omega: false, origin: None, velocity: None };
-        let problem = AssemblyProblem { aims: Vec::new(), ..AssemblyProblem::new(self, scene, &[], &given) };
-        let all: Vec<usize> = (0..start.len()).collect();
-        let mut found = vec![ClosedStart {
-            q: start.clone(),
-            change: 0.0,
-            distance: 0.0,
-            held: Vec::new(),
-            is_of_family: false,
-        }];
-        let mut unassembled = 0;
-        for k in 1..=guesses {
-            let mut q = problem.other_guess(&start, &all, k);
-            if problem.descend(&mut q, &problem.active, &[], HOPEFUL) < NEARLY && problem.closes(&mut q, &[])
-            {
-                let other =
-                    ClosedStart { q, change: 0.0, distance: 0.0, held: Vec::new(), is_of_family: false };
-                if found.iter().all(|known| problem.differs(known, &other).is_some()) {
-                    found.push(other);
-                }
-            } else {
-                unassembled += 1;
-            }
-        }
-        let plain = |found: ClosedStart| {
-            let of = |(k, q): (usize, DoubleDouble)| {
-                if k < self.bodies.len() { q.reduced().0.hi } else { q.hi }
-            };
-            let mut q: Vec<f64> = found.q.into_iter().enumerate().map(of).collect();
-            self.wind(&mut q);
-            q
-        };
-        let others: Vec<Vec<f64>> = found.into_iter().skip(1).map(plain).collect();
-        let repeated = guesses - unassembled - others.len();
-        (others, [guesses, unassembled, repeated])
     }
 
     /// Springs need a direction, and points must be before their walls; the reader of scenes sees to it where

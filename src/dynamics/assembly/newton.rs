@@ -86,7 +86,7 @@ impl AssemblyProblem<'_> {
     }
 
     /// Shows the rows at t = 0 with their gradients, one after another; returns the elements.
-    fn visit<T: Real>(
+    pub fn visit<T: Real>(
         &self,
         q: &[DoubleDouble],
         omega: &[T],

@@ -7,13 +7,19 @@ use crate::dynamics::constraint::{RowMeasure, Site};
 use crate::dynamics::force::formula::Formulas;
 use crate::dynamics::force::user::{ForceInput, UserForce};
 use crate::scene::Meaning;
+use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
+
+/// Most turns after which wheels are looked for as they were.
+const MOST_TURNS: u32 = 64;
 
 /// For every body the first of those with which it may make whole turns and all is as before; `None` where a
 /// turn of it is felt: by a torsion spring on the ground, by a formula with its angle.
 #[derive(Clone, Debug)]
 pub(crate) struct WholeTurns {
     with: Vec<Option<usize>>,
+    /// The same beside gears of constant ratios: two positions that keep them differ by turns that suit them.
+    between_kept: Vec<Option<usize>>,
 }
 
 impl WholeTurns {
@@ -26,23 +32,22 @@ impl WholeTurns {
     /// Those of a mechanism in which pairs of bodies, or a body and the ground, turn together.
     fn joined(mechanism: &Mechanism, pairs: impl Iterator<Item = (usize, Option<usize>)>) -> Self {
         let ground = mechanism.bodies.len();
-        let mut group: Vec<usize> = (0..=ground).collect();
-        let mut join = |a: usize, b: usize| {
-            let [from, to] = [group[a], group[b]];
-            group.iter_mut().filter(|one| **one == from).for_each(|one| *one = to);
-        };
-        for spring in mechanism.torsions.iter().filter(|spring| spring.stiffness != 0.0) {
-            join(spring.body, spring.base.unwrap_or(ground));
-        }
+        let torsions = mechanism.torsions.iter().filter(|spring| spring.stiffness != 0.0);
         let forces = mechanism.forces.iter().flat_map(UserForce::angles_compared);
-        let aims = mechanism.aims().flat_map(Aim::angles_compared);
-        let formulas = mechanism.laws.iter().flat_map(|laws| laws.formulas.angles_compared());
-        for (body, base) in forces.chain(aims).chain(formulas).chain(pairs) {
-            join(body, base.unwrap_or(ground));
-        }
-        let first = |k: usize| group.iter().position(|one| *one == group[k]);
-        let with = (0..ground).map(|k| if group[k] == group[ground] { None } else { first(k) }).collect();
-        Self { with }
+        let other = torsions.map(|spring| (spring.body, spring.base)).chain(forces).chain(pairs);
+        let formulas = || mechanism.laws.iter().map(|laws| &*laws.formulas);
+        let walls = mechanism.contacts.iter().filter_map(|contact| contact.row.aim.as_deref());
+        let (gears, cams): (Vec<&Aim>, Vec<&Aim>) =
+            mechanism.gears_and_cams().partition(|aim| !aim.ratios().is_empty());
+        let other: Vec<Compared> = other
+            .chain(cams.into_iter().chain(walls).flat_map(Aim::angles_compared))
+            .chain(formulas().flat_map(Formulas::meanings_beside_gears).filter_map(angle_of))
+            .collect();
+        let of_gears = gears.into_iter().flat_map(Aim::angles_compared);
+        let of_formulas = formulas().flat_map(Formulas::angles_compared);
+        let other = || other.iter().copied();
+        let with = groups(ground, other().chain(of_gears).chain(of_formulas));
+        Self { with, between_kept: groups(ground, other()) }
     }
 
     /// The same beside motors, locks and welds as they stand at one time: they count turns, so that the
@@ -52,10 +57,10 @@ impl WholeTurns {
         Self::joined(mechanism, pairs)
     }
 
-    /// Takes whole turns off a difference of two positions: those that leave least of it.
+    /// Takes whole turns off a difference of two positions on the constraints: those that leave least of it.
     pub fn take_off(&self, apart: &mut [f64]) {
         let turns: Vec<f64> =
-            self.with.iter().map(|with| with.map_or(0.0, |k| (apart[k] / TAU).round())).collect();
+            self.between_kept.iter().map(|with| with.map_or(0.0, |k| (apart[k] / TAU).round())).collect();
         apart.iter_mut().zip(turns).for_each(|(apart, turns)| *apart -= TAU * turns);
     }
 
@@ -82,6 +87,27 @@ impl WholeTurns {
 }
 
 impl Mechanism {
+    /// Laws of motors that depend on where the mechanism is.
+    fn gears_and_cams(&self) -> impl Iterator<Item = &Aim> {
+        self.constraints.iter().filter_map(|row| row.aim.as_deref())
+    }
+
+    /// Bodies whose whole turns gears or cams count.
+    pub(crate) fn geared_bodies(&self) -> Vec<usize> {
+        let all: BTreeSet<usize> = self.gears_and_cams().flat_map(Aim::counted_angles).collect();
+        all.into_iter().collect()
+    }
+
+    /// The least number of turns after which every gear with a constant ratio may be where it was; 1 where
+    /// there is none up to [`MOST_TURNS`].
+    pub(crate) fn turns_of_gears(&self) -> f64 {
+        let gears = self.gears_and_cams().filter(|aim| !aim.angles.is_empty());
+        let ratios: Vec<f64> = gears.flat_map(Aim::ratios).collect();
+        let is_whole = |x: f64| (x - x.round()).abs() < 1e-9;
+        let suits = |turns: &f64| ratios.iter().all(|ratio| is_whole(turns * ratio));
+        (1..=MOST_TURNS).map(f64::from).find(suits).unwrap_or(1.0)
+    }
+
     /// The angles that motors, locks and welds give at t = 0: a body, what it is measured from, and the angle
     /// \[rad\].
     fn angles_given(&self) -> impl Iterator<Item = (usize, Option<usize>, f64)> {
@@ -120,6 +146,17 @@ impl Mechanism {
 
 /// A body, and the one its angle is compared with; `None` for the ground.
 type Compared = (usize, Option<usize>);
+
+/// For every body the first of those that turn with it; `None` for those that turn with the ground.
+fn groups(ground: usize, pairs: impl Iterator<Item = Compared>) -> Vec<Option<usize>> {
+    let mut group: Vec<usize> = (0..=ground).collect();
+    for (body, base) in pairs {
+        let [from, to] = [group[body], group[base.unwrap_or(ground)]];
+        group.iter_mut().filter(|one| **one == from).for_each(|one| *one = to);
+    }
+    let first = |k: usize| group.iter().position(|one| *one == group[k]);
+    (0..ground).map(|k| if group[k] == group[ground] { None } else { first(k) }).collect()
+}
 
 /// The angles of these bodies, compared with one another where only their differences matter.
 fn compared(bodies: Vec<usize>, only_differences: bool) -> impl Iterator<Item = Compared> {
@@ -181,7 +218,8 @@ mod tests {
     /// A chain of four: a spring to the ground, one between the next two, and a last one that is free.
     #[test]
     fn bodies_turn_with_those_that_feel_it() {
-        let turns = WholeTurns { with: vec![None, Some(1), Some(1), Some(3)] };
+        let with = vec![None, Some(1), Some(1), Some(3)];
+        let turns = WholeTurns { between_kept: with.clone(), with };
         let mut apart = [9.0, 1.0 + TAU, -9.0, 4.0 * TAU, 8.0];
         turns.take_off(&mut apart);
         assert_eq!(apart, [9.0, 1.0, -9.0 - TAU, 0.0, 8.0]);

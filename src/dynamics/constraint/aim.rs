@@ -197,6 +197,16 @@ impl Aim {
         sizes
     }
 
+    /// The sizes of its slopes where they are the same everywhere, as of a gear; else none.
+    pub(in crate::dynamics) fn ratios(&self) -> Vec<f64> {
+        let slots: Vec<Slot> = self.slopes.iter().map(|slope| slope.1).collect();
+        if self.tape.inputs_of(&slots).is_empty() {
+            self.slope_sizes(1.0).into_iter().map(|slope| slope.1).collect()
+        } else {
+            Vec::new()
+        }
+    }
+
     /// Its explicit rate f_t.
     pub fn drive(&self, t: Time, at: ConstraintArguments<f64>) -> f64 {
         self.results(t, at, |slots| slots[self.drive as usize])

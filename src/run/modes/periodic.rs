@@ -411,7 +411,7 @@ impl Shooting<'_> {
         let turning = laws.map(|law| law.rate).find(|rate| *rate != 0.0).unwrap_or(0.0);
         let bodies = self.whole.bodies.len();
         let rates = |rate: f64| (0..self.local.unit.len()).map(move |k| if k < bodies { rate } else { 0.0 });
-        let (others, asked) = self.whole.other_assemblies(scene, starts);
+        let (others, asked) = self.whole.other_assemblies(scene, starts, self.whole.turns_of_gears());
         let begin = |(k, phi)| [phi, rates(if k % 2 == 0 { turning } else { 0.0 }).collect()];
         (others.into_iter().enumerate().map(begin).collect(), asked)
     }

@@ -34,6 +34,15 @@ impl Formulas {
         self.switched().flat_map(|expression| &expression.meanings)
     }
 
+    /// The same but of laws of gears and cams, where these are the same all along.
+    pub fn meanings_beside_gears(&self) -> impl Iterator<Item = &Meaning<Site>> {
+        let is_gear =
+            |expression| self.aims.iter().any(|aim| !aim.0.is_wall && std::ptr::eq(&aim.2, expression));
+        let switches = self.switches();
+        let others = self.switched().filter(move |expression| switches || !is_gear(*expression));
+        others.flat_map(|expression| &expression.meanings)
+    }
+
     /// What the numbers mean that formulas that act depend on, themselves or by signals.
     pub fn acting_meanings(&self) -> impl Iterator<Item = &Meaning<Site>> {
         let own = || self.acting().flat_map(|expression| &expression.meanings);
