@@ -595,3 +595,48 @@ fn other_assemblies_have_geared_wheels_where_their_gears_have_them() {
         assert!(mechanism.assembly.changes.is_empty(), "{:?}", mechanism.assembly.changes);
     }
 }
+
+/// Towards the limit of a crank, d before it, accelerations grow as d^(-3/2), also where projection leaves a row
+/// out: outputs are those of the position, and have no bound.
+#[test]
+fn accelerations_have_no_bound_at_a_limit() {
+    let [a, b, c, d]: [f64; 4] = [0.3, 0.35, 0.25, 0.5];
+    let scene = parse_scene(
+        &format!(
+            r#"{{"name": "limited", "gravity": [0, -9.81],
+            "bars": [{{"name": "a", "length": {a}, "mass": 1, "centre": [0.15, 0], "inertia": 0.01}},
+                     {{"name": "b", "length": {b}, "mass": 2, "centre": [0.12, 0], "inertia": 0.03}},
+                     {{"name": "c", "length": {c}, "mass": 1.5, "centre": [0.125, 0], "inertia": 0.02}}],
+            "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+                       {{"name": "A", "between": [{{"body": "a", "point": [{a}, 0]}}, {{"body": "b", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "b", "point": [{b}, 0]}}, {{"body": "c", "point": [{c}, 0]}}]}},
+                       {{"name": "C", "between": [{{"body": "ground", "point": [{d}, 0]}}, {{"body": "c", "point": [0, 0]}}]}}],
+            "motors": [{{"name": "M", "body": "a", "law": {{"start": 0.5, "rate": 3}}}}],
+            "outputs": {{"ac": "c.alpha", "ab": "b.alpha"}},
+            "start": {{"b": {{"phi": 0.25}}, "c": {{"phi": 1.15}}}}, "until": 1, "every": 1}}"#
+        ),
+        "limited.json",
+        &[],
+    )
+    .unwrap_or_else(|error| panic!("{error}"));
+    let limit = ((a * a + d * d - (b + c) * (b + c)) / (2.0 * a * d)).acos();
+    let found = over(&scene, "M=-3..3", 36);
+    let range = |name: &str| found.ranges.iter().find(|range| range.name == name).expect("a column");
+    assert!(
+        range("ac").max[0] == f64::INFINITY && range("ab").min[0] == f64::NEG_INFINITY,
+        "{:?}",
+        found.ranges
+    );
+    let beside = |left: f64| {
+        let to = KinematicDrive { range: Some([0.5, limit - left]), ..drive("M") };
+        let found = kinematics(&scene, &to, 12).expect("kinematics");
+        let last = found.positions.last().expect("a position").clone();
+        assert_eq!(last.outputs, [last.alpha[2], last.alpha[1]]);
+        assert!(
+            found.ranges.iter().find(|range| range.name == "ac").expect("a column").max[0] >= last.outputs[0]
+        );
+        last.outputs[0]
+    };
+    let ratio = beside(1e-10) / beside(4e-10);
+    assert!((ratio - 8.0).abs() < 1e-3, "{ratio}");
+}

@@ -70,6 +70,8 @@ impl DriveWalk {
         if let Some(multipliers) = given_way.lu().solve(&lost) {
             self.kernel.multiplier.copy_from_slice(multipliers.as_slice());
         }
+        // Outputs are evaluated from it.
+        self.kernel.load.copy_from_slice(&self.alpha);
         self.state.y[..n].copy_from_slice(&phi);
         self.state.y[n..2 * n].copy_from_slice(&omega);
         self.state.low[..2 * n].fill(0.0);
