@@ -640,3 +640,29 @@ fn accelerations_have_no_bound_at_a_limit() {
     let ratio = beside(1e-10) / beside(4e-10);
     assert!((ratio - 8.0).abs() < 1e-3, "{ratio}");
 }
+
+/// Both ends of the rod of an elliptic trammel turn back at the ends of their ways, the one whose place is a
+/// coordinate and the other.
+#[test]
+fn both_sliders_of_a_trammel_turn_back() {
+    let scene = parse_scene(
+        r#"{"name": "trammel", "gravity": [0, -9.81],
+            "bars": [{"name": "rod", "mass": 1.5, "centre": [0.4, 0], "inertia": 0.08, "length": 0.8}],
+            "sliders": [{"name": "sx", "point": {"body": "rod", "point": [0, 0]},
+                    "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}},
+                {"name": "sy", "point": {"body": "rod", "point": [0.8, 0]},
+                    "rail": {"body": "ground", "point": [0, 0], "direction": [0, 1]}}],
+            "motors": [{"name": "M", "body": "rod", "law": {"start": 0.2, "rate": 6}}],
+            "start": {"rod": {"phi": 0.2}}, "until": 1, "every": 0.1}"#,
+        "trammel.json",
+        &[],
+    )
+    .expect("a scene");
+    let found = over(&scene, "M", 90).dead_centres;
+    let expected = [(FRAC_PI_2, 0.8), (PI, 0.8), (3.0 * FRAC_PI_2, -0.8), (TAU, -0.8)];
+    assert_eq!(found.len(), 4, "{found:?}");
+    for (at, (angle, value)) in found.iter().zip(expected) {
+        assert!((at.drive - angle).abs() < 1e-9 && (at.value - value).abs() < 1e-12, "{at:?}");
+        assert_eq!(at.name == "sy", at.drive.cos().abs() < 0.5, "{at:?}");
+    }
+}

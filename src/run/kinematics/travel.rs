@@ -5,7 +5,7 @@ use crate::dynamics::Mechanism;
 use crate::dynamics::compile::travel_along;
 use crate::dynamics::constraint::ConstraintEquation;
 use crate::dynamics::forest::BodyOrigin;
-use crate::scene::Scene;
+use crate::scene::{Scene, Slider};
 
 /// How far a slider's point is along its rail.
 pub(super) struct SliderTravel {
@@ -14,11 +14,19 @@ pub(super) struct SliderTravel {
 }
 
 impl SliderTravel {
-    /// Those of all sliders, but of bodies whose places are coordinates, which tell it themselves.
+    /// Those of all sliders but of points on fixed rails whose places are coordinates, which tell it
+    /// themselves.
     pub fn of(scene: &Scene, mechanism: &Mechanism) -> Vec<Self> {
         let forest = &mechanism.forest;
-        let floats = |body: usize| matches!(forest.hangs[body].origin_point, BodyOrigin::Free(_));
-        let sliders = scene.sliders.iter().filter(|slider| !slider.point.bar.is_some_and(floats));
+        let tells_itself = |slider: &&Slider| {
+            let floats = |body: usize| {
+                let hang = &forest.hangs[body];
+                let [x, y] = slider.point.point;
+                matches!(hang.origin_point, BodyOrigin::Free(_)) && (hang.own.re, hang.own.im) == (x, y)
+            };
+            slider.rail.place.bar.is_none() && slider.point.bar.is_some_and(floats)
+        };
+        let sliders = scene.sliders.iter().filter(|slider| !tells_itself(slider));
         sliders.map(|slider| Self { name: slider.name.clone(), row: travel_along(forest, slider) }).collect()
     }
 
