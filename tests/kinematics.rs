@@ -666,3 +666,32 @@ fn both_sliders_of_a_trammel_turn_back() {
         assert_eq!(at.name == "sy", at.drive.cos().abs() < 0.5, "{at:?}");
     }
 }
+
+/// What a motor drives goes at the motor's rate, whichever of the two is named; refusals name what was asked for
+/// and the motor that drives it.
+#[test]
+fn what_a_motor_drives_goes_at_its_rate() {
+    let rate = |scene: &Scene, text: &str| over(scene, text, 4).rate;
+    assert_eq!(rate(&example("crank_rocker"), "crank"), rate(&example("crank_rocker"), "motor"));
+    assert_eq!(rate(&example("crank_rocker"), "rocker=1.7..2"), 1.0);
+    let scene = parse_scene(
+        r#"{"name": "lift", "gravity": [0, -9.81],
+            "bars": [{"name": "boom", "mass": 100, "centre": [1, 0], "inertia": 30, "length": 2},
+                {"name": "cylinder", "mass": 10, "centre": [0.3, 0], "inertia": 0.5, "length": 0.6},
+                {"name": "rod", "mass": 8, "centre": [-0.4, 0], "inertia": 0.4, "length": 0.8}],
+            "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "boom", "point": [0, 0]}]},
+                {"name": "C", "between": [{"body": "ground", "point": [0.5, -0.3]}, {"body": "cylinder", "point": [0, 0]}]},
+                {"name": "R", "between": [{"body": "boom", "point": [1, -0.1]}, {"body": "rod", "point": [0, 0]}]}],
+            "sliders": [{"name": "s", "point": {"body": "rod", "point": [0, 0]}, "angle": "locked",
+                "rail": {"body": "cylinder", "point": [0, 0], "direction": [1, 0]}}],
+            "motors": [{"name": "H", "slider": "s", "law": {"start": 0.7, "rate": 0.1}}],
+            "outputs": {"F": "H.force"},
+            "start": {"boom": {"phi": 0.3}, "cylinder": {"phi": 0.8}, "rod": {"phi": 0.8}}, "until": 1, "every": 1}"#,
+        "lift.json",
+        &[],
+    )
+    .expect("a scene");
+    assert_eq!([rate(&scene, "s=0.6..1.2"), rate(&scene, "H=0.6..1.2")], [0.1; 2]);
+    let refused = kinematics(&scene, &drive("boom=0..1"), 4).expect_err("no force of a turning motor");
+    assert!(refused.to_string().starts_with("with motor `H` driving `boom`: "), "{refused}");
+}

@@ -93,13 +93,19 @@ pub enum KinematicsError {
         left: f64,
     },
     /// The scene with its drive does not compile.
-    #[error("with `{name}` as the drive: {error}")]
+    #[error("with {}: {error}", driving(motor, name))]
     Compile {
         /// The drive.
         name: String,
+        /// The motor that moves it.
+        motor: String,
         /// Why.
         error: CompileError,
     },
+}
+
+fn driving(motor: &str, name: &str) -> String {
+    if motor == name { format!("`{name}` as the drive") } else { format!("motor `{motor}` driving `{name}`") }
 }
 
 /// A scene with its drive.
@@ -160,28 +166,29 @@ impl DrivenScene {
                 (scene.drives[k].name.clone(), "m")
             }
         };
+        let label = drive.name.clone().unwrap_or_else(|| name.clone());
         let is_turn = drive.range.is_none();
         let range = match drive.range {
             Some(range) => range,
-            None if unit == "m" => return Err(KinematicsError::NoRange(name)),
+            None if unit == "m" => return Err(KinematicsError::NoRange(label)),
             None => [start, start + TAU],
         };
         if let Some(&value) = range.iter().find(|value| unit == "rad" && (*value - start).abs() > FARTHEST) {
-            return Err(KinematicsError::Far { name, value, start });
+            return Err(KinematicsError::Far { name: label, value, start });
         }
-        let mechanism = Arc::new(compile(&scene, &name)?);
+        let mechanism = Arc::new(compile(&scene, [&label, &name])?);
         let left = mechanism.assembly.degrees_of_freedom;
         if left > 0 {
-            return Err(KinematicsError::Free { name, left });
+            return Err(KinematicsError::Free { name: label, left });
         }
         let row = mechanism.constraints.iter().position(|row| row.name() == name).unwrap_or_default();
-        let label = drive.name.clone().unwrap_or_else(|| name.clone());
         Ok(Self { scene, mechanism, start, row, label, name, unit, rate, range, is_turn })
     }
 }
 
-fn compile(scene: &Scene, name: &str) -> Result<Mechanism, KinematicsError> {
-    Mechanism::new(scene).map_err(|error| KinematicsError::Compile { name: name.to_owned(), error })
+fn compile(scene: &Scene, [name, motor]: [&str; 2]) -> Result<Mechanism, KinematicsError> {
+    let refused = |error| KinematicsError::Compile { name: name.to_owned(), motor: motor.to_owned(), error };
+    Mechanism::new(scene).map_err(refused)
 }
 
 /// Takes out the first motor, whose place a driven coordinate takes, and gives its name; else `name`.
@@ -194,7 +201,7 @@ fn freed(scene: &mut Scene, name: String) -> String {
 
 /// The start as the scene's own motors have it, all of whose angles the scene then gives, and no rates.
 fn settled(scene: &mut Scene, name: &str) -> Result<(Motion, Mechanism), KinematicsError> {
-    let mechanism = compile(scene, name)?;
+    let mechanism = compile(scene, [name, name])?;
     let motion = mechanism.start(scene);
     let own = scene.own_bars();
     for (bar, start) in scene.start.iter_mut().enumerate().take(own) {
@@ -231,21 +238,23 @@ fn find(scene: &mut Scene, drive: &KinematicDrive) -> Result<(Slot, f64, f64), K
         let start = settled(scene, &name)?.0.unwrapped(bar);
         let is_it = |motor: &Motor| motor.bar == bar && motor.relative_to.is_none();
         let k = scene.motors.iter().position(is_it).unwrap_or_else(|| {
-            let motor = Motor { name: freed(scene, name), bar, relative_to: None, law: Law::default() };
+            let law = Law { rate: 1.0, ..Law::default() };
+            let motor = Motor { name: freed(scene, name), bar, relative_to: None, law };
             scene.motors.insert(0, motor);
             0
         });
-        return Ok((Slot::Turning(k), start, 1.0));
+        return Ok((Slot::Turning(k), start, of_law(&scene.motors[k].law).1));
     }
     if let Some(slider) = scene.sliders.iter().position(|slider| slider.name == name) {
         let (motion, mechanism) = settled(scene, &name)?;
         let start = travel(scene, &mechanism, &motion, slider);
         let k = scene.drives.iter().position(|slide| slide.slider == slider).unwrap_or_else(|| {
-            let slide = scene::Drive { name: freed(scene, name), slider, law: Law::default() };
+            let law = Law { rate: 1.0, ..Law::default() };
+            let slide = scene::Drive { name: freed(scene, name), slider, law };
             scene.drives.insert(0, slide);
             0
         });
-        return Ok((Slot::Sliding(k), start, 1.0));
+        return Ok((Slot::Sliding(k), start, of_law(&scene.drives[k].law).1));
     }
     let known: Vec<&str> = (scene.motors.iter().map(|motor| motor.name.as_str()))
         .chain(scene.drives.iter().map(|slide| slide.name.as_str()))
