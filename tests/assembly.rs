@@ -560,3 +560,30 @@ fn what_gears_and_racks_give_is_found_however_large_it_is() {
         }
     }
 }
+
+/// A point mass that turns about itself has no equation of its own, also where a weld, a lock or nothing holds
+/// it: it is the one that is named.
+#[test]
+fn a_point_mass_about_its_own_hinge_is_named() {
+    let text = |parts: &str, start: &str| {
+        format!(
+            r#"{{"name": "plank", "gravity": [0, -9.81], "bars": [
+                {{"name": "plank", "mass": 10, "centre": [1.5, 0], "inertia": 7.5, "length": 3}},
+                {{"name": "child", "mass": 30, "centre": [0, 0], "inertia": 0}}],
+            "hinges": [{{"name": "P", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "plank", "point": [1.5, 0.2]}}]}}
+                {parts}], "start": {{"plank": {{"phi": 0.9, "omega": 0}}, "child": {{{start}}}}}, "until": 1, "every": 1}}"#
+        )
+    };
+    let seat = r#"[{"body": "plank", "point": [0.3, 0]}, {"body": "child", "point": [0, 0]}]"#;
+    let weld = format!(r#"], "welds": [{{"name": "W", "between": {seat}}}"#);
+    let lock = format!(
+        r#", {{"name": "H", "between": {seat}}}], "locks": [{{"name": "L", "body": "child", "relative_to": "plank"}}"#
+    );
+    for parts in [weld, lock] {
+        let scene = parse_scene(&text(&parts, r#""phi": 0.9"#), "plank", &[]).expect("a scene");
+        assert!(matches!(refused(&scene), CompileError::Massless(name) if name == "child"), "{parts}");
+    }
+    let free = text("", r#""phi": 0, "omega": 0, "origin": [1, 1], "velocity": [0, 0]"#);
+    let told = parse_scene(&free, "plank", &[]).expect_err("nothing turns").to_string();
+    assert!(told.contains("`child`") && !told.contains("hinge"), "{told}");
+}

@@ -109,7 +109,10 @@ impl Mechanism {
             let sound = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]) > 1e-13;
             !sound
         };
-        match (0..self.bodies.len()).find(singular) {
+        // Dividing by a pivot of zero spoils those that come after: a body with nothing to turn is told first.
+        let is_still = |&k: &usize| self.tree.diagonal[k] == 0.0;
+        let bodies = 0..self.bodies.len();
+        match bodies.clone().find(is_still).or_else(|| bodies.rev().find(singular)) {
             Some(k) => Err(CompileError::Massless(self.bodies[k].name.clone())),
             None => Ok(()),
         }

@@ -25,10 +25,11 @@ pub enum CompileError {
             {DENSE_LIMIT} are taken"
     )]
     TooMany(usize),
-    /// The mass matrix is singular: some body has no inertia about its hinge.
+    /// The mass matrix is singular: some body moves no mass when it turns.
     #[error(
-        "the mass matrix is singular at the start: bar `{0}` and what hangs on it have no inertia about its \
-            hinge"
+        "the mass matrix is singular at the start: turning bar `{0}` moves no mass, and its angle has no \
+            equation without constraints\nhint: give it an inertia, or a centre away from its hinge; a point \
+            mass fixed to a bar can be part of that bar"
     )]
     Massless(String),
     /// No start closes the rows, or none near what is given.

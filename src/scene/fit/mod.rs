@@ -32,13 +32,16 @@ pub(super) fn fitted(
 ) -> Result<Scene, SceneError> {
     let hanging = Hanging::of(&scene);
     let whole = hanging.has_whole_start(&scene);
-    if let Some(bar) = if whole { hanging.turns_nothing(&scene.bars) } else { turns_alone(&scene) } {
-        let problem = format!("(bar `{}`) is a point mass on its own hinge", scene.bars[bar].name);
-        let hint = "give it an inertia, or a centre away from its hinge";
+    let point_mass = if whole { hanging.turns_nothing(&scene.bars) } else { turns_alone(&scene) };
+    if let Some(bar) = point_mass {
+        let has_hinge =
+            scene.hinges.iter().flat_map(|hinge| hinge.between).any(|place| place.bar == Some(bar));
+        let (on_hinge, or_centre) =
+            if has_hinge { (" on its own hinge", ", or a centre away from its hinge") } else { ("", "") };
         return Err(places.bars[bar].refuse(
-            &problem,
+            &format!("(bar `{}`) is a point mass{on_hinge}", scene.bars[bar].name),
             "turning a bar must move some mass, else its angle has no equation",
-            hint,
+            &format!("give it an inertia{or_centre}"),
         ));
     }
     for (bar, entry) in given.iter().enumerate().filter(|(bar, _)| hanging.hung[body(Some(*bar))]) {

@@ -184,7 +184,7 @@ pub(in crate::scene) static OUTRIGHT_BAR: KeyTable = KeyTable {
             "inertia",
             FieldShape::Number(INERTIA),
             "0.0018",
-            "Moment of inertia about the centre of mass; 0 for a point mass.",
+            "Moment of inertia about the centre of mass; 0 for a point mass away from its hinge.",
         ),
         optional(
             "length",
