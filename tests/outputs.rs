@@ -762,6 +762,49 @@ fn roots_that_end_at_a_corner_have_their_means() {
     }
 }
 
+/// Where both arguments of an angle pass zero it jumps by half a turn, and a pendulum's velocity turns round
+/// at the largest angle: closed forms of one that turns evenly and of the energy of one that swings.
+#[test]
+fn angles_that_jump_where_both_arguments_are_zero_stay_within_half_a_turn() {
+    let with = |gravity: f64, rest: &str| {
+        scene(&format!(
+            r#"{{"name": "angles", "gravity": [0, -{gravity}],
+            "bars": [{{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+            "hinges": [{{"name": "H", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}}],
+            {rest}, "every": 1}}"#
+        ))
+    };
+    let turning = with(
+        0.0,
+        r#""start": {"a": {"phi": 0.1, "omega": 1}}, "until": 7,
+        "outputs": {"one": "atan2(a.cos - 0.2, 0.2 - a.cos)", "other": "atan2(a.sin*(t - 1 s), 1 s - t)"}"#,
+    );
+    let swinging = with(
+        9.81,
+        r#""start": {"a": {"phi": -0.5, "omega": 0.3}}, "until": 5,
+        "outputs": {"way": "atan2(a.vy, a.vx)", "turned": "atan2(a.vx, -a.vy)"}"#,
+    );
+    // From 0.1 rad to 7.1 rad the cosine is below 0.2 between the angle of that and what it is on the other side.
+    let below = TAU - 2.0 * f64::acos(0.2);
+    let mean = 0.75 * PI - PI * below / 7.0;
+    // (m s² + I) ω²/2 - m g s cos is -m g s cos of the amplitude, with angles from the lowest place.
+    let amplitude = f64::acos(0.5_f64.sin() - 0.35 * 0.09 / (2.0 * 9.81 * 0.5));
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Radau(5)] {
+        let outcome = run(&turning, &adaptive(method, 1e-10));
+        let [one, other] = ["one", "other"].map(|name| found(&outcome.extremes, name));
+        println!("{method:?}: {one:?} {mean} {other:?}");
+        assert!((one.min[0] + 0.25 * PI).abs() < 1e-12 && (one.max[0] - 0.75 * PI).abs() < 1e-12, "{one:?}");
+        assert!((one.mean - mean).abs() < 1e-9, "{method:?}: {one:?} {mean}");
+        assert!(other.min[0] >= -PI - 1e-9 && other.max[0] <= PI + 1e-9, "{other:?}");
+        let outcome = run(&swinging, &adaptive(method, 1e-10));
+        let [way, turned] = ["way", "turned"].map(|name| found(&outcome.extremes, name));
+        println!("{method:?}: {way:?} {turned:?} {amplitude}");
+        assert!((way.min[0] + PI).abs() < 1e-9 && (way.max[0] - PI).abs() < 1e-9, "{way:?}");
+        let most = 0.5 * PI + amplitude;
+        assert!((turned.min[0] + most).abs() < 1e-6 && (turned.max[0] - most).abs() < 1e-6, "{turned:?}");
+    }
+}
+
 #[test]
 fn roots_of_what_rounding_leaves_have_their_means() {
     let scene_until = |until: f64, output: &str| {

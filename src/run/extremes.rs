@@ -306,7 +306,7 @@ impl ExtremesDetector {
             tail <= (RESOLVED * size).max(rounding[k]) || tail <= NOISE * size && curve.stays(lower)
         };
         let Interpolants { curves, nodes, values, is_resolved } = interpolated(&DEGREES, at, is_enough);
-        if depth == 0 && self.look_inwards(inside, begin, span, &values) {
+        if depth == 0 && self.look_inwards(inside, (begin, span), &values, is_resolved) {
             return;
         }
         if !is_resolved && depth <= DOUBTS && self.has_more_rounding(inside, begin + 0.5 * span) {

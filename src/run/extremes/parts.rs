@@ -8,7 +8,7 @@
 use super::super::halvings::turns;
 use super::super::observer::Inside;
 use super::super::rounding::{changes, last_digits};
-use super::{DEGREES, DOUBTS, ExtremesDetector, RESOLVED, has_grown, rounding_of};
+use super::{DEGREES, DOUBTS, ExtremesDetector, MARGIN, RESOLVED, has_grown, rounding_of};
 use crate::dynamics::{Motion, Time};
 use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated, root};
 use std::sync::Arc;
@@ -25,6 +25,10 @@ const TURNS: f64 = 16.0;
 /// Shares of a part by which its ends are moved inwards, until all outputs are finite there: beyond a change
 /// a root may have no value.
 const INWARDS: [f64; 7] = [0.0, 1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5];
+/// Shares of a part next to its ends between which outputs change as they do up to these: by no more than so
+/// many times as much, where they do not jump.
+const NEXT: [f64; 2] = [1e-7, 1e-4];
+const STEEPER: f64 = 8.0;
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: it has no zero.
 const CERTAIN: f64 = 1e-3;
 /// What a condition must be over what its interpolant may be off by for its sign to be known, and the share
@@ -131,23 +135,43 @@ impl ExtremesDetector {
         INWARDS.into_iter().find(|&by| is_enough(by))
     }
 
-    /// Looks at a step of outputs that have no value at its ends and do inside, as a root at an impact may;
-    /// false where they are not such.
+    /// The same until no output jumps between its ends and what is next to them, on the branches given:
+    /// where both arguments of `atan2` are zero, rounding leads beyond that to angles that are half a turn
+    /// or more off.
+    fn inwards_of_jumps(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<f64> {
+        let mut both_ends =
+            |by: f64| [by, 1.0 - by].map(|share| self.values_at(inside.at(begin + share * span)));
+        let [next, later] = NEXT.map(&mut both_ends);
+        let mut leads_on = |by: f64| {
+            both_ends(by).iter().zip(next.iter().zip(&later)).all(|(end, (next, later))| {
+                end.iter().zip(next.iter().zip(later)).all(|(end, (next, later))| {
+                    let most = STEEPER * (later - next).abs() + MARGIN * end.abs().max(next.abs());
+                    (end - next).abs() <= most || !(end - next).is_finite()
+                })
+            })
+        };
+        INWARDS.into_iter().find(|&by| leads_on(by))
+    }
+
+    /// Looks at a step of outputs that have no value at its ends and do inside, as a root at an impact may,
+    /// or at a part that no interpolant resolves as they jump there; false where they are not such.
     pub(super) fn look_inwards(
         &mut self,
         inside: &mut dyn Inside,
-        begin: Time,
-        span: f64,
+        (begin, span): (Time, f64),
         values: &[Vec<f64>],
+        is_resolved: bool,
     ) -> bool {
         let is_blind = |values: &Vec<f64>| {
             let [first, .., last] = &values[..] else { return false };
             !(first + last).is_finite() && values[values.len() / 2].is_finite()
         };
-        if !self.branches.is_empty() || !values.iter().any(is_blind) {
-            return false;
-        }
-        let Some(by) = self.inwards(inside, begin, span).filter(|&by| by > 0.0) else { return false };
+        let by = match self.branches.is_empty() {
+            true if values.iter().any(is_blind) => self.inwards(inside, begin, span),
+            false if !is_resolved => self.inwards_of_jumps(inside, begin, span),
+            _ => None,
+        };
+        let Some(by) = by.filter(|&by| by > 0.0) else { return false };
         self.look(inside, begin + by * span, span - 2.0 * by * span, 1);
         true
     }
