@@ -4,9 +4,10 @@
 #[allow(dead_code)]
 use crate::scaled;
 
+use crate::formulas::run as outcome;
 use driftless::dynamics::{Mechanism, Units};
 use driftless::run::{METHODS, MethodId, MethodInfo, Request, RunError, simulate};
-use driftless::scene::{Scene, read_scene};
+use driftless::scene::{Scene, parse_scene, read_scene};
 use driftless::stepping::Cause;
 use scaled::{Scale, scaled};
 use std::path::Path;
@@ -209,6 +210,30 @@ fn gauss_methods_keep_loops_at_every_mass() {
                 let found = run(&scene, &request, Scale { mass, ..Scale::ONE });
                 assert_eq!(found.stopped, None, "{name} by gauss{} at masses times {mass:e}", 2 * stages);
             }
+        }
+    }
+}
+
+/// The error of a pendulum that swings slowly or fast is what it is at 1 s, and so is its estimate.
+#[test]
+fn estimates_of_slow_and_fast_mechanisms_are_those_of_ordinary_ones() {
+    let text = r#"{"name": "slow", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "H", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+        "start": {"a": {"phi": 0.3, "omega": 0}}, "until": 2, "every": 0.02}"#;
+    let scene = parse_scene(text, "slow", &[]).expect("a scene");
+    let estimate = |method, time: f64| {
+        let scene = scaled(&scene, Scale { time, ..Scale::ONE });
+        let (until, every) = (Some(2.0 * time), Some(0.02 * time));
+        let outcome = outcome(&scene, &Request { method: Some(method), until, every, ..Request::default() });
+        outcome.trust.and_then(|trust| trust.error_estimate).expect("an estimate")
+    };
+    for method in [MethodId::Dp8, MethodId::Radau(5)] {
+        let ordinary = estimate(method, 1.0);
+        for time in [1024.0, 1e7, 1e-7] {
+            let found = estimate(method, time);
+            println!("{method} {time:e}: {found:e} {ordinary:e}");
+            assert!((0.3..3.0).contains(&(found / ordinary)), "{method} {time:e}: {found:e} {ordinary:e}");
         }
     }
 }

@@ -201,8 +201,8 @@ pub(super) fn is_alike(series: &Plan, run: &Plan) -> bool {
         && tolerance(run).is_some_and(|own| own <= FINE)
 }
 
-/// What a reference solution in doubles may be off by in each second \[rad/s\], where that may be as much as
-/// a run is: where it is as fine as doubles allow.
+/// What a reference solution in doubles may be off by \[rad\] in each of the mechanism's units of time, where
+/// that may be as much as a run is: where it is as fine as doubles allow.
 pub(super) fn own_error(series: &Plan) -> f64 {
     let is_finest = series.method == MethodId::Taylor
         && !series.extended

@@ -176,7 +176,7 @@ impl ReferenceRun {
     /// What its motion at `t` \[s\] may be off by itself \[rad\], where that may be as much as the run is.
     pub(super) fn own_error(&self, t: f64, run: &Plan, measured: &TrustMeasurement) -> f64 {
         let time = t - self.begun;
-        let least = own_error(self.plan()) * time;
+        let least = own_error(self.plan()) * time / self.contact_driver.holding().units.time;
         match &self.tangent {
             Some(tangent) if self.is_rounded => tangent.rounding().hypot(least),
             // A series like that of the run comes to in its time what the run had come to before.
