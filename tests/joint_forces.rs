@@ -149,6 +149,33 @@ fn indeterminate_forces_are_named_and_shared_equally() {
     program.run("inspect scene.json").exits(0).shows(&["indeterminate", "A, B", "least norm"]);
 }
 
+/// A motor's torque follows from its power whatever the rods share; the record marks what `inspect` does.
+#[test]
+fn outputs_of_least_norm_are_those_that_are_indeterminate() {
+    let mut scene = beam([3.0, -9.81]);
+    scene["bars"]
+        .as_array_mut()
+        .expect("bars")
+        .push(json!({"name": "wheel", "mass": 1, "centre": [0, 0], "inertia": 0.1}));
+    scene["hinges"].as_array_mut().expect("hinges").push(
+        json!({"name": "O", "between": [{"body": "ground", "point": [0, 1]}, {"body": "wheel", "point": [0, 0]}]}),
+    );
+    scene["motors"] = json!([{"name": "M", "body": "wheel", "law": {"start": 0, "rate": 2}}]);
+    scene["start"]["wheel"] = json!({"phi": 0});
+    scene["outputs"] = json!({"T": "M.torque", "F": "A.force", "P": "M.power + O.force*(1 m/s)"});
+    let program = Program::new();
+    program.write("scene.json", &scene.to_string());
+    let inspected = program.run("inspect scene.json --json").exits(0).object();
+    program.run("run scene.json --out o --no-charts").exits(0);
+    let record: Value =
+        serde_json::from_str(&program.read("o/beam/taylor-1e-9-projection/run.json")).expect("a record");
+    let marked = |name: &str| record["result"]["outputs"][name]["least_norm"] == true;
+    assert_eq!(["T", "F", "P"].map(marked), [false, true, false], "{record:#}");
+    assert_eq!(inspected["motors"]["M"]["determinate"], true);
+    assert_eq!(inspected["hinges"]["A"]["determinate"], false);
+    assert_eq!(inspected["hinges"]["O"]["determinate"], true);
+}
+
 #[test]
 fn three_equal_cranks_share_what_they_may() {
     let bar = |name: &str, length: f64| json!({"name": name, "mass": 1, "centre": [0.5 * length, 0], "inertia": 0.1, "length": length});

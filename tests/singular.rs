@@ -16,6 +16,7 @@ use driftless::run::{Outcome, Request, Status, Sweep};
 use driftless::scene::{Scene, Template, parse_scene};
 use driftless::stepping::Cause;
 use serde_json::{Value, json};
+use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 fn by(method: &str, rtol: f64) -> Request {
@@ -590,5 +591,86 @@ fn no_step_ends_where_the_kite_folds() {
         let point = plan.point(index).expect("a point");
         let off = (point.phi[0] - kite_after(point.values[0], 2.0)).abs();
         assert!(point.status == Status::Done && off < 1e-7, "off by {off:.1e} rad, {point:?}");
+    }
+}
+
+/// Two wheels with two coupling rods a quarter turn apart, the first wheel turned steadily, a load on the
+/// second: one constraint is redundant, each rod's loop is singular twice a turn, and both together never
+/// are.
+fn coupled_wheels() -> Scene {
+    let bar = |name: &str, mass: f64, centre: f64, inertia: f64, length: f64| json!({"name": name, "mass": mass, "centre": [centre, 0], "inertia": inertia, "length": length});
+    let hinge = |name: &str, a: (&str, [f64; 2]), b: (&str, [f64; 2])| {
+        let at = |(body, point): (&str, [f64; 2])| json!({"body": body, "point": point});
+        json!({"name": name, "between": [at(a), at(b)]})
+    };
+    let (zero, rod) = ([0.0, 0.0], [0.5, 0.0]);
+    parsed(
+        &json!({
+            "name": "coupled_wheels", "gravity": [0, -9.81],
+            "bars": [bar("a", 1.0, 0.0, 0.02, 0.2), bar("c", 1.0, 0.0, 0.02, 0.2),
+                     bar("b1", 2.0, 0.25, 0.05, 0.5), bar("b2", 2.0, 0.25, 0.05, 0.5)],
+            "hinges": [hinge("O", ("ground", zero), ("a", zero)), hinge("C", ("ground", rod), ("c", zero)),
+                       hinge("A1", ("a", [0.2, 0.0]), ("b1", zero)),
+                       hinge("B1", ("b1", rod), ("c", [0.2, 0.0])),
+                       hinge("A2", ("a", [0.0, 0.2]), ("b2", zero)),
+                       hinge("B2", ("b2", rod), ("c", [0.0, 0.2]))],
+            "motors": [{"name": "M", "body": "a", "law": {"start": 0.3, "rate": 5.0}}],
+            "torques": [{"name": "load", "body": "c", "torque": "-3 - 0.1*c.omega"}],
+            "outputs": {"T": "M.torque"},
+            "start": {"a": {"phi": 0.3}, "c": {"phi": 0.3}, "b1": {"phi": 0}, "b2": {"phi": 0}},
+            "until": 1.3, "every": 0.1,
+        })
+        .to_string(),
+    )
+}
+
+/// The motor's torque by the power of the load and of the rods' weight.
+fn torque_of_coupled_wheels(angle: f64) -> f64 {
+    3.5 + 2.0 * 9.81 * 0.2 * (angle.cos() - angle.sin())
+}
+
+/// Which of redundant constraints are kept is a matter of the position: no choice is independent over a turn.
+#[test]
+fn redundant_constraints_are_independent_wherever_the_linkage_is_regular() {
+    let scene = coupled_wheels();
+    let by_matrices = Mechanism::new(&scene).expect("a mechanism");
+    for mechanism in [by_matrices.body_by_body(), by_matrices] {
+        let mut kernel = Kernel::<f64>::new(&mechanism);
+        for quarter in 0..4 {
+            for off in [0.3, 1e-2, -1e-3, 1.2e-4, -1e-4, 1e-5, 1e-6, 1e-8, 0.0] {
+                let angle = FRAC_PI_2 * f64::from(quarter) + off;
+                let (phi, omega) = ([angle, angle, 0.0, 0.0], [5.0, 5.0, 0.0, 0.0]);
+                kernel.accelerations(&mechanism, Time::default(), &phi, &omega, Bias::default());
+                let torque = -kernel.multiplier[0];
+                let error = (torque - torque_of_coupled_wheels(angle)).abs();
+                assert!(error < 1e-12, "{quarter} quarters and {off:e}: torque off by {error:.1e} N·m");
+                let left_out = (0..mechanism.constraints.len()).filter(|&r| kernel.is_left_out(r)).count();
+                assert!(left_out == 1 && kernel.weakest.share > 1e-2, "{left_out}, {:?}", kernel.weakest);
+            }
+        }
+    }
+    for rtol in [1e-9, 1e-12, 1e-15] {
+        let outcome = run(&scene, &by("taylor", rtol));
+        let off = outcome.last.outputs[0] - torque_of_coupled_wheels(outcome.last.phi[0]);
+        assert!(outcome.stop.is_none() && off.abs() < 1e-12, "{rtol:e}: {off:.1e}, {:?}", outcome.stop);
+        let [steps, drift] = [outcome.statistics.steps as f64, outcome.drift.energy.max];
+        assert!(steps < 40.0 && drift < 30.0 * rtol.max(1e-15), "{rtol:e}: {steps} steps, {drift:.1e}");
+    }
+}
+
+/// A crank driven steadily through positions with all links in line: the work of its motor is that of the
+/// weights, whose energy the passages keep as well as other steps do.
+#[test]
+fn a_driven_linkage_keeps_its_energy_balance_through_singular_positions() {
+    let texts =
+        [include_str!("data/driven_parallelogram.json"), include_str!("data/driven_slider_crank.json")];
+    for text in texts {
+        let scene = Scene { until: 3.0, ..parsed(text) };
+        for rtol in [1e-9, 1e-12, 1e-15] {
+            let outcome = run(&scene, &by("taylor", rtol));
+            assert_eq!(outcome.stop, None, "{}: {rtol:e}", scene.name);
+            let drift = outcome.drift.energy.max;
+            assert!(drift < 3e-9, "{}: {rtol:e}: {drift:.1e}", scene.name);
+        }
     }
 }

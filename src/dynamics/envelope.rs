@@ -56,6 +56,19 @@ impl Envelope {
         matrix[at + j - first] += value;
     }
 
+    /// Both halves of a symmetric matrix, row by row.
+    pub fn full<T: Scalar>(&self, matrix: &[T]) -> Vec<T> {
+        let n = self.rows.len();
+        let mut full = vec![T::ZERO; n * n];
+        for i in 0..n {
+            let (first, here) = self.row(i);
+            for (j, &entry) in (first..=i).zip(&matrix[here]) {
+                (full[i * n + j], full[j * n + i]) = (entry, entry);
+            }
+        }
+        full
+    }
+
     /// Replaces a matrix by its factors, and writes the reciprocal pivots: zero for rows left out, whose
     /// pivot is less than a share [`DROPPED`](super::schur::DROPPED) of their scale.  Tells the row whose
     /// pivot is the smallest share.

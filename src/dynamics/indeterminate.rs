@@ -12,7 +12,7 @@
 
 use super::assembly::svd::{RowMatrix, dot};
 use super::constraint::ConstraintArguments;
-use super::kernel::Kernel;
+use super::kernel::{Bias, Kernel};
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
 
@@ -108,6 +108,18 @@ impl Mechanism {
         found.row_is_determinate =
             (0..rows).map(|r| Some(is_left_alone(&|unit| self.as_force(r, unit.1[r]).abs()))).collect();
         found
+    }
+
+    /// Which outputs have forces in them that redundant constraints leave open at these angles \[rad\] and
+    /// rates \[rad/s\].
+    pub fn open_outputs(&self, t: Time, phi: &[f64], omega: &[f64]) -> Vec<bool> {
+        let Some(outputs) = &self.outputs else { return Vec::new() };
+        if self.redundant().is_empty() {
+            return vec![false; outputs.heads().count()];
+        }
+        let mut kernel = Kernel::new(self);
+        kernel.accelerations(self, t, phi, omega, Bias::default());
+        outputs.left_open(self, &self.joint_forces(t, &kernel, phi, omega))
     }
 
     /// The forces whose squares are added.

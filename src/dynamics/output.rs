@@ -4,6 +4,7 @@ use super::compile::CompileError;
 use super::configuration::{Configuration, Values};
 use super::constraint::{Aim, ConstraintArguments, ConstraintEquation, Site};
 use super::forest::{Forest, turning_acceleration};
+use super::indeterminate::JointForces;
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
@@ -140,6 +141,15 @@ impl Outputs {
         self.list.iter().map(|output| (output.name.as_str(), output.unit.as_str()))
     }
 
+    /// Which of them have forces in them that redundant constraints leave open, by these joint forces.
+    pub fn left_open(&self, mechanism: &Mechanism, found: &JointForces) -> Vec<bool> {
+        let is_open = |source: &Source<Site>| match source {
+            Source::State(_) => false,
+            Source::Carried(quantity) => quantity.is_open(mechanism, found),
+        };
+        self.list.iter().map(|output| output.expression.sources.iter().any(is_open)).collect()
+    }
+
     /// How many conditions choose the branches of their formulas and of the signals'.
     pub fn condition_count(&self) -> usize {
         let all = self.list.iter().map(|output| &output.expression).chain(&self.signals);
@@ -270,6 +280,27 @@ impl Component {
 }
 
 impl Quantity<Site> {
+    /// True where it is a force that redundant constraints leave open, or that was not examined.
+    fn is_open(&self, mechanism: &Mechanism, found: &JointForces) -> bool {
+        let row = |name: &str| {
+            let is_open = |(row, known): (&ConstraintEquation, &Option<bool>)| {
+                row.name == *name && *known != Some(true)
+            };
+            mechanism.constraints.iter().zip(&found.row_is_determinate).any(is_open)
+        };
+        match self {
+            Self::Joint(name, _) => {
+                let joint = mechanism.joints.iter().position(|joint| joint.name == *name);
+                joint.is_some_and(|joint| found.hinge_is_determinate[joint] != Some(true))
+            }
+            Self::Multiplier(name) | Self::Power(name) | Self::Push(name, _) | Self::Tension(name, _) => {
+                row(name)
+            }
+            Self::Wall(_) | Self::Friction(_) => true,
+            _ => false,
+        }
+    }
+
     fn value(&self, at: &Moment, seen: &Configuration<f64>, shared: &MomentQuantities) -> f64 {
         let Moment { mechanism, time, phi, omega, kernel, .. } = *at;
         let (z, alpha, forces) = (&kernel.z, &kernel.load, shared.forces);

@@ -9,7 +9,9 @@
 //! levers long.  Those of A know no masses, and D takes out units and lengths: the bounds b of the entries of
 //! G are scaled to one, column by column and row by row.  The share is about the square of the distance from
 //! a singular position.  Pivots are taken in the order of S, so that the constraints that A finds dependent
-//! are those that have no pivot in S.
+//! are those that have no pivot in S.  Of redundant constraints those that are kept so may be singular among
+//! themselves at a position where all together are not: there the largest share is the next pivot, and what A
+//! finds dependent is left out of S.
 //!
 //! Bounds of slopes of gears and cams are what they come to over a turn, and those of sliders the size of the
 //! parts; where the mechanism goes far beyond them, they are what is found there.  Ratios of gears couple
@@ -35,6 +37,9 @@ const LOSS: f64 = 1e-3;
 const EVEN_ROUNDS: usize = 32;
 /// What is known of a derivative's square may be exceeded so many times before it is replaced.
 const BEYOND: f64 = 100.0;
+
+/// Number of constraints up to which those that are kept of redundant ones are chosen by position.
+const PIVOTED: usize = 100;
 
 /// Share above which a position is far from any singular one.
 const WIDE: f64 = 0.3;
@@ -73,6 +78,8 @@ pub struct RankVerdict {
     kept: f64,
     /// The dependent ones.
     pub is_left_out: Vec<bool>,
+    /// True where the largest pivots tell them, and not the order.
+    is_pivoted: bool,
 }
 
 impl Metric {
@@ -122,23 +129,23 @@ impl Metric {
             for j in i..r {
                 let products = row(i).iter().zip(row(j)).zip(&metric.columns);
                 a[i * r + j] = products.map(|((x, y), d)| x.value() * y.value() * d).sum();
+                a[j * r + i] = a[i * r + j];
             }
         }
-        let mut shares = vec![0.0; r];
-        for k in (0..r).rev() {
-            let pivot = a[k * r + k];
-            shares[k] = pivot / metric.rows[k];
-            if is_dependent(shares[k]) {
-                continue;
-            }
-            for i in 0..k {
-                let l = a[i * r + k] / pivot;
-                for j in 0..=i {
-                    a[j * r + i] -= l * a[j * r + k];
-                }
-            }
-        }
-        self.verdict(&shares)
+        let verdict = self.verdict(&shares(a.clone(), &metric.rows, false));
+        if self.is_open(&verdict) { self.pivoted(a, &metric.rows) } else { verdict }
+    }
+
+    /// True of a verdict in the order of S that leaves open whether the position is near a singular one:
+    /// other constraints could be kept.
+    pub fn is_open(&self, verdict: &RankVerdict) -> bool {
+        self.redundant > 0 && verdict.kept < NEAR && self.rows.len() <= PIVOTED
+    }
+
+    /// The verdict on constraints with this A, both its halves, whose pivots are measured against `rows`, by
+    /// the largest pivots.
+    pub fn pivoted(&self, a: Vec<f64>, rows: &[f64]) -> RankVerdict {
+        RankVerdict { is_pivoted: true, ..self.verdict(&shares(a, rows, true)) }
     }
 
     /// The verdict on constraints with these shares.
@@ -152,8 +159,35 @@ impl Metric {
         // Constraints that are redundant everywhere say nothing of the position.
         let is_singular = is_left_out.iter().filter(|&&is_left_out| is_left_out).count() > self.redundant;
         let weakest = if is_singular { shares.iter().enumerate().fold(Weakest::NONE, least) } else { kept };
-        RankVerdict { weakest, kept: kept.share, is_left_out }
+        RankVerdict { weakest, kept: kept.share, is_left_out, is_pivoted: false }
     }
+}
+
+/// The shares of constraints with this A, both its halves, whose pivots are measured against `rows`; the next
+/// pivot is that of the largest share, or the last one.
+fn shares(mut a: Vec<f64>, rows: &[f64], is_pivoted: bool) -> Vec<f64> {
+    let r = rows.len();
+    let mut shares = vec![0.0; r];
+    let mut left: Vec<usize> = (0..r).collect();
+    while !left.is_empty() {
+        let share = |i: usize| a[i * r + i] / rows[i];
+        let size = |at: usize| share(left[at]).max(0.0);
+        let largest = || (0..left.len()).max_by(|&i, &j| size(i).total_cmp(&size(j))).unwrap_or(0);
+        let at = if is_pivoted { largest() } else { left.len() - 1 };
+        let k = left.remove(at);
+        shares[k] = a[k * r + k] / rows[k];
+        if is_dependent(shares[k]) {
+            continue;
+        }
+        for (place, &i) in left.iter().enumerate() {
+            let l = a[k * r + i] / a[k * r + k];
+            for &j in &left[..=place] {
+                a[j * r + i] -= l * a[j * r + k];
+                a[i * r + j] = a[j * r + i];
+            }
+        }
+    }
+    shares
 }
 
 /// One over it, and 1 of nothing.
@@ -252,7 +286,7 @@ impl RankVerdict {
             if is_right { kept().fold(f64::INFINITY, f64::min) } else { again(Some(&self.is_left_out)) };
         let is_delicate = share.is_nan() || share < LOSS * self.kept;
         let is_near = self.weakest.share < WIDE;
-        if is_delicate || self.weakest.share >= NEAR {
+        if is_delicate || self.weakest.share >= NEAR || self.is_pivoted {
             return Weakest { is_delicate, is_near, ..self.weakest };
         }
         if !is_right {

@@ -1,7 +1,7 @@
 //! What the record and the page say of a scene's outputs.
 
 use super::page::{Page, figure};
-use crate::dynamics::Mechanism;
+use crate::dynamics::{Mechanism, Time};
 use crate::run::{Extremes, Outcome};
 use serde_json::{Map, Value, json};
 
@@ -9,14 +9,16 @@ use serde_json::{Map, Value, json};
 const CONSTANT: f64 = 1e-12;
 const CONSTANT_TOLD: &str = "constant";
 
-/// True where forces are those of least norm among what rigid bodies leave open.
-fn is_open(mechanism: &Mechanism) -> bool {
-    !mechanism.redundant().is_empty()
+/// Which outputs have forces in them that are those of least norm among what rigid bodies leave open.
+fn left_open(mechanism: &Mechanism, outcome: &Outcome) -> Vec<bool> {
+    let last = &outcome.last;
+    mechanism.open_outputs(Time::from(last.t), &last.phi, &last.omega)
 }
 
 /// What the record of a run says; nothing for a scene without outputs.
 pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> {
     let outputs = mechanism.outputs.as_ref()?;
+    let is_open = left_open(mechanism, outcome);
     let of = |(k, (name, unit)): (usize, (&str, &str))| {
         let mut told = json!({"unit": unit, "final": outcome.last.outputs.get(k)});
         if let Some(Extremes { min, max, mean, rms, .. }) = outcome.extremes.get(k) {
@@ -25,7 +27,7 @@ pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> 
             told["mean"] = json!(mean);
             told["rms"] = json!(rms);
         }
-        if is_open(mechanism) {
+        if is_open[k] {
             told["least_norm"] = json!(true);
         }
         (name.to_owned(), told)
@@ -53,7 +55,7 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome
         })
         .collect();
     page.table(&["output", "least", "at t [s]", "largest", "at t [s]", "mean", "rms"], &rows);
-    if is_open(mechanism) {
+    if left_open(mechanism, outcome).contains(&true) {
         page.entry(
             "",
             "constraints are redundant: forces that rigid bodies leave open are those of least norm",

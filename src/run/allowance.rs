@@ -3,7 +3,9 @@
 //!
 //! ```text
 //! limit = min(1e-2, 20 (N + 10) e),   e = (s + a_w) / E
-//!     with errors at the tolerance in every unknown:  d_q = atol + rtol |q| + 1e-14,  d_w likewise
+//!     with errors at the tolerance in every unknown:  d_q = atol + rtol |q| + rounding,  d_w likewise
+//!     rounding: 1e-14; of closed loops and sliders by their series 1e-12, as on the way through singular
+//!     positions
 //! s = sqrt(E) (Σ r_i d_wi + Σ R d_q) + Σ |W_i| d_q + (Σ r_i |w_i|)² d_q,    a_w = atol E + rtol |work|
 //! r_i = sqrt(2 M_ii),   R = sqrt(2 k) (Σ |gamma|),
 //!     M_ii, W_i, gamma: inertia, weights and levers, see `dynamics::tree`
@@ -17,7 +19,7 @@
 //! beyond 1e-2: an energy so far off is wrong at any tolerance.
 
 use super::drift::{ENERGY_DOUBT, ENERGY_MOST};
-use super::methods::Stabilization;
+use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
 use crate::dynamics::Mechanism;
 
@@ -25,8 +27,9 @@ use crate::dynamics::Mechanism;
 const GENEROUS: f64 = 20.0;
 /// Steps that every run is granted beside its own.
 const FIRST_STEPS: f64 = 10.0;
-/// The tolerance that rounding leaves of a tighter one.
+/// The tolerance that rounding leaves of a tighter one, and in steps that lead through singular positions.
 const ROUNDING: f64 = 1e-14;
+const PASSAGE: f64 = 1e-12;
 /// Energy balance beyond which loops and sliders that nothing projects count as torn: at a singular position
 /// they may let go at any tolerance, in steps that err by less.
 const APART: f64 = 1e-4;
@@ -70,6 +73,8 @@ impl Allowance {
     pub fn new(mechanism: &Mechanism, plan: &Plan) -> Option<Self> {
         let tolerance = plan.tolerance?;
         let is_loose = matches!(plan.stabilization, Stabilization::None | Stabilization::Baumgarte);
+        let leaps = mechanism.has_closed_loops() && plan.method == MethodId::Taylor;
+        let rounding = if leaps { PASSAGE } else { ROUNDING };
         let tree = &mechanism.tree;
         let (mut rigidity, mut weight) = ([0.0; 2], [0.0; 2]);
         for spring in &mechanism.springs {
@@ -85,7 +90,7 @@ impl Allowance {
             weight[usize::from(k >= angles)] += pull.norm_squared().sqrt();
         }
         Some(Self {
-            tolerance: [tolerance.relative + ROUNDING, tolerance.absolute + ROUNDING],
+            tolerance: [tolerance.relative + rounding, tolerance.absolute + rounding],
             units: [mechanism.units.length, mechanism.units.time],
             angles,
             inertia: tree.diagonal.iter().map(|inertia| (2.0 * inertia).sqrt()).collect(),

@@ -11,7 +11,9 @@ pub use self::prepared::Run;
 use self::snapshot::moment;
 pub use self::snapshot::{ResumeError, Snapshot};
 pub(super) use self::stops::without_value;
-use self::stops::{advised, came_apart, drift_stop, foreign, missed, not_finite, not_given, uncounted};
+use self::stops::{
+    advised, came_apart, drift_stop, foreign, is_at_rounding, missed, not_finite, not_given, uncounted,
+};
 use super::clock::{Clock, still};
 use super::contact::ContactDriver;
 use super::drift::{Drift, Limits};
@@ -423,7 +425,11 @@ impl Running {
             self.outcome.plan.notes.push(note);
         }
         if self.outcome.drift.is_doubtful() {
-            let how = if self.outcome.plan.step.is_some() { "a shorter step" } else { "a tighter tolerance" };
+            let how = match self.outcome.plan.step {
+                Some(_) => "a shorter step",
+                None if is_at_rounding(&self.outcome.plan) => "another method",
+                None => "a tighter tolerance",
+            };
             let off = self.outcome.drift.energy_share;
             self.outcome.plan.notes.push(format!(
                 "the energy balance is off by {} of its scale, and the motion may be off by more: try \

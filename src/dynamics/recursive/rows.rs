@@ -292,7 +292,13 @@ impl<T: Real> RecursiveRows<T> {
             shares[i] = pivot / metric.rows[ways.order[i]];
             if shares[i] >= DROPPED { 1.0 / pivot } else { 0.0 }
         });
-        self.metric.verdict(&shares)
+        let verdict = self.metric.verdict(&shares);
+        if !self.metric.is_open(&verdict) {
+            return verdict;
+        }
+        ways.cross(&mut matrix, &gradient, |coordinate| metric.columns[coordinate]);
+        let rows: Vec<f64> = ways.order.iter().map(|&row| metric.rows[row]).collect();
+        self.metric.pivoted(ways.envelope.full(&matrix), &rows)
     }
 
     /// The inward pass of one row.

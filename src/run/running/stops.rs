@@ -15,6 +15,8 @@ use crate::dynamics::friction::paradox::{HINT, JAMS};
 use crate::dynamics::{CompileError, Mechanism, Motion};
 use crate::stepping::{Cause, StepError};
 
+/// Relative tolerance from which on rounding is what a run in doubles errs by.
+const ROUNDING: f64 = 1e-14;
 /// Share of the output interval by which a row may be beside its time.
 const BESIDE: f64 = 1e-6;
 
@@ -185,14 +187,19 @@ pub(super) fn not_finite(plan: &Plan, t: f64) -> StepError {
     }
 }
 
+/// True where rounding, and not its tolerance, is what a run in doubles errs by.
+pub(super) fn is_at_rounding(plan: &Plan) -> bool {
+    !plan.extended && plan.tolerance.is_some_and(|tolerance| tolerance.relative <= ROUNDING)
+}
+
 pub(super) fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
+    let instead = "state another limit with --max-energy-drift or --max-constraint-drift";
     let hint = match plan.step {
-        Some(_) => {
-            "shorten the step, or state another limit with --max-energy-drift or --max-constraint-drift"
+        Some(_) => format!("shorten the step, or {instead}"),
+        None if is_at_rounding(plan) => {
+            format!("no tolerance is tighter: try another --method, or {instead}")
         }
-        None => {
-            "tighten the tolerance, or state another limit with --max-energy-drift or --max-constraint-drift"
-        }
+        None => format!("tighten the tolerance, or {instead}"),
     };
     StepError {
         cause: Cause::DriftLimit,
@@ -200,6 +207,6 @@ pub(super) fn drift_stop(plan: &Plan, t: f64, what: String) -> StepError {
         t,
         step: plan.step.unwrap_or(0.0),
         what,
-        hint: hint.into(),
+        hint,
     }
 }

@@ -26,6 +26,8 @@ pub struct Expansion<T: Coefficient> {
     /// Powers of the rates that are summed: all, or those before noise takes over in a step through a
     /// singular position.
     summed: usize,
+    /// The same of the powers of the work, whose noise takes over elsewhere.
+    summed_work: usize,
     u: [Vec<T>; 3],
     exact: [Vec<DoubleDouble>; 3],
 }
@@ -39,6 +41,7 @@ impl<T: Coefficient> Expansion<T> {
             mechanism: mechanism.clone(),
             coordinates,
             summed: order + 1,
+            summed_work: order + 1,
             first: (extended && T::IS_PLAIN).then(|| Box::new(Series::new(mechanism, coordinates, LEADING))),
             whole: None,
             u: std::array::from_fn(|_| vec![T::ZERO; f]),
@@ -68,7 +71,7 @@ impl<T: Coefficient> Expansion<T> {
     /// Expands the motion about a state.
     pub fn expand(&mut self, mechanism: &Mechanism, state: &State) {
         let f = self.series.coordinates();
-        self.summed = self.series.order() + 1;
+        self.sum_all();
         let [u, rest, rate] = &mut self.u;
         for i in 0..f {
             (u[i], rest[i]) = T::split(state.unknown(i));
@@ -181,15 +184,24 @@ impl<T: Coefficient> Expansion<T> {
         force.map_or(f64::NAN, |force| -force.value() / mechanism.contacts[mechanism.held[place]].force)
     }
 
-    /// Sums no further than to the power that is the smallest at `h` \[s\].
+    /// Sums no further than to the power that is the smallest at `h` \[s\]: of the work where two of its
+    /// neighbours are, as one alone may be zero by symmetry.
     pub fn sum_to_smallest(&mut self, h: f64) {
-        let smallest = (1..=self.series.order()).min_by(|&a, &b| self.size(a, h).total_cmp(&self.size(b, h)));
-        self.summed = smallest.unwrap_or(self.series.order()) + 1;
+        let order = self.series.order();
+        let smallest = (1..=order).min_by(|&a, &b| self.size(a, h).total_cmp(&self.size(b, h)));
+        self.summed = smallest.unwrap_or(order) + 1;
+        let work: Vec<f64> = (self.series.power.iter().zip(0..))
+            .map(|(power, m)| power.value().abs() * libm::pow(h, f64::from(m)))
+            .collect();
+        let size = |m: usize| larger(work[m], work[m + 1]);
+        let smallest = (1..order - 1).min_by(|&a, &b| size(a).total_cmp(&size(b)));
+        self.summed_work = smallest.map_or(order, |m| m + 1);
     }
 
     /// Sums all powers again.
     pub fn sum_all(&mut self) {
-        self.summed = self.series.order() + 1;
+        let all = self.series.order() + 1;
+        (self.summed, self.summed_work) = (all, all);
     }
 
     /// The smallest power at `h` \[s\] over the largest.
@@ -227,7 +239,7 @@ impl<T: Coefficient> Expansion<T> {
     pub fn go(&self, state: &mut State, h: Time) {
         let (f, series) = (self.series.coordinates(), &self.series);
         let (rates, powers) =
-            (&series.rate[..self.summed * f], &series.power[..self.summed.min(series.power.len())]);
+            (&series.rate[..self.summed * f], &series.power[..self.summed_work.min(series.power.len())]);
         let step = T::split(h).0;
         // Powers of the rates that are in `first` already, and powers of the work.
         let known = if self.first.is_some() { LEADING + 1 } else { 0 };
@@ -255,7 +267,7 @@ impl<T: Coefficient> Expansion<T> {
             add(state, 2 * f, work);
         }
         if !series.lost().is_empty() {
-            let lost = &series.lost()[..self.summed.min(series.lost().len())];
+            let lost = &series.lost()[..self.summed_work.min(series.lost().len())];
             add(state, 2 * f + 2, integral(lost, 0, 1, 0, step).double_double());
         }
     }
