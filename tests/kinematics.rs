@@ -347,6 +347,43 @@ fn a_slider_crank_goes_as_far_as_crank_and_rod_reach() {
     assert!(turned.dead_centres.iter().any(|at| at.name == slider && at.in_line == ["A"]));
 }
 
+/// A crank r and a rod l with the centres of mass in their middles, and a massless pin on a rail along x.
+fn slider_crank(r: f64, l: f64, motors: &str) -> Scene {
+    let text = format!(
+        r#"{{"name": "sd", "gravity": [0, -9.81],
+        "bars": [{{"name": "a", "mass": 1, "centre": [{}, 0], "inertia": 0.01, "length": {r}}},
+            {{"name": "b", "mass": 2, "centre": [{}, 0], "inertia": 0.05, "length": {l}}}],
+        "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+            {{"name": "A", "between": [{{"body": "a", "point": [{r}, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+        "sliders": [{{"name": "S", "point": {{"body": "b", "point": [{l}, 0]}},
+            "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}}}],
+        "start": {{"a": {{"phi": 1.3}}, "b": {{"phi": -0.4}}}}, {motors} "until": 1, "every": 1}}"#,
+        0.5 * r,
+        0.5 * l
+    );
+    parse_scene(&text, "sd", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What moves a slider is the force along its rail, not that of the rail: it does the work against gravity.
+#[test]
+fn the_force_that_drives_a_slider_is_that_of_virtual_work() {
+    let (r, l) = (0.2, 0.5);
+    let motor = r#""motors": [{"name": "M", "slider": "S", "law": {"start": 0.5, "rate": 1e-6}}],"#;
+    for (motors, name) in [("", "S"), (motor, "M")] {
+        let scene = slider_crank(r, l, motors);
+        let drive = KinematicDrive { rate: Some(1e-6), ..drive(&format!("{name}=0.32..0.65")) };
+        let found = kinematics(&scene, &drive, 40).expect("kinematics");
+        for at in &found.positions {
+            let x = at.drive;
+            let cosine = (x * x + r * r - l * l) / (2.0 * r * x);
+            let slope = (x * x - r * r + l * l) / (2.0 * r * x * x);
+            // Of V = g (m r/2 + M r/2) sin(angle of the crank), the rod's centre being half as high as its end.
+            let expected = -9.81 * 1.5 * r * cosine * slope / (1.0 - cosine * cosine).sqrt();
+            assert!((at.force - expected).abs() < 1e-8, "{name} at {x}: {} for {expected}", at.force);
+        }
+    }
+}
+
 /// The ram of a shaper turns back where its rocker does, and the pin in the slot where the crank lies along it.
 #[test]
 fn rams_and_pins_in_slots_turn_back_at_the_ends_of_their_ways() {

@@ -181,7 +181,14 @@ impl DrivenScene {
         if left > 0 {
             return Err(KinematicsError::Free { name: label, left });
         }
-        let row = mechanism.constraints.iter().position(|row| row.name() == name).unwrap_or_default();
+        let row = match slot {
+            // Rows of motors that give angles come first.
+            Slot::Turning(k) => k,
+            // The slider's own row may bear the name, too, but has no law.
+            Slot::Sliding(_) => (mechanism.constraints.iter())
+                .position(|row| row.name() == name && row.law.is_some() && !row.is_angle())
+                .unwrap_or_default(),
+        };
         Ok(Self { scene, mechanism, start, row, label, name, unit, rate, range, is_turn })
     }
 }
