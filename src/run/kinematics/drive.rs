@@ -100,7 +100,7 @@ pub enum KinematicsError {
         /// The motor that moves it.
         motor: String,
         /// Why.
-        error: CompileError,
+        error: Box<CompileError>,
     },
 }
 
@@ -194,8 +194,11 @@ impl DrivenScene {
 }
 
 fn compile(scene: &Scene, [name, motor]: [&str; 2]) -> Result<Mechanism, KinematicsError> {
-    let refused = |error| KinematicsError::Compile { name: name.to_owned(), motor: motor.to_owned(), error };
-    Mechanism::new(scene).map_err(refused)
+    Mechanism::new(scene).map_err(|error| KinematicsError::Compile {
+        name: name.to_owned(),
+        motor: motor.to_owned(),
+        error: Box::new(error),
+    })
 }
 
 /// Takes out the first motor, whose place a driven coordinate takes, and gives its name; else `name`.
