@@ -109,7 +109,7 @@ impl Mechanism {
             let sound = 1.0 / (kernel.pivot[k] * self.tree.diagonal[k]) > 1e-13;
             !sound
         };
-        // Dividing by a pivot of zero spoils those that come after: a body with nothing to turn is told first.
+        // Dividing by a pivot of zero spoils those after it: a body with nothing to turn is told first.
         let is_still = |&k: &usize| self.tree.diagonal[k] == 0.0;
         let bodies = 0..self.bodies.len();
         match bodies.clone().find(is_still).or_else(|| bodies.rev().find(singular)) {
