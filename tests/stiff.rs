@@ -7,8 +7,9 @@ use common::{compile, run, shipped};
 use driftless::arithmetic::Complex;
 use driftless::dynamics::Stiffness;
 use driftless::run::{MethodId, Outcome, Plan, Request};
-use driftless::scene::{Bar, Hinge, Place, Scene, Spring, Start, TorsionSpring};
+use driftless::scene::{Bar, Hinge, Place, Scene, Spring, Start, TorsionSpring, parse_scene};
 use driftless::stepping::Cause;
+use serde_json::{Value, json};
 
 /// Two point masses of 1 kg on massless rods of 1 m, with the energy C² theta²/2 between them: the stiff
 /// double pendulum of M. Antoñana, J. Makazaga, A. Murua, Numer. Algorithms 78 (2018), section 5.
@@ -255,4 +256,70 @@ fn a_stiff_spring_that_swings_is_followed_to_six_digits() {
             assert!((found - expected).abs() < 1e-5, "{method}: {found} {expected}");
         }
     }
+}
+
+/// Masses \[kg\] on one upright rail, one above the other on springs and dampers \[N/m, N·s/m\], at rest in
+/// the springs' free lengths.
+fn stack(gravity: f64, masses: &[f64], springs: &[[f64; 2]], until: f64) -> Scene {
+    let name = |k: usize| if k == 0 { "ground".to_owned() } else { format!("m{k}") };
+    let place = |body: String| json!({"body": body, "point": [0, 0]});
+    let each = |of: &dyn Fn(usize) -> Value| (1..=masses.len()).map(of).collect::<Vec<_>>();
+    let rail = json!({"body": "ground", "point": [0, 0], "direction": [0, 1]});
+    let start = |k: usize| (name(k), json!({"phi": 0, "origin": [0, k], "velocity": [0, 0]}));
+    let scene = json!({
+        "name": "stack", "gravity": [0, -gravity],
+        "bars": each(&|k| json!({"name": name(k), "mass": masses[k - 1], "centre": [0, 0], "inertia": 1})),
+        "sliders": each(&|k| {
+            json!({"name": format!("s{k}"), "point": place(name(k)), "rail": rail, "angle": "locked"})
+        }),
+        "springs": each(&|k| {
+            let [stiffness, damping] = springs[k - 1];
+            json!({"name": format!("k{k}"), "between": [place(name(k - 1)), place(name(k))],
+                   "stiffness": stiffness, "damping": damping, "free_length": 1})
+        }),
+        "start": (1..=masses.len()).map(start).collect::<serde_json::Map<_, _>>(),
+        "until": until, "every": 0.1,
+    });
+    parse_scene(&scene.to_string(), "stack.json", &[]).expect("a scene")
+}
+
+/// A damped mode is stiff beside slower ones, over so long a run that an implicit method pays; it is not by
+/// itself, nor beside modes nearly as fast.
+#[test]
+fn a_damped_mode_is_stiff_beside_slower_motion_only() {
+    let chosen = |scene: &Scene| {
+        let mechanism = compile(scene);
+        let plan = Plan::new(scene, &mechanism, &Request::default()).expect("a plan");
+        let found = Stiffness::at_start(&mechanism, &mechanism.start(scene)).expect("springs");
+        (plan.method, plan.why.expect("a reason"), found)
+    };
+    // One mass: its two eigenvalues are as large as one another, or have the product k/m.
+    let (k, m): (f64, f64) = (45.0, 2.0);
+    for until in [8.0, 1000.0] {
+        let (method, why, found) = chosen(&stack(0.0, &[m], &[[k, 5.0]], until));
+        assert!(method == MethodId::Taylor && found.is_damped(), "{method}: {why}");
+        let alone = (k / m).sqrt();
+        assert!((found.fastest - alone).abs().max((found.slow - alone).abs()) < 1e-9 * alone, "{found:?}");
+    }
+    let (method, why, found) = chosen(&stack(0.0, &[m], &[[k, 1e4]], 8.0));
+    assert!(method == MethodId::Radau(5) && why.contains("k1"), "{method}: {why}");
+    assert!((found.fastest * m / 1e4 - 1.0).abs() < 1e-4, "{found:?}");
+    // A quarter of a car: the product of all four eigenvalues is that of the stiffnesses over the masses'.
+    let (masses, springs) = ([40.0, 300.0], [[180_000.0, 0.0], [18_000.0, 1500.0]]);
+    for until in [2.5, 1000.0] {
+        let (method, why, found) = chosen(&stack(9.81, &masses, &springs, until));
+        assert!(method == MethodId::Taylor && found.is_damped(), "{method}: {why}");
+        let product = (springs[0][0] * springs[1][0] / (masses[0] * masses[1])).sqrt();
+        assert!((found.fastest * found.slow / product - 1.0).abs() < 1e-9, "{found:?}");
+        assert!((found.ratio() - 9.0).abs() < 1.0, "{found:?}");
+    }
+    // Beside a motion that keeps its rate, as long as the mode has few periods to go through.
+    let flying = |until: f64| {
+        let mut scene = stack(9.81, &[1.0, 1.0], &[[0.0, 0.0], [100.0, 5.0]], until);
+        scene.springs.remove(0);
+        chosen(&scene)
+    };
+    let (method, why, _) = flying(2.0);
+    assert!(method == MethodId::Taylor && !why.contains("undamped"), "{method}: {why}");
+    assert_eq!(flying(1000.0).0, MethodId::Radau(5));
 }

@@ -27,6 +27,8 @@ const ROUNDS: usize = 60;
 const NAMED: usize = 200;
 /// Eigenvalues whose squares differ by this share are as large as one another.
 const ALIKE: f64 = 1e-6;
+/// Eigenvalues below this share of the largest are rounding: zeros come in pairs that it moves by its root.
+const ROUNDING: f64 = 1e-6;
 /// Share of the fastest rate that a spring must reach by itself to be what makes it.
 const SHARE: f64 = 0.5;
 
@@ -38,7 +40,9 @@ pub struct Stiffness {
     pub fastest: f64,
     /// Minus its real part \[1/s\]: positive where the mode dies away.
     pub decay: f64,
-    /// The rate of everything else \[rad/s\]: gravity on the bars, their own rates, and the laws of motors.
+    /// The rate of everything else \[rad/s\]: gravity on the bars, their own rates, and the laws of motors;
+    /// beside a mode that dies away that of the slowest mode at least, which is its own where it is the only
+    /// one.
     pub slow: f64,
     /// The spring or damper whose mode it is; `None` where it is no spring's.
     pub culprit: Option<String>,
@@ -51,14 +55,17 @@ pub struct Stiffness {
 impl Stiffness {
     /// Measures it at a time, at angles and positions `phi` \[rad, m\] and rates `omega` \[rad/s, m/s\].
     pub fn at(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Self {
-        let lambda = if phi.len() <= EXACT {
+        let (lambda, slowest) = if phi.len() <= EXACT {
             spectrum(mechanism, time, phi, omega)
         } else {
-            largest(mechanism, time, phi, omega)
+            (largest(mechanism, time, phi, omega), 0.0)
         };
         let fastest = lambda.norm_squared().sqrt();
         let mut found =
             Self { fastest, decay: -lambda.re, slow: slow(mechanism, time, omega), ..Self::default() };
+        if found.is_damped() {
+            found.slow = found.slow.max(slowest);
+        }
         if let Some(mode) =
             fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest)
         {
@@ -97,8 +104,9 @@ impl Stiffness {
     }
 }
 
-/// The largest eigenvalue, by the Schur form of the whole matrix.
-fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Complex<f64> {
+/// The largest eigenvalue, and the magnitude of the smallest of those that constraints leave, zero where it
+/// is rounding; by the Schur form of the whole matrix.
+fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> (Complex<f64>, f64) {
     let n = phi.len();
     let mut jacobian = Jacobian::new(mechanism);
     jacobian.evaluate(mechanism, time, phi, omega, Bias::default());
@@ -106,7 +114,7 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
     let squares = (0..n)
         .flat_map(|i| (0..n).map(move |k| (i, k)))
         .fold(0.0, |sum: f64, (i, k)| sum + by(i, k) * by(i, k));
-    let unknown = Complex::new(f64::NAN, 0.0);
+    let unknown = (Complex::new(f64::NAN, 0.0), 0.0);
     if !jacobian.acceleration.iter().all(|entry| entry.is_finite()) {
         return unknown;
     }
@@ -119,9 +127,21 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
         (false, true) => by(i - n, k) / r,
         (false, false) => by(i - n, k),
     });
-    let Some(schur) = Schur::try_new(matrix, f64::EPSILON, 10_000) else { return unknown };
+    let Some(schur) = Schur::try_new(matrix, f64::EPSILON, 10_000) else {
+        return (largest(mechanism, time, phi, omega), 0.0);
+    };
     let values = schur.complex_eigenvalues();
-    values.iter().map(|value| Complex::new(value.re, value.im.abs())).fold(Complex::ZERO, |most, value| {
+    let mut sizes: Vec<f64> = values.iter().map(|value| libm::hypot(value.re, value.im)).collect();
+    sizes.sort_by(|a, b| b.total_cmp(a));
+    // Those of what constraints do not let move are zero.
+    let rows = mechanism.constraints.len().saturating_sub(mechanism.assembly.redundant.len());
+    let free = sizes.get(..2 * n.saturating_sub(rows)).unwrap_or_default();
+    let slowest = match free {
+        [first, .., last] if *last > ROUNDING * first => *last,
+        _ => 0.0,
+    };
+    let values = values.iter().map(|value| Complex::new(value.re, value.im.abs()));
+    let largest = values.fold(Complex::<f64>::ZERO, |most, value| {
         // Of a mode that grows and one that dies away as fast, rounding is not to choose: the first counts.
         let share = value.norm_squared() / most.norm_squared();
         let is_alike = (share - 1.0).abs() <= ALIKE;
@@ -130,7 +150,8 @@ fn spectrum(mechanism: &Mechanism, time: Time, phi: &[f64], omega: &[f64]) -> Co
         } else {
             most
         }
-    })
+    });
+    (largest, slowest)
 }
 
 /// The largest eigenvalue or pair, by power iteration with products of the Jacobian and a vector: x'' = b x'
@@ -363,8 +384,8 @@ mod tests {
         for scene in [sprung(1e6, 0.0), sprung(1e6, 667.0), sprung(1.0, 1e4)] {
             let mechanism = Mechanism::new(&scene).expect("equations");
             let phi = [scene.start[0].phi, scene.start[1].phi];
-            let [exact, found] =
-                [spectrum, largest].map(|method| method(&mechanism, Time::default(), &phi, &[0.0, 0.0]));
+            let [exact, found] = [|m: &_, t, phi: &_, omega: &_| spectrum(m, t, phi, omega).0, largest]
+                .map(|method| method(&mechanism, Time::default(), &phi, &[0.0, 0.0]));
             assert!((exact - found).norm_squared() < 1e-6 * exact.norm_squared(), "{exact:?} {found:?}");
         }
     }

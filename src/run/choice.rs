@@ -34,7 +34,8 @@ const LONG: f64 = 60.0;
 const MANY_STEPS: f64 = 2e7;
 /// Radians of the fastest motion in a step of `gauss16`.
 const STEP: f64 = 0.12;
-/// How many times faster than the rest a mode that dies away must be for an implicit method to pay.
+/// How many times faster than the rest a mode that dies away must be for an implicit method to pay, and the
+/// phase it must run through until the horizon \[rad\].
 const STIFF: f64 = 300.0;
 /// Tolerances below this are for the five-stage method.
 const TIGHT: f64 = 1e-7;
@@ -150,6 +151,11 @@ fn is_long(mechanism: &Mechanism, until: f64) -> bool {
     until >= LONG * mechanism.units.time
 }
 
+/// True where a mode that dies away makes an implicit method pay in a run to `until` \[s\].
+fn is_overdamped(stiffness: &Stiffness, until: f64) -> bool {
+    stiffness.is_damped() && stiffness.ratio() > STIFF && stiffness.radians(until) > STIFF
+}
+
 fn chosen(
     mechanism: &Mechanism,
     request: &Request,
@@ -170,8 +176,7 @@ fn chosen(
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
     let is_expanded = mechanism.recursion.is_some() && is_kept && mechanism.has_series();
     if !mechanism.frictions.is_empty() && request.step.is_none() {
-        let is_overdamped =
-            stiffness.is_some_and(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF);
+        let is_overdamped = stiffness.is_some_and(|stiffness| is_overdamped(stiffness, until));
         let method = match n > MANY_COORDINATES {
             true => MethodId::Dp8,
             false if is_overdamped => MethodId::Radau(5),
@@ -205,7 +210,7 @@ fn chosen(
         return (MethodId::Gauss(8), format!("a fixed step was given; {why}"));
     }
     let tolerance = request.rtol.or(request.atol);
-    if let Some(damped) = stiffness.filter(|stiffness| stiffness.is_damped() && stiffness.ratio() > STIFF) {
+    if let Some(damped) = stiffness.filter(|stiffness| is_overdamped(stiffness, until)) {
         let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
         let mode = damped
             .culprit
@@ -248,7 +253,7 @@ fn chosen(
     if n > FEW_COORDINATES && !is_expanded {
         return (classic, format!("{n} coordinates are cheaper to evaluate than to expand"));
     }
-    let fast = stiffness.filter(|stiffness| stiffness.ratio() > STIFF);
+    let fast = stiffness.filter(|stiffness| stiffness.ratio() > STIFF && !stiffness.is_damped());
     let why = if let Some(name) = fast.and_then(|fast| fast.culprit.as_ref()) {
         format!("spring {name} vibrates undamped and is resolved, which its long steps do best")
     } else if mechanism.has_closed_loops() {
