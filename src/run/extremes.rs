@@ -6,6 +6,7 @@
 //! between the extremes known so far, as in most steps of a long run, one low degree serves, and the cheapest
 //! interpolation of the motion.  Steps in which an output has a corner or jumps are taken apart there.
 
+mod irregular;
 mod parts;
 
 use super::halvings::Halvings;
@@ -15,9 +16,8 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch, Outputs};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, golden_sections, interpolated};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated};
 use serde::{Deserialize, Serialize};
-use std::convert::Infallible;
 use std::sync::Arc;
 
 /// Degrees of the interpolants, and what the last coefficients may be over the largest value.
@@ -145,6 +145,8 @@ pub(super) struct ExtremesMemory {
     rounding: Vec<f64>,
     /// The same of the conditions that choose their branches.
     still: Vec<f64>,
+    /// Short parts, one after the other, in which no interpolant has resolved each output.
+    unresolved: Vec<u8>,
 }
 
 /// Looks at the outputs of every step.
@@ -189,7 +191,8 @@ impl ExtremesDetector {
         let conditions = self.condition_count();
         let fits = memory.found.len() == count
             && [0, count].contains(&memory.rounding.len())
-            && [0, conditions].contains(&memory.still.len());
+            && [0, conditions].contains(&memory.still.len())
+            && [0, count].contains(&memory.unresolved.len());
         if fits {
             self.memory = memory;
         }
@@ -309,14 +312,20 @@ impl ExtremesDetector {
         if depth == 0 && self.look_inwards(inside, (begin, span), &values, is_resolved) {
             return;
         }
-        if !is_resolved && depth <= DOUBTS && self.has_more_rounding(inside, begin + 0.5 * span) {
+        let is_open: Vec<bool> = (curves.iter().zip(&rounding))
+            .map(|(curve, &rounding)| !is_resolved && curve.tail() > (RESOLVED * curve.most()).max(rounding))
+            .collect();
+        let doubts = depth <= DOUBTS && !is_resolved && !self.were_irregular(&is_open);
+        if doubts && self.has_more_rounding(inside, begin + 0.5 * span) {
             return self.look(inside, begin, span, depth);
         }
         let (angles, part) = (self.mechanism.bodies.len(), (begin, span));
-        if !is_resolved && self.halvings.asks(inside, angles, part, [depth, HALVINGS]) {
+        let is_halved = (0..curves.len()).any(|k| is_open[k] && !self.is_irregular(k));
+        if is_halved && self.halvings.asks(inside, angles, part, [depth, HALVINGS]) {
             self.look(inside, begin, 0.5 * span, depth + 1);
             return self.look(inside, begin + 0.5 * span, 0.5 * span, depth + 1);
         }
+        self.count_unresolved(inside, part, depth, &is_open);
         self.memory.span += DoubleDouble::from(span);
         let ends = self.true_ends(inside, begin, span);
         let mut row = Vec::new();
@@ -334,50 +343,17 @@ impl ExtremesDetector {
             if found.holds(curve, rounding[k]) {
                 continue;
             }
-            if !is_resolved && curve.tail() > (RESOLVED * curve.most()).max(rounding[k]) {
+            let known = [found.min[0], found.max[0]];
+            if is_open[k] && !self.is_irregular(k) {
                 self.look_beside_nodes(inside, (begin, span), k, (values, &nodes.places));
                 continue;
             }
-            let known = [found.min[0], found.max[0]];
             for share in turns(curve, values, &nodes.places, known) {
                 let t = begin + share * span;
                 row.clear();
                 self.values(inside.at(t), &mut row);
                 self.memory.found[k].see(row[k], t.hi);
             }
-        }
-    }
-
-    /// Looks for the extremes of an output next to its least and its largest value at nodes, by golden
-    /// sections of the output itself: beside a corner the interpolant does not tell where they are.
-    fn look_beside_nodes(
-        &mut self,
-        inside: &mut dyn Inside,
-        (begin, span): (Time, f64),
-        k: usize,
-        (values, places): (&[f64], &[f64]),
-    ) {
-        for sign in [1.0, -1.0] {
-            let signed = |i: usize| sign * values[i];
-            let Some(least) = (0..values.len()).min_by(|&a, &b| signed(a).total_cmp(&signed(b))) else {
-                return;
-            };
-            let beside = [(least + 1).min(values.len() - 1), least.saturating_sub(1)];
-            let rise = beside.iter().fold(0.0, |rise: f64, &i| rise.max(signed(i) - signed(least)));
-            let Found { min: [min, _], max: [max, _], .. } = self.memory.found[k];
-            if signed(least) - rise >= if sign > 0.0 { min } else { -max } {
-                continue;
-            }
-            let mut row = Vec::new();
-            let at = |share: f64| {
-                let t = begin + share * span;
-                row.clear();
-                self.values(inside.at(t), &mut row);
-                self.memory.found[k].see(row[k], t.hi);
-                Ok::<f64, Infallible>(sign * row[k])
-            };
-            // Nodes go from 1 to 0.
-            let Ok(()) = golden_sections(at, beside.map(|i| places[i]), ROUNDS);
         }
     }
 }

@@ -80,6 +80,7 @@ impl ExtremesDetector {
     /// Looks at a step, or a part of it.
     pub(super) fn look_at(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) {
         if span > 0.0 && !self.passes(inside, begin, span) {
+            self.begin_part();
             self.look(inside, begin, span, 0);
         }
     }
