@@ -409,7 +409,8 @@ pub struct Wall<C = f64> {
     /// The same as a formula of time, angles and positions \[m\]; `None`: it depends on time alone.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub aim: Option<String>,
-    /// Restitution e: the normal velocity after an impact is -e times the one before; 0 to 1.
+    /// Restitution e: the normal velocity after an impact is -e times the one before; 0 to 1.  With friction,
+    /// and where several walls are hit at one moment, by Poisson's law if friction does not say otherwise.
     pub restitution: C,
 }
 

@@ -174,7 +174,9 @@ pub(in crate::scene) static WALL: KeyTable = KeyTable {
             "restitution",
             FieldShape::Number(QuantityRange { least: 0.0, most: 1.0, unit: "" }),
             "0.5",
-            "The normal velocity after an impact is -restitution times the one before: 0 plastic, 1 elastic.",
+            "The normal velocity after an impact is -restitution times the one before: 0 plastic, 1 elastic. \
+             With friction, and where several walls are hit at one moment, it multiplies the impulse of \
+             compression instead, unless friction says otherwise.",
         ),
         optional(
             "law",
