@@ -720,3 +720,61 @@ fn a_spring_that_loses_its_length_inside_a_step_is_found_by_every_method() {
         assert!((stop.t - time).abs() < 1e-6, "{name}: {} for {time}", stop.t);
     }
 }
+
+/// A ball dropped from 1 m, whose event at the ground changes its rate by a factor.
+fn dropped(factor: f64, direction: Direction, request: Request) -> Outcome {
+    let scene = SceneBuilder::new("ball")
+        .gravity([0.0, -9.81])
+        .body("b", 1.0, [0.0, 0.0], 0.1, 0.1)
+        .start("b", 0.0, 0.0)
+        .with("origin", vec![0.0, 1.0])
+        .with("velocity", vec![0.3, 0.0])
+        .until(6.0, 0.5)
+        .build()
+        .expect("a scene");
+    let simulation = Simulation::new(&scene).expect("equations").options(request);
+    let site = simulation.site("b", [0.0, 0.0]).expect("a body");
+    let ground = When(
+        "ground",
+        direction,
+        move |at: &Configuration<f64>| at.position(&site)[1],
+        move |motion: &Motion| {
+            let mut next = motion.clone();
+            next.omega[2] = next.omega[2].scale(factor);
+            Action::Change(Change::default().to(next))
+        },
+    );
+    simulation.event(ground).run().expect("a run")
+}
+
+/// Bounces end at t1 (1 + e)/(1 - e), t1 = sqrt(2 h/g): a run that cannot tell them apart any more stops there, and
+/// does not fall through the ground.
+#[test]
+fn events_that_accumulate_stop_the_run() {
+    for (request, direction) in
+        every_method().into_iter().zip([Direction::Either, Direction::Falling].into_iter().cycle())
+    {
+        let method = request.method;
+        if matches!(method, Some(MethodId::Rattle(_))) {
+            continue;
+        }
+        for restitution in [0.5_f64, 0.8] {
+            let found = dropped(-restitution, direction, request.clone());
+            let end = (2.0_f64 / 9.81).sqrt() * (1.0 + restitution) / (1.0 - restitution);
+            let stop = found.stop.as_ref().map(ToString::to_string).unwrap_or_default();
+            assert!(stop.contains("`ground` comes true again"), "{method:?} {restitution}: {stop}");
+            assert!((found.last.t - end).abs() < 1e-5, "{method:?}: {} for {end}", found.last.t);
+            assert!(found.last.phi[2].abs() < 1e-9, "{method:?}: {:?}", found.last.phi);
+            // Each rate is the one before times e, down to where a bounce is shorter than times can tell.
+            assert!(found.event_count > 15, "{method:?}: {}", found.event_count);
+        }
+    }
+    // What is only slowed down goes on through the ground, which happens once.
+    let through =
+        dropped(0.5, Direction::Either, Request { method: Some(MethodId::Taylor), ..Request::default() });
+    let impact = (2.0_f64 / 9.81).sqrt();
+    let rest = 6.0 - impact;
+    let expected = -0.5 * 9.81 * impact * rest - 0.5 * 9.81 * rest * rest;
+    assert_eq!((through.event_count, through.stop.is_none()), (1, true));
+    assert!((through.last.phi[2] - expected).abs() < 1e-10, "{:?}", through.last.phi);
+}

@@ -6,6 +6,7 @@ use super::closing;
 use super::contact::{ContactDriver, Jump, Switch, in_modes};
 use super::event::{Action, Change, EventDetector, SwitchFunction};
 use super::monitor::Monitor;
+use super::plan::Plan;
 use super::running::Outcome;
 use crate::arithmetic::shown::about;
 use crate::dynamics::compile::Laws;
@@ -36,33 +37,8 @@ impl ContactDriver {
         outcome: &mut Outcome,
         monitor: Option<&mut dyn Monitor>,
     ) -> Result<(), StepError> {
-        let too_many = [
-            self.events.as_ref().is_some_and(|events| events.halvings.is_too_much()),
-            self.extremes.as_ref().is_some_and(|extremes| extremes.halvings.is_too_much()),
-        ];
-        if too_many.contains(&true) {
-            return Err(StepError {
-                cause: Cause::Unresolved,
-                method: outcome.plan.method.to_string(),
-                t: self.motion().time.hi,
-                step: 0.0,
-                what: "in the step that ends here a body turns, or a formula oscillates, too often for \
-                    events and outputs to be looked for each time"
-                    .into(),
-                hint: "end the run earlier with --until, or leave its events and outputs out".into(),
-            });
-        }
+        self.check_search(&outcome.plan)?;
         let Some(events) = &mut self.events else { return Ok(()) };
-        if let Some(name) = events.take_undefined() {
-            return Err(StepError {
-                cause: Cause::NotFinite,
-                method: outcome.plan.method.to_string(),
-                t: self.motion().time.hi,
-                step: 0.0,
-                what: format!("the function of event `{name}` is not a number in the step that ends here"),
-                hint: "let its value be a number wherever the motion may come to".into(),
-            });
-        }
         let Some((event, action)) = events.memory.pending.take() else { return Ok(()) };
         if let Some(function) = events.friction_function(event) {
             return self.friction_event(function, outcome);
@@ -98,9 +74,55 @@ impl ContactDriver {
                 if let Some(monitor) = monitor.filter(|_| is_from_outside) {
                     monitor.end(&format!("event `{name}` changed the run, which nothing beside it follows"));
                 }
-                self.change((&name, at), change, outcome)
+                let is_moved = is_from_outside && change.motion.is_some();
+                self.change((&name, at), change, outcome)?;
+                if is_moved {
+                    let motion = self.motion();
+                    self.events.iter_mut().for_each(|events| events.leave(event, &motion));
+                }
+                Ok(())
             }
         }
+    }
+
+    /// Stops where events of the last step could not be told.
+    fn check_search(&mut self, plan: &Plan) -> Result<(), StepError> {
+        let too_many = [
+            self.events.as_ref().is_some_and(|events| events.halvings.is_too_much()),
+            self.extremes.as_ref().is_some_and(|extremes| extremes.halvings.is_too_much()),
+        ];
+        if too_many.contains(&true) {
+            return Err(StepError {
+                cause: Cause::Unresolved,
+                method: plan.method.to_string(),
+                t: self.motion().time.hi,
+                step: 0.0,
+                what: "in the step that ends here a body turns, or a formula oscillates, too often for \
+                    events and outputs to be looked for each time"
+                    .into(),
+                hint: "end the run earlier with --until, or leave its events and outputs out".into(),
+            });
+        }
+        let Some(events) = &mut self.events else { return Ok(()) };
+        if let Some(name) = events.take_undefined() {
+            return Err(StepError {
+                cause: Cause::NotFinite,
+                method: plan.method.to_string(),
+                t: self.motion().time.hi,
+                step: 0.0,
+                what: format!("the function of event `{name}` is not a number in the step that ends here"),
+                hint: "let its value be a number wherever the motion may come to".into(),
+            });
+        }
+        if let Some(name) = events.take_lost() {
+            return Err(self.stopped(
+                plan,
+                format!("event `{name}` comes true again too soon after its change to be told from it"),
+                "events that accumulate end here: let its action stop the run, or state it as a wall of the \
+                    scene, whose bounces end",
+            ));
+        }
+        Ok(())
     }
 
     fn change(

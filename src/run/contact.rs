@@ -404,7 +404,7 @@ impl ContactDriver {
         contacts.iter().map(|&contact| self.name(contact)).collect::<Vec<_>>().join(", ")
     }
 
-    fn stopped(&mut self, plan: &Plan, what: String, hint: &str) -> StepError {
+    pub(super) fn stopped(&mut self, plan: &Plan, what: String, hint: &str) -> StepError {
         let t = self.motion().time.hi;
         StepError {
             cause: Cause::RestingContact,

@@ -1,6 +1,7 @@
 //! The events of a run: which functions there are, what they belong to, and what is done at their zeros.
 
 mod named;
+mod returns;
 mod shortened;
 
 use super::search::{NO_VALUE, Passage};
@@ -72,6 +73,8 @@ pub(in crate::run) struct EventDetector {
     pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
     pub(super) undefined: Option<usize>,
+    /// What events from outside that changed the motion are to do.
+    pub(super) returns: returns::Returns,
     /// Parts of the last step that were halved.
     pub halvings: Halvings,
     /// Events since somebody last took them.
@@ -113,6 +116,7 @@ impl EventDetector {
             closers,
             tolerance: 0.0,
             undefined: None,
+            returns: returns::Returns::default(),
             halvings: Halvings::default(),
             found,
             count: 0,
@@ -353,14 +357,6 @@ impl EventDetector {
         }
     }
 
-    /// True where a function that is not kept at zero is within this share of its largest value from it.
-    pub fn is_beside_zero(&self, motion: &Motion, share: f64) -> bool {
-        let EventMemory { largest, still, .. } = &self.memory;
-        let values = self.values(motion);
-        let mut values = values.iter().zip(largest).enumerate();
-        values.any(|(event, (value, largest))| value.abs() <= share * largest && !still.contains(&event))
-    }
-
     /// Values of all functions at a motion.
     pub(super) fn values(&self, motion: &Motion) -> Vec<f64> {
         let mut values = Vec::with_capacity(self.functions());
@@ -395,6 +391,9 @@ impl StepWatcher for EventDetector {
         self.passages(inside, begin, span, 0, &mut passages);
         if self.undefined.is_some() || self.halvings.is_too_much() {
             return Some(end);
+        }
+        if self.returns.lost.is_some() {
+            return Some(begin);
         }
         self.memory.woken.clear();
         // In the order of their times for each function.

@@ -1,9 +1,9 @@
 //! Where zeros of event functions are on the dense output: those of functions that no interpolant resolves
 //! between its nodes, and others from near by.
 
-use super::detector::{EventDetector, SAME};
+use super::detector::{EventDetector, EventMemory, SAME};
 use super::search::{HALVINGS, MANY_TURNS, NO_VALUE, Passage, StepPart, resolved};
-use crate::dynamics::Time;
+use crate::dynamics::{Motion, Time};
 use crate::run::halvings::turns;
 use crate::run::observer::Inside;
 use crate::stepping::search::sign;
@@ -61,6 +61,14 @@ impl EventDetector {
             (side, before) = (sign(value), node);
         }
         self.memory.sides[event] = side;
+    }
+
+    /// True where a function that is not kept at zero is within this share of its largest value from it.
+    pub fn is_beside_zero(&self, motion: &Motion, share: f64) -> bool {
+        let EventMemory { largest, still, .. } = &self.memory;
+        let values = self.values(motion);
+        let mut values = values.iter().zip(largest).enumerate();
+        values.any(|(event, (value, largest))| value.abs() <= share * largest && !still.contains(&event))
     }
 
     /// The length of a step of which small shares are straight \[s\]: of a step with many turns as long as so

@@ -282,6 +282,7 @@ impl EventDetector {
         }
         let was_still = still.contains(&event);
         still.retain(|other| *other != event);
+        let goes_to = self.returns.take_left(event);
         let is_at_zero = first.abs() <= NO_VALUE * *largest;
         if is_at_zero && *side != 0 && sign(next) == -*side {
             all.push(part.passage(begin, event, *side < 0));
@@ -315,6 +316,9 @@ impl EventDetector {
             *side = sign(part.curve.at(from)[0]);
         }
         self.zeros(part, event, (from, None), all);
+        if let Some(goes_to) = goes_to {
+            self.look_for_return(inside.span(), event, [goes_to, sign(next)], all);
+        }
         if part.is_last {
             self.end_at_zero(part, event, inside.span().1, all);
         }

@@ -1,0 +1,87 @@
+//! Events from outside that change the motion and come true again too soon to be told from themselves, as
+//! those of a ball whose bounces accumulate.
+
+use super::{EventDetector, Owner, SAME};
+use crate::arithmetic::Scalar;
+use crate::dynamics::{Motion, Time};
+use crate::run::event::search::Passage;
+use crate::stepping::search::sign;
+
+/// Part of the time in which a coordinate moves by its unit over which an event function is differenced.
+const BESIDE: f64 = 1.0 / 1024.0;
+/// What a rate must be over the error of its differences, and over their rounding, to have a sign.
+const ERROR: f64 = 0.01;
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+/// Share of its largest value within which a function is at its zero after a change.
+const AT_ZERO: f64 = 1e-9;
+
+/// What is known of an event that has changed the motion.
+#[derive(Clone, Debug, Default)]
+pub(in crate::run::event) struct Returns {
+    /// The event, and the side of zero to which the new rates take its function.
+    left: Option<(usize, i8)>,
+    /// One whose function was on the other side at once, without an event.
+    pub lost: Option<usize>,
+}
+
+impl Returns {
+    /// The side to which an event was to go after its change, where that is this one; told once.
+    pub fn take_left(&mut self, event: usize) -> Option<i8> {
+        self.left.take_if(|left| left.0 == event).map(|left| left.1)
+    }
+}
+
+impl EventDetector {
+    /// Remembers to which side of zero an event from outside goes that has just changed the motion.
+    pub fn leave(&mut self, event: usize, motion: &Motion) {
+        let side = self.side_ahead(event, motion);
+        self.returns.left = (side != 0).then_some((event, side));
+    }
+
+    /// The side of zero to which the rates take the function of an event from outside that is at its zero; 0
+    /// where they take it nowhere.  Of a function of rates nothing is told.
+    fn side_ahead(&self, event: usize, motion: &Motion) -> i8 {
+        let Owner::Outside(number) = self.owner(event) else { return 0 };
+        let (angles, units) = (self.mechanism.bodies.len(), self.mechanism.units);
+        let rates = motion.omega.iter().enumerate();
+        let fastest = rates
+            .map(|(k, omega)| omega.hi.abs() / if k < angles { 1.0 } else { units.length })
+            .fold(1.0 / units.time, f64::max);
+        let span = BESIDE / fastest;
+        let at = |ahead: f64| {
+            let mut there = motion.clone();
+            there.time = motion.time + ahead;
+            for (phi, omega) in there.phi.iter_mut().zip(&motion.omega) {
+                *phi += omega.scale(ahead);
+            }
+            self.mechanism.seen(&there, |at| self.events[number].value(at))
+        };
+        let [fine, coarse] = [span, 2.0 * span].map(|span| (at(span) - at(-span)) / (2.0 * span));
+        let (rate, largest) = (fine + (fine - coarse) / 3.0, self.memory.largest[event]);
+        let off = ERROR * (fine - coarse).abs() + ROUNDING * largest / span;
+        if at(0.0).abs() <= AT_ZERO * largest && rate.abs() > off { sign(rate) } else { 0 }
+    }
+
+    /// Looks whether the return of a function that left zero to a side, and is on the side `next` after it,
+    /// is among the passages of a step.
+    pub(in crate::run::event) fn look_for_return(
+        &mut self,
+        (begin, end): (Time, Time),
+        event: usize,
+        [side, next]: [i8; 2],
+        passages: &[Passage],
+    ) {
+        let (rises, same) = (side < 0, SAME * (end - begin).hi);
+        let is_the_last =
+            |t: Time| self.memory.last.iter().any(|(last, at)| *last == event && (t - *at).hi <= same);
+        let mut returns = passages.iter().filter(|passage| passage.event == event && passage.rises == rises);
+        if next == -side && self.counts(event, rises) && returns.all(|passage| is_the_last(passage.t)) {
+            self.returns.lost = Some(event);
+        }
+    }
+
+    /// The name of the event that came true again before that could be told.
+    pub fn take_lost(&mut self) -> Option<String> {
+        self.returns.lost.take().map(|event| self.name(event).into())
+    }
+}
