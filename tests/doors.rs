@@ -778,3 +778,43 @@ fn events_that_accumulate_stop_the_run() {
     assert_eq!((through.event_count, through.stop.is_none()), (1, true));
     assert!((through.last.phi[2] - expected).abs() < 1e-10, "{:?}", through.last.phi);
 }
+
+/// Asks every step for the motion at a time.
+struct Asks(f64, u32);
+
+impl Observer for Asks {
+    fn step(&mut self, step: &mut Step) -> ControlFlow<()> {
+        let (begin, t) = (step.begin(), step.at(self.0).time.hi);
+        let nearest = if self.0.is_nan() { begin } else { self.0.clamp(begin, step.end()) };
+        assert_eq!(t, nearest);
+        self.1 += 1;
+        ControlFlow::Continue(())
+    }
+}
+
+#[test]
+fn a_step_asked_for_the_motion_at_no_time_gives_its_beginning() {
+    for request in every_method() {
+        for time in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let (mut asks, method) = (Asks(time, 0), request.method);
+            let simulation = Simulation::new(&dangling()).expect("equations").options(request.clone());
+            let found = simulation.until(0.2).every(0.1).run_observed(&mut asks).expect("a run");
+            assert!(found.stop.is_none() && asks.1 > 0, "{method:?}");
+        }
+    }
+}
+
+fn dangling() -> Scene {
+    SceneBuilder::new("dangling")
+        .gravity([0.0, -9.81])
+        .bar("a", 0.6, 0.5)
+        .bar("b", 0.5, 0.4)
+        .hinge("A", ground([0.0, 0.0]), on("a", [0.0, 0.0]))
+        .hinge("B", on("a", [0.6, 0.0]), on("b", [0.0, 0.0]))
+        .spring("s", on("b", [0.5, 0.0]), ground([1.0, 0.0]), 8.0, 0.5)
+        .start("a", 0.3, 0.0)
+        .start("b", -0.3, 1.0)
+        .until(0.5, 0.25)
+        .build()
+        .expect("a scene")
+}

@@ -50,8 +50,9 @@ impl Step<'_> {
     }
 
     /// The motion at a time inside it \[s\], by the method's dense output, or a shorter step of fixed-step
-    /// methods and `ode_solvers`.
+    /// methods and `ode_solvers`.  Times outside count as the nearer end, NaN as the beginning.
     pub fn at(&mut self, time: f64) -> &Motion {
+        let time = if time.is_nan() { self.begin() } else { time };
         self.0.at(Time::from(time))
     }
 
