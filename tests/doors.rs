@@ -818,3 +818,34 @@ fn dangling() -> Scene {
         .build()
         .expect("a scene")
 }
+
+/// What a file is refused for is refused of a scene whose fields were changed, by the path of the field.
+#[test]
+fn scenes_changed_by_hand_are_refused_as_files_are() {
+    type Change = fn(&mut Scene);
+    let cases: [(&str, Change); 16] = [
+        ("bars[0]", |scene| scene.bars[0].length = -1.0),
+        ("start[1]", |scene| scene.start[1].phi = 1e300),
+        ("bars[1].name", |scene| scene.bars[1].name = "a".into()),
+        ("bars[0].name", |scene| scene.bars[0].name = String::new()),
+        ("bars[0].name", |scene| scene.bars[0].name = "ground".into()),
+        ("bars[1].name", |scene| scene.bars[1].name = "b.phi".into()),
+        ("springs[1].name", |scene| scene.springs.push(scene.springs[0].clone())),
+        ("hinges[1].name", |scene| scene.hinges[1].name = "A".into()),
+        ("name", |scene| scene.name = "../x".into()),
+        ("name", |scene| scene.name = "-x".into()),
+        ("until", |scene| scene.until = f64::NAN),
+        ("until", |scene| scene.until = 0.0),
+        ("until", |scene| scene.until = -1.0),
+        ("until", |scene| scene.every = f64::INFINITY),
+        ("until", |scene| scene.every = 0.0),
+        ("bars[0]", |scene| scene.bars[0].mass = 0.0),
+    ];
+    assert!(dangling().fault().is_none());
+    for (path, change) in cases {
+        let mut scene = dangling();
+        change(&mut scene);
+        let told = Simulation::new(&scene).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(told.contains(path), "{path}: {told}");
+    }
+}

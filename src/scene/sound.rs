@@ -3,6 +3,9 @@
 //! Scenes that were read are sound; this guards the equations against scenes whose fields were changed
 //! afterwards or filled in by a program.
 
+mod names;
+
+use super::format::WIDEST_ANGLE;
 use super::{Coupled, Friction, FrictionPlace, Law, Place, Scene};
 
 impl Scene {
@@ -17,6 +20,7 @@ impl Scene {
         }
         self.faulty_number()
             .or_else(|| self.faulty_body(bars))
+            .or_else(|| self.faulty_name())
             .or_else(|| self.faulty_law())
             .or_else(|| self.faulty_friction())
     }
@@ -89,6 +93,10 @@ impl Scene {
         if !finite(&self.gravity) {
             return Some("gravity: a number is not finite".into());
         }
+        let is_time = |time: f64| time > 0.0 && time.is_finite();
+        if !is_time(self.until) || !is_time(self.every) {
+            return Some("until, every: both must be positive and finite".into());
+        }
         let unit = |v: [f64; 2]| ((v[0] * v[0] + v[1] * v[1]).sqrt() - 1.0).abs() < 1e-6;
         let place = |place: &Place| finite(&place.point);
         let found = [
@@ -96,11 +104,16 @@ impl Scene {
                 "bars",
                 self.bars.iter().position(|bar| {
                     !finite(&[bar.length, bar.mass, bar.centre[0], bar.centre[1], bar.inertia])
+                        || bar.length < 0.0
                         || bar.mass <= 0.0
                         || bar.inertia < 0.0
                 }),
             ),
-            wrong("start", self.start.iter().position(|start| !finite(&[start.phi, start.omega]))),
+            wrong(
+                "start",
+                (self.start.iter())
+                    .position(|start| !finite(&[start.phi, start.omega]) || start.phi.abs() > WIDEST_ANGLE),
+            ),
             wrong("hinges", self.hinges.iter().position(|part| !part.between.iter().all(place))),
             wrong("welds", self.welds.iter().position(|part| !part.between.iter().all(place))),
             wrong(

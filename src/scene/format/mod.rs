@@ -92,7 +92,7 @@ const TINY: f64 = 1e-30;
 const HUGE: f64 = 1e30;
 
 /// Just below 2⁴³, where the last place of an angle grows beyond 1e-3 rad.
-const WIDEST_ANGLE: f64 = 8.796093e12;
+pub(super) const WIDEST_ANGLE: f64 = 8.796093e12;
 
 /// Longest name \[characters\].
 pub(super) const LONGEST_NAME: usize = 64;

@@ -308,7 +308,7 @@ impl At<'_> {
     }
 }
 
-fn is_name(text: &str) -> bool {
+pub(in crate::scene) fn is_name(text: &str) -> bool {
     (1..=LONGEST_NAME).contains(&text.len())
         && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
 }

@@ -26,6 +26,7 @@ use super::locate::{Located, Text, Texts};
 use super::set::{Override, put};
 use super::{Coupling, Drive, Motor, Scene};
 use crate::arithmetic::shown::plain;
+pub(super) use at::is_name;
 use laws::Either;
 use loads::AnyMotor;
 use names::{BarNames, named};
