@@ -747,3 +747,31 @@ fn corners_are_found_along_constraints() {
     let smooth = lower(&format!("-2*(c.phi - {angle:?})*abs(c.phi - {angle:?})"));
     assert!(!smooth.is_on_corner && (smooth.modes[0].frequency - slowest).abs() < 1e-6, "{smooth:?}");
 }
+
+/// A weak torsion spring leaves equilibria over several turns: m g c cos a + k (a - a0) = 0 has all of them where
+/// |a - a0| <= m g c / k, about two turns to either side.
+#[test]
+fn equilibria_are_found_over_several_turns() {
+    let [mass, centre, stiffness, free] = [2.0, 0.5, 0.9, -0.4];
+    for own in [0.2, 0.2 + TAU] {
+        let scene = parsed(&format!(
+            r#"{{"name": "coil", "gravity": [0, -9.81],
+                "bars": [{{"name": "b", "mass": {mass}, "centre": [{centre}, 0], "inertia": 0.1, "length": 1}}],
+                "hinges": [{{"name": "O", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+                "torsion_springs": [{{"name": "s", "body": "b", "stiffness": {stiffness}, "free_angle": {free}}}],
+                "start": {{"b": {{"phi": {own}, "omega": 0}}}}, "until": 1, "every": 0.1}}"#
+        ));
+        let torque = |a: f64| mass * 9.81 * centre * f64::cos(a) + stiffness * (a - free);
+        let places = (-13_000..13_000).map(|i| [1e-3 * f64::from(i), 1e-3 * f64::from(i + 1)]);
+        let roots: Vec<f64> =
+            places.filter(|[a, b]| torque(*a) * torque(*b) < 0.0).map(|[a, b]| 0.5 * (a + b)).collect();
+        assert_eq!(roots.len(), 7, "{roots:?}");
+        let mut found = found(&scene, 64).equilibria;
+        found.sort_by(|a, b| a.phi[0].total_cmp(&b.phi[0]));
+        assert_eq!(found.len(), roots.len(), "{found:?}");
+        for (k, (one, root)) in found.iter().zip(&roots).enumerate() {
+            assert!((one.phi[0] - root).abs() < 1e-3 && torque(one.phi[0]).abs() < 1e-11, "{one:?} {root}");
+            assert_eq!(one.stability == Stability::Stable, k % 2 == 0, "{one:?}");
+        }
+    }
+}

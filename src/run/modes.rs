@@ -28,6 +28,7 @@ use crate::arithmetic::Scalar;
 use crate::dynamics::{Mechanism, Time};
 use crate::scene::{Law, Scene};
 use serde::Serialize;
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// What the constraints may be off by, in their own size.
@@ -40,6 +41,10 @@ const RELAXED: usize = 8;
 const BRANCHES: usize = 8;
 /// Positions at least from which it is known how large accelerations are.
 const FEWEST: usize = 16;
+/// Whole turns to either side of the scene's start over which starts are wound, and the share of their range
+/// by which one follows the other.
+const WOUND: f64 = 2.0;
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
 /// Longest step \[rad, or units of length\].
 const LONGEST: f64 = 0.5;
 /// What is left of the accelerations over the largest there are counts as none.
@@ -192,6 +197,30 @@ fn moving(mechanism: &Mechanism) -> Option<&str> {
     mechanism.constraints.iter().find(|row| row.law.as_ref().is_some_and(moves)).map(|row| row.name())
 }
 
+/// The starts once more, with whole turns of the bodies that torsion springs turn and no constraint holds, up
+/// to so many to either side of the scene's start.
+fn wound(mechanism: &Mechanism, first: &[f64], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let is_held = |body: usize| mechanism.constraints.iter().any(|row| row.coordinates().contains(&body));
+    let springs = mechanism.torsions.iter().filter(|spring| spring.stiffness != 0.0);
+    let mut bodies: Vec<usize> = springs.map(|spring| spring.body).filter(|&body| !is_held(body)).collect();
+    bodies.sort_unstable();
+    bodies.dedup();
+    if bodies.is_empty() {
+        return Vec::new();
+    }
+    let turned = |(number, phi): (usize, &[f64])| {
+        let mut phi = phi.to_vec();
+        for (place, &body) in bodies.iter().enumerate() {
+            // Evenly spread, for each body otherwise.
+            let share = ((number + 1) as f64 * (place + 1) as f64 * GOLDEN).fract();
+            let turns = (share * (2.0 * WOUND + 1.0)).floor() - WOUND;
+            phi[body] += TAU * (((first[body] - phi[body]) / TAU).round() + turns);
+        }
+        phi
+    };
+    std::iter::once(first).chain(others.iter().map(Vec::as_slice)).enumerate().map(turned).collect()
+}
+
 /// Looks for equilibria from the start of a scene and from `starts` other positions of a fixed set.
 ///
 /// # Errors
@@ -223,7 +252,9 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     let slid = search.relaxed(&first).unwrap_or_else(|| first.clone());
     let others_slid: Vec<Vec<f64>> =
         others.iter().take(RELAXED).filter_map(|phi| search.relaxed(phi)).collect();
-    for (k, phi) in [&slid, &first].into_iter().chain(&others_slid).chain(&others).enumerate() {
+    let turned = wound(mechanism, &first, &others);
+    let all = [&slid, &first].into_iter().chain(&others_slid).chain(&others).chain(&turned);
+    for (k, phi) in all.enumerate() {
         count[0] += 1;
         let Some((phi, branch)) = search.settle_on_branches(phi) else { continue };
         count[1] += 1;
