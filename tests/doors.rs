@@ -849,3 +849,33 @@ fn scenes_changed_by_hand_are_refused_as_files_are() {
         assert!(told.contains(path), "{path}: {told}");
     }
 }
+
+/// Names of motors, locks, sliders and rigid springs are those of their constraints, of which there are no two.
+#[test]
+fn no_two_constraints_have_one_name() {
+    let guided = || {
+        SceneBuilder::new("guided")
+            .bar("a", 0.6, 0.5)
+            .slider("S", on("a", [0.0, 0.0]), ground([0.0, 0.0]), [1.0, 0.0])
+            .motor("m", "a", 0.0, 1.0)
+            .until(1.0, 0.1)
+    };
+    let scene = guided().build().expect("a scene");
+    let changes: [fn(&mut Scene); 2] =
+        [|scene| scene.motors[0].name = "S".into(), |scene| scene.sliders[0].name = "m".into()];
+    for change in changes {
+        let mut scene = scene.clone();
+        change(&mut scene);
+        let told = Simulation::new(&scene).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(told.contains("motors[0].name"), "{told}");
+    }
+    let law = serde_json::json!({"start": 0.0, "rate": 0.3});
+    for part in ["motors", "locks"] {
+        let part_named = match part {
+            "motors" => serde_json::json!({"name": "S", "slider": "S", "law": law}),
+            _ => serde_json::json!({"name": "m", "body": "a", "angle": 0.0}),
+        };
+        let refused = guided().part(part, part_named).build().expect_err("a name that is taken").to_string();
+        assert!(refused.contains("the name of another constraint"), "{refused}");
+    }
+}

@@ -206,7 +206,7 @@ pub struct Hinge<C = f64> {
 /// A point that slides along a line of the ground or of another body.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Slider<C = f64> {
-    /// Name, unique among sliders; it also names the constraints.
+    /// Name, unique among sliders, motors, locks and rigid springs, whose constraints bear it.
     pub name: String,
     /// The point that slides; on another body than the rail.
     pub point: Place<C>,
@@ -237,7 +237,7 @@ pub struct Weld<C = f64> {
 /// An angle that stays as it is.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Lock<C = f64> {
-    /// Name, unique among locks; it also names the constraint.
+    /// Name, unique among locks, motors, sliders and rigid springs, whose constraints bear it.
     pub name: String,
     /// The bar.
     pub bar: usize,
@@ -316,7 +316,7 @@ pub struct Torque<C = f64> {
 /// A prescribed travel of a slider.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Drive<C = f64> {
-    /// Name, unique among motors; it also names the constraint.
+    /// Name, unique among motors, sliders, locks and rigid springs, whose constraints bear it.
     pub name: String,
     /// Index of the slider.
     pub slider: usize,
@@ -327,7 +327,7 @@ pub struct Drive<C = f64> {
 /// An angle or a travel prescribed by where the mechanism is: a gear, a cam.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Coupling {
-    /// Name, unique among motors; it also names the constraint.
+    /// Name, unique among motors, sliders, locks and rigid springs, whose constraints bear it.
     pub name: String,
     /// What is prescribed.
     pub coupled: Coupled,
@@ -352,7 +352,7 @@ pub enum Coupled {
 /// A prescribed angle.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Motor<C = f64> {
-    /// Name, unique among motors; it also names the constraint.
+    /// Name, unique among motors, sliders, locks and rigid springs, whose constraints bear it.
     pub name: String,
     /// The driven bar.
     pub bar: usize,

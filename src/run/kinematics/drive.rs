@@ -116,7 +116,7 @@ pub(super) struct DrivenScene {
     pub start: f64,
     /// Its row.
     pub row: usize,
-    /// Name of its row, which is that of the motor.
+    /// Name of the motor; of one that is made, what was named.
     pub name: String,
     /// What moves: the motor, or the body or slider that was named.
     pub label: String,
@@ -149,8 +149,8 @@ enum Slot {
 
 impl DrivenScene {
     /// The scene with the law of its drive at a constant rate.
-    pub fn new(scene: &Scene, drive: &KinematicDrive) -> Result<Self, KinematicsError> {
-        let mut scene = scene.clone();
+    pub fn new(given: &Scene, drive: &KinematicDrive) -> Result<Self, KinematicsError> {
+        let mut scene = given.clone();
         let (slot, start, own_rate) = find(&mut scene, drive)?;
         // A motor that stands at the start has no rate of its own.
         let own_rate = if own_rate != 0.0 && own_rate.is_finite() { own_rate } else { 1.0 };
@@ -176,7 +176,11 @@ impl DrivenScene {
         if let Some(&value) = range.iter().find(|value| unit == "rad" && (*value - start).abs() > FARTHEST) {
             return Err(KinematicsError::Far { name: label, value, start });
         }
-        let mechanism = Arc::new(compile(&scene, [&label, &name])?);
+        // A motor made for the drive has no name of its own.
+        let mut known =
+            given.motors.iter().map(|motor| &motor.name).chain(given.drives.iter().map(|slide| &slide.name));
+        let motor = if known.any(|known| *known == name) { name.clone() } else { label.clone() };
+        let mechanism = Arc::new(compile(&scene, [&label, &motor])?);
         let left = mechanism.assembly.degrees_of_freedom;
         if left > 0 {
             return Err(KinematicsError::Free { name: label, left });
@@ -189,7 +193,7 @@ impl DrivenScene {
                 .position(|row| row.name() == name && row.law.is_some() && !row.is_angle())
                 .unwrap_or_default(),
         };
-        Ok(Self { scene, mechanism, start, row, label, name, unit, rate, range, is_turn })
+        Ok(Self { scene, mechanism, start, row, label, name: motor, unit, rate, range, is_turn })
     }
 }
 
@@ -207,6 +211,18 @@ fn freed(scene: &mut Scene, name: String) -> String {
         return scene.motors.remove(0).name;
     }
     if scene.drives.is_empty() { name } else { scene.drives.remove(0).name }
+}
+
+/// A name for a motor on a slider, whose own name is that of its rail's constraint.
+fn unused(scene: &Scene, slider: String) -> String {
+    let is_free = |name: &String| {
+        let mut names = (scene.sliders.iter().map(|part| &part.name))
+            .chain(scene.locks.iter().map(|part| &part.name))
+            .chain(scene.springs.iter().map(|part| &part.name))
+            .chain(scene.couplings.iter().map(|part| &part.name));
+        names.all(|other| other != name)
+    };
+    (1..).map(|k| format!("drive{k}")).find(is_free).unwrap_or(slider)
 }
 
 /// The start as the scene's own motors have it, all of whose angles the scene then gives, and no rates.
@@ -260,7 +276,8 @@ fn find(scene: &mut Scene, drive: &KinematicDrive) -> Result<(Slot, f64, f64), K
         let start = travel(scene, &mechanism, &motion, slider);
         let k = scene.drives.iter().position(|slide| slide.slider == slider).unwrap_or_else(|| {
             let law = Law { rate: 1.0, ..Law::default() };
-            let slide = scene::Drive { name: freed(scene, name), slider, law };
+            let made = unused(scene, name);
+            let slide = scene::Drive { name: freed(scene, made), slider, law };
             scene.drives.insert(0, slide);
             0
         });

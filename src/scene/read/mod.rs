@@ -29,7 +29,7 @@ use crate::arithmetic::shown::plain;
 pub(super) use at::is_name;
 use laws::Either;
 use loads::AnyMotor;
-use names::{BarNames, named};
+use names::{BarNames, check_constraint_names, named};
 use resolve::{FormulaConstants, Resolved};
 use std::io::Read;
 use std::path::Path;
@@ -153,6 +153,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let (motors, motor_places, drives, couplings) = sorted(any);
     let (walls, wall_places) =
         named(&fields, "walls", |fields, name| joints::wall(fields, name, &known, &constants))?;
+    check_constraint_names(&fields)?;
     let given = start::starts(&fields, &known)?;
     let [until, every] = times(&fields)?;
     let scene = Scene {

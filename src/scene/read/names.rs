@@ -39,6 +39,29 @@ pub(super) fn named<'a, T>(
     Ok((read, places))
 }
 
+/// Refuses a motor, a lock, a slider or a rigid spring of the name of another one: their names are those of
+/// their constraints as well.
+pub(super) fn check_constraint_names(scene: &Fields) -> Result<(), SceneError> {
+    let mut known: HashMap<&str, String> = HashMap::new();
+    for list in ["sliders", "locks", "springs", "motors"] {
+        let parts = scene.optional(list).map_or(Ok(Vec::new()), |at| at.items(list, scene.table))?;
+        for part in parts {
+            let model = part.node.at("model").map(|model| &model.value);
+            let is_rigid = matches!(model, Some(Value::Text(model)) if model == "rigid");
+            let Some(node) = part.node.at("name").filter(|_| list != "springs" || is_rigid) else {
+                continue;
+            };
+            let Value::Text(name) = &node.value else { continue };
+            let at = At { source: part.source, node, path: format!("{}.name", part.path) };
+            if let Some(first) = known.insert(name, at.path.clone()) {
+                let allowed = format!("must not be the name of another constraint; {first} is the same");
+                return Err(at.refuse_value(&allowed, "rename one of the two"));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// Names of one kind, each with the path of its owner.
 #[derive(Default)]
 struct UniqueNames(HashMap<String, String>);

@@ -28,18 +28,7 @@ impl Scene {
             .or_else(|| among(vec![("events", self.events.iter().map(|part| &*part.name).collect())]))
             .or_else(|| among(vec![("points", self.points.iter().map(|part| &*part.name).collect())]))
             .or_else(|| self.loads().into_iter().find_map(among))
-            .or_else(|| among(vec![("sliders", self.sliders.iter().map(|part| &*part.name).collect())]))
-            .or_else(|| among(vec![("locks", self.locks.iter().map(|part| &*part.name).collect())]))
-            .or_else(|| among(self.motor_names()))
-    }
-
-    /// Names of motors of all kinds.
-    fn motor_names(&self) -> Vec<NamedList<'_>> {
-        vec![
-            ("motors", self.motors.iter().map(|part| &*part.name).collect()),
-            ("drives", self.drives.iter().map(|part| &*part.name).collect()),
-            ("couplings", self.couplings.iter().map(|part| &*part.name).collect()),
-        ]
+            .or_else(|| among(self.constraint_names()))
     }
 
     /// Names of what acts with a force or a torque, kind by kind, by numbers and by formulas.
@@ -66,6 +55,19 @@ impl Scene {
                 laws(|load| matches!(load, Load::Torque { .. })),
             ],
             vec![laws(|load| matches!(load, Load::Potential { .. }))],
+        ]
+    }
+
+    /// Names that are those of constraints as well.
+    fn constraint_names(&self) -> Vec<NamedList<'_>> {
+        let rods = self.springs.iter().filter(|spring| spring.rigid);
+        vec![
+            ("sliders", self.sliders.iter().map(|part| &*part.name).collect()),
+            ("locks", self.locks.iter().map(|part| &*part.name).collect()),
+            ("rigid springs", rods.map(|part| &*part.name).collect()),
+            ("motors", self.motors.iter().map(|part| &*part.name).collect()),
+            ("drives", self.drives.iter().map(|part| &*part.name).collect()),
+            ("couplings", self.couplings.iter().map(|part| &*part.name).collect()),
         ]
     }
 }

@@ -77,7 +77,7 @@ pub(in crate::scene) static SLIDER: KeyTable = KeyTable {
             "name",
             FieldShape::Name,
             "\"slider\"",
-            "Name, unique among sliders; it also names the constraints.",
+            "Name, unique among sliders, motors, locks and rigid springs, whose constraints bear it.",
         ),
         required(
             "point",
@@ -153,7 +153,7 @@ pub(in crate::scene) static LOCK: KeyTable = KeyTable {
             "name",
             FieldShape::Name,
             "\"lock\"",
-            "Name, unique among locks; it also names the constraint.",
+            "Name, unique among locks, motors, sliders and rigid springs, whose constraints bear it.",
         ),
         required("body", FieldShape::Body { ground: false }, "\"bar1\"", "The bar."),
         optional("relative_to", FieldShape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),

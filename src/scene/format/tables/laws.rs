@@ -11,7 +11,7 @@ pub(in crate::scene) static MOTOR: KeyTable = KeyTable {
             "name",
             FieldShape::Name,
             "\"motor\"",
-            "Name, unique among motors; it also names the constraint.",
+            "Name, unique among motors, sliders, locks and rigid springs, whose constraints bear it.",
         ),
         required("body", FieldShape::Body { ground: false }, "\"bar1\"", "The driven bar."),
         optional("relative_to", FieldShape::Body { ground: true }, "\"bar2\"", MEASURED_FROM),
@@ -33,7 +33,7 @@ pub(in crate::scene) static DRIVE: KeyTable = KeyTable {
             "name",
             FieldShape::Name,
             "\"motor\"",
-            "Name, unique among motors; it also names the constraint.",
+            "Name, unique among motors, sliders, locks and rigid springs, whose constraints bear it.",
         ),
         required("slider", FieldShape::SliderName, "\"slider\"", "The driven slider."),
         required(
