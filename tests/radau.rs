@@ -210,6 +210,23 @@ fn looking_more_often_changes_nothing_of_the_motion() {
     }
 }
 
+/// A pendulum's velocity has no direction where it turns round: no constraint and no stabilizer is to blame.
+#[test]
+fn a_formula_without_a_derivative_is_told_of() {
+    let text = r#"{"name": "turns", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "H", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+        "points": [{"name": "P", "body": "a", "point": [0.5, 0]}], "integrals": {"I": "atan2(P.vy, P.vx)"},
+        "start": {"a": {"phi": -0.5, "omega": 0.3}}, "until": 1, "every": 1}"#;
+    let scene = driftless::scene::parse_scene(text, "turns", &[]).expect("a scene");
+    let stops: Vec<_> = RADAU.iter().filter_map(|&method| run(&scene, &request(method, 1e-9)).stop).collect();
+    assert!(!stops.is_empty());
+    for stop in stops {
+        assert_eq!(stop.cause, Cause::NotFinite, "{stop}");
+        assert!(stop.what.contains("a derivative") && stop.hint.contains("atan2"), "{stop}");
+    }
+}
+
 #[test]
 fn what_is_not_finite_ends_in_a_typed_stop() {
     // The spring passes through length zero, where its force has no direction.

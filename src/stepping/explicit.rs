@@ -367,7 +367,7 @@ impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
                 statistics.rejected += 1;
                 if cuts > MOST_CUTS || h < super::finest(state, field.time_unit()) {
                     let what = format!("{} is not finite", self.culprit(field, n));
-                    let hint = "look for a spring of length zero or a position without inertia";
+                    let hint = super::NOT_FINITE;
                     return Err(Self::stop(Cause::NotFinite, state, h, what, hint));
                 }
                 (wanted, is_rejected) = (0.1 * h, true);

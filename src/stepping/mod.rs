@@ -403,6 +403,10 @@ fn finest(state: &State, time_unit: f64) -> f64 {
     1e-14 * state.time.hi.abs().max(1e-3 * time_unit)
 }
 
+/// What to do about a stop where something is not finite.
+pub(crate) const NOT_FINITE: &str = "look for a spring of length zero, a position without inertia, or a \
+    formula without a value or a derivative here, as atan2(0, 0)";
+
 /// The stop of a step \[s\] in which a point came to rest on its wall.
 fn at_rest(method: &str, state: &State, step: f64) -> StepError {
     StepError {
@@ -411,7 +415,10 @@ fn at_rest(method: &str, state: &State, step: f64) -> StepError {
         t: state.time.hi,
         step,
         what: "a point has come to rest on a wall".into(),
-        hint: "raise the restitution of the wall, or change what presses the point against it".into(),
+        hint:
+            "raise the restitution of the wall, or change what presses the point against it; a wall must not \
+               move on to where the point cannot go"
+                .into(),
     }
 }
 

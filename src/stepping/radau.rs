@@ -244,15 +244,15 @@ impl Radau {
         }
     }
 
-    /// The component that asks most of the step.
+    /// The component that asks most of the step, or the derivatives that are to solve for it.
     fn culprit<F: OdeSystem + ?Sized>(&self, field: &F) -> String {
-        let share = |k: usize| {
-            let share = (self.work.error[k] / self.work.scale[k]).abs();
-            if share.is_nan() { f64::INFINITY } else { share }
-        };
-        (0..self.work.scale.len())
-            .max_by(|&a, &b| share(a).total_cmp(&share(b)))
-            .map_or_else(String::new, |k| field.label(k))
+        let RadauScratch { error, scale, jacobian, .. } = &self.work;
+        if jacobian.iter().any(|slope| !slope.is_finite()) {
+            return "a derivative of the accelerations".into();
+        }
+        let share = |k: usize| (error[k] / scale[k]).abs();
+        let most = (0..scale.len()).max_by(|&a, &b| share(a).total_cmp(&share(b)));
+        most.map_or_else(String::new, |k| field.label(k))
     }
 
     fn resize(&mut self, d: usize) {
@@ -317,7 +317,12 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
         loop {
             let (h, whole) = super::reach(control.wanted, left);
             statistics.check(self.id(), state.time.hi, h)?;
-            if h < super::finest(state, field.time_unit()) && !whole {
+            let is_finest = h < super::finest(state, field.time_unit()) && !whole;
+            if cuts > MOST_CUTS || is_finest && cuts > 0 {
+                let what = format!("{} is not finite", self.culprit(field));
+                return Err(self.stop(Cause::NotFinite, state, h, what, super::NOT_FINITE));
+            }
+            if is_finest {
                 let what = format!("{} asks for ever smaller steps", self.culprit(field));
                 let hint = "loosen the tolerance: forces of stiff springs have a rounding of their own";
                 return Err(self.stop(Cause::StepTooSmall, state, h, what, hint));
@@ -357,11 +362,6 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
             if !error.is_finite() {
                 cuts += 1;
                 statistics.rejected += 1;
-                if cuts > MOST_CUTS {
-                    let what = format!("{} is not finite", self.culprit(field));
-                    let hint = "look for a spring of length zero or a position without inertia";
-                    return Err(self.stop(Cause::NotFinite, state, h, what, hint));
-                }
                 (self.is_hard, control.wanted, control.keeps) = (true, 0.1 * h, 0.0);
                 continue;
             }

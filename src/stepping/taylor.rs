@@ -178,7 +178,7 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
         self.by_series = quick.is_none();
         let (wanted, mut h) = quick.unwrap_or_else(|| self.expand(problem, state, left.hi));
-        let hint = "look for a spring of length zero or a position without inertia";
+        let hint = super::NOT_FINITE;
         if wanted.is_nan() {
             let lost = problem.label(problem.angles() + self.expansion.as_ref().map_or(0, Expansion::lost));
             return Err(stop(

@@ -191,7 +191,7 @@ fn part<F: OdeSystem + ?Sized>(
     field.rhs(state.time, &state.y, &mut rate);
     statistics.evaluations += 1;
     if let Some(i) = rate.iter().position(|rate| !rate.is_finite()) {
-        let hint = "look for a spring of length zero or a position without inertia";
+        let hint = super::NOT_FINITE;
         return Err(stop(
             Cause::NotFinite,
             state.time.hi,

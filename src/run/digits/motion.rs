@@ -327,7 +327,7 @@ impl<const W: usize> DigitsMotion<W> {
         let step = confirmed(self, wanted);
         let seconds = self.state.t.value();
         if step.is_nan() {
-            let hint = "look for a spring of length zero or a position without inertia";
+            let hint = crate::stepping::NOT_FINITE;
             return Err(self.stop(Cause::NotFinite, 0.0, "the series is not finite", hint));
         }
         if step < self.finest() * seconds.abs().max(1e-3 * self.mechanism.structure.units.time) {
