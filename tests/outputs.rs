@@ -859,3 +859,82 @@ fn conditions_of_conditions_take_what_sticks_as_at_rest() {
         assert!((nested - (1.0 - slides + way)).abs() < 1e-9, "{method:?}: {nested} {slides} {way}");
     }
 }
+
+/// A slider-crank whose links are both 0.3 m long, turned by a motor from 0.3 rad at 5 rad/s.
+pub const EQUAL_SLIDER_CRANK: &str = r#"{"name": "s", "gravity": [0, -9.81], "bars": [
+    {"name": "a", "mass": 1, "centre": [0.15, 0], "inertia": 0.01, "length": 0.3},
+    {"name": "b", "mass": 1, "centre": [0.15, 0], "inertia": 0.01, "length": 0.3},
+    {"name": "p", "mass": 2, "centre": [0, 0], "inertia": 0.01}], "hinges": [
+    {"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+    {"name": "A", "between": [{"body": "a", "point": [0.3, 0]}, {"body": "b", "point": [0, 0]}]},
+    {"name": "B", "between": [{"body": "b", "point": [0.3, 0]}, {"body": "p", "point": [0, 0]}]}],
+    "sliders": [{"name": "s", "point": {"body": "p", "point": [0, 0]}, "angle": "locked",
+        "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+    "motors": [{"name": "M", "body": "a", "law": {"start": 0.3, "rate": 5.0}}],
+    "outputs": {"T": "M.torque", "S": "s.force", "FB": "B.force", "x": "p.x"},
+    "start": {"a": {"phi": 0.3}, "b": {"phi": -0.3}, "p": {"phi": 0}}, "until": 1, "every": 0.01}"#;
+
+/// Statics of an equal slider-crank, which passes its singular position at a quarter and at three quarters of
+/// a turn: forces there are the limits along the motion, whatever the method's last digits are.
+#[test]
+fn forces_at_singular_positions_are_limits_along_the_motion() {
+    let (g, rate, length) = (9.81, 5.0_f64, 0.3);
+    let forces = |t: f64| {
+        let (sin, cos) = (0.3 + rate * t).sin_cos();
+        let along = -4.0 * length * rate.powi(2);
+        let moment = 0.15 * (g - rate.powi(2) * 0.15 * sin) - 0.15 * sin * 0.45 * rate.powi(2);
+        let across = -(moment + length * sin * along) / length;
+        [(2.0 * g - across).abs(), (along * cos).hypot(across)]
+    };
+    let steps = 100_000;
+    let rows: Vec<[f64; 2]> = (0..=steps).map(|i| forces(f64::from(i) / f64::from(steps))).collect();
+    let scene = parse_scene(EQUAL_SLIDER_CRANK, "scene", &[]).expect("a scene");
+    for (method, rtol) in [(MethodId::Taylor, 1e-9), (MethodId::Radau(5), 1e-9), (MethodId::Dp8, 1e-11)] {
+        let outcome = run(&scene, &adaptive(method, rtol));
+        for (k, name) in ["S", "FB"].into_iter().enumerate() {
+            let told = found(&outcome.extremes, name);
+            let values = || rows.iter().map(|row| row[k]);
+            let mean = values().sum::<f64>() / f64::from(steps);
+            for (value, expected) in [
+                (told.min[0], values().fold(f64::INFINITY, f64::min)),
+                (told.max[0], values().fold(0.0, f64::max)),
+                (told.mean, mean - 0.5 * (rows[0][k] + rows[steps as usize][k]) / f64::from(steps)),
+            ] {
+                // The least magnitude is a zero between two of the times.
+                assert!((value - expected).abs() < 4e-4, "{method:?} {name}: {value} for {expected}");
+            }
+        }
+        let nearest = outcome.drift.singular.as_ref().expect("a singular position");
+        let t = (nearest.t - (0.5 * PI - 0.3) / rate).abs().min((nearest.t - (1.5 * PI - 0.3) / rate).abs());
+        assert!(nearest.smallest < 1e-9 && t < 1e-6, "{nearest:?}");
+    }
+}
+
+/// A parallelogram's torque is 5.886 cos θ; the forces in its hinges are without bound where it folds, and a
+/// row there does not tell them.
+#[test]
+fn forces_without_bound_at_singular_positions_are_told() {
+    let text = r#"{"name": "p", "gravity": [0, -9.81], "bars": [
+        {"name": "a", "mass": 1, "centre": [0.1, 0], "inertia": 0.004, "length": 0.2},
+        {"name": "b", "mass": 2, "centre": [0.25, 0.1], "inertia": 0.05, "length": 0.5},
+        {"name": "c", "mass": 1, "centre": [0.1, 0], "inertia": 0.004, "length": 0.2}], "hinges": [
+        {"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]},
+        {"name": "A", "between": [{"body": "a", "point": [0.2, 0]}, {"body": "b", "point": [0, 0]}]},
+        {"name": "B", "between": [{"body": "b", "point": [0.5, 0]}, {"body": "c", "point": [0.2, 0]}]},
+        {"name": "C", "between": [{"body": "ground", "point": [0.5, 0]}, {"body": "c", "point": [0, 0]}]}],
+        "motors": [{"name": "M", "body": "a", "law": {"start": 0.3, "rate": 5.0}}],
+        "outputs": {"T": "M.torque", "FB": "B.force", "x": "b.x"},
+        "start": {"a": {"phi": 0.3}, "b": {"phi": 0}, "c": {"phi": 0.3}}, "until": 1, "every": 0.01}"#;
+    let mut scene = parse_scene(text, "scene", &[]).expect("a scene");
+    let fold = (PI - 0.3) / 5.0;
+    for until in [1.0, fold] {
+        (scene.until, scene.every) = (until, until);
+        let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-9));
+        let [torque, force] = ["T", "FB"].map(|name| found(&outcome.extremes, name));
+        assert!((torque.min[0] + 5.886).abs() < 1e-6 && (torque.min[1] - fold).abs() < 1e-6, "{torque:?}");
+        assert!(force.max[0] == f64::INFINITY && (force.max[1] - fold).abs() < 1e-6, "{force:?}");
+        assert!(force.mean == f64::INFINITY && force.rms == f64::INFINITY && force.min[0] > 0.0, "{force:?}");
+        let is_known = outcome.last.outputs.iter().map(|value| value.is_finite()).collect::<Vec<_>>();
+        assert_eq!(is_known, [until == 1.0, until == 1.0, true]);
+    }
+}

@@ -247,6 +247,18 @@ fn inspect_gives_the_published_accelerations() {
     }
 }
 
+/// The kite folds at half a turn of its crank: no state tells forces there.
+#[test]
+fn inspect_tells_no_forces_at_a_singular_position() {
+    let program = Program::with_scenes(&["kite"]);
+    let asked = "inspect kite.json --output F=B.force --output x=crank.x";
+    let at = |t: &str| program.run(&format!("{asked} --at {t} --json")).exits(0).object();
+    let (fold, beside) = (at("0.220568"), at("0.21"));
+    assert!(fold["outputs"]["F"]["value"].is_null() && fold["outputs"]["x"]["value"].is_number());
+    assert_eq!(fold["hinges"]["A"]["determinate"], false);
+    assert!(beside["outputs"]["F"]["value"].is_number() && beside["bodies"]["crank"]["phi"].is_number());
+}
+
 #[test]
 fn inspect_gives_multiplier_torque_power_and_hinge_forces() {
     let program = Program::with_scenes(&["motor", "free"]);

@@ -2,6 +2,7 @@
 //! of Lyapunov spectra.
 
 use crate::mechanisms::{Dice, scene as random_scene};
+use crate::outputs::EQUAL_SLIDER_CRANK;
 use driftless::dynamics::{Mechanism, Time};
 use driftless::run::reference;
 use driftless::scene::Output;
@@ -879,6 +880,15 @@ fn extremes_at_an_event_move_with_it() {
         (k * angle, [angle, k * te * (2.0 - te / 2.0)]),
     ];
     assert_measures(&found, &expected, 1e-9);
+}
+
+/// The slider's largest force is the limit at a singular position, the least one of hinge B is elsewhere.
+#[test]
+fn extremes_of_forces_at_singular_positions_are_refused_as_such() {
+    let found = derived(&template(EQUAL_SLIDER_CRANK), &["max:S", "min:FB"], &["bars.p.mass"], 1.0);
+    let [force, other] = &found.measures[..] else { panic!("two measures") };
+    assert!(force.why.as_ref().is_some_and(|why| why.contains("singular position")), "{:?}", force.why);
+    assert!(other.why.is_none() && (other.slopes[0] - 14.9639).abs() < 1e-3, "{other:?}");
 }
 
 /// A torque that changes its sign at p0, from a to -a: outputs of the same signal jump there.  Up to then J w²/2 = a phi,

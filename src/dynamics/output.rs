@@ -38,6 +38,8 @@ pub(crate) struct Outputs {
     needs_accelerations: bool,
     /// True where any acceleration or joint force is.
     needs_equations: bool,
+    /// Those that are made of such.
+    follows_equations: Vec<bool>,
 }
 
 /// What the outputs of one moment share, and room for it.
@@ -126,14 +128,42 @@ impl Outputs {
             |source: &Source<Site>| matches!(source, Source::Carried(Quantity::AngularAcceleration(_)));
         let needs_forces = !sources.clone().all(is_state);
         let needs_accelerations = sources.clone().any(is_acceleration);
-        let needs_equations = needs_forces || needs_accelerations || sources.clone().any(is_turning);
+        let follows =
+            |source: &Source<Site>| !is_state(source) || is_acceleration(source) || is_turning(source);
+        let needs_equations = sources.clone().any(follows);
+        let do_signals = signals.iter().flat_map(|signal| &signal.sources).any(follows);
+        let is_signal = |source: &Source<Site>| matches!(source, Source::State(Meaning::Signal(_)));
+        let follows_equations = list
+            .iter()
+            .map(|output| &output.expression.sources)
+            .map(|sources| sources.iter().any(|one| follows(one) || do_signals && is_signal(one)))
+            .collect();
         let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
-        Ok(Some(Self { list, signals, parameters, needs_forces, needs_accelerations, needs_equations }))
+        Ok(Some(Self {
+            list,
+            signals,
+            parameters,
+            needs_forces,
+            needs_accelerations,
+            needs_equations,
+            follows_equations,
+        }))
     }
 
     /// False where places and rates are all that the outputs are made of.
     pub fn needs_equations(&self) -> bool {
         self.needs_equations
+    }
+
+    /// Which of them are made of accelerations or of forces in joints.
+    pub fn follows_equations(&self) -> &[bool] {
+        &self.follows_equations
+    }
+
+    /// Makes those that the state does not tell at a singular position not a number.
+    pub fn withhold(&self, values: &mut [f64]) {
+        let pairs = values.iter_mut().zip(&self.follows_equations);
+        pairs.filter(|(_, follows)| **follows).for_each(|(value, _)| *value = f64::NAN);
     }
 
     /// Names and units, in order.

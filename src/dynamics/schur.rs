@@ -15,7 +15,7 @@
 
 use super::Mechanism;
 use super::constraint::{ConstraintEquation, RowMeasure};
-use super::kernel::dot;
+use super::kernel::{Kernel, dot};
 use super::rank::Metric;
 use super::tree::{self, Tree, size};
 use crate::arithmetic::Real;
@@ -24,6 +24,10 @@ use crate::arithmetic::Real;
 pub const DROPPED: f64 = f64::DROPPED;
 /// Share below which a position counts as near a singular one.
 pub const NEAR: f64 = 1e-2;
+
+/// Share below which forces and accelerations are those of a singular position: rounding, or of rows that are
+/// left out.
+pub const SINGULAR: f64 = 1e-7;
 
 /// The row whose pivot is the smallest share of its scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -108,6 +112,19 @@ impl ConstraintEquation {
 }
 
 impl Mechanism {
+    /// The share of the weakest constraint after an evaluation; infinite where points rest or places stick:
+    /// with these, constraints may depend on each other without a singular position.
+    pub fn standing_share(&self, kernel: &Kernel<f64>) -> f64 {
+        let is_standing = self.standing_rows() == self.constraints.len();
+        if is_standing { kernel.weakest.share } else { f64::INFINITY }
+    }
+
+    /// True after an evaluation at a singular position of the way: what constraints exert there is the limit
+    /// along the motion, which the state alone does not tell.
+    pub fn hides_forces(&self, kernel: &Kernel<f64>) -> bool {
+        !self.leaves_forces_open() && self.standing_share(kernel) < SINGULAR
+    }
+
     /// The scale of every row, see [`ConstraintEquation::scale`].
     pub fn row_scales(&self) -> Vec<f64> {
         self.constraints.iter().map(|row| row.scale(&self.tree)).collect()

@@ -58,6 +58,9 @@ pub struct Inspection {
     pub frictions: Vec<(String, &'static str, bool, [f64; 2])>,
     /// Name, unit and value of each of the scene's outputs.
     pub outputs: Vec<(String, String, f64)>,
+    /// True at a singular position: the state does not tell accelerations and what constraints exert, which
+    /// are not a number.
+    pub is_singular: bool,
 }
 
 /// What a hinge carries.
@@ -138,12 +141,21 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
     let mut kernel = Kernel::<f64>::new(mechanism);
     kernel.accelerations(mechanism, start.time, &phi, &omega, Bias::default());
     let (t, energy_scale) = (start.time.hi, mechanism.energy_scale);
-    let mut found = Inspection { t, energy_scale, ..Inspection::default() };
+    let is_singular = mechanism.hides_forces(&kernel);
+    let mut found = Inspection { t, energy_scale, is_singular, ..Inspection::default() };
+    if is_singular {
+        kernel.load.fill(f64::NAN);
+        kernel.multiplier.fill(f64::NAN);
+    }
     let centres = mechanism.centre_accelerations(&kernel.z, &omega, &kernel.load);
     for (k, (body, centre)) in mechanism.own_bodies().iter().zip(centres).enumerate() {
         found.bodies.push((body.name.clone(), [centre.re, centre.im, kernel.load[k]]));
     }
-    let forces = mechanism.joint_forces(start.time, &kernel, &phi, &omega);
+    let mut forces = mechanism.joint_forces(start.time, &kernel, &phi, &omega);
+    if is_singular {
+        forces.hinge_is_determinate.fill(Some(false));
+        forces.row_is_determinate.fill(Some(false));
+    }
     let name =
         |body: Option<usize>| body.map_or("ground", |body| mechanism.bodies[body].name.as_str()).to_owned();
     for (r, row) in mechanism.constraints.iter().enumerate() {
@@ -189,21 +201,29 @@ pub fn inspect_at(mechanism: &Mechanism, start: &Motion) -> Inspection {
     for ((friction, mode), force) in mechanism.frictions.iter().zip(&mechanism.modes).zip(frictions) {
         found.frictions.push((friction.name.clone(), mode.word(), friction.tangent.is_angle(), force));
     }
-    if let Some(outputs) = &mechanism.outputs {
-        let winding: Vec<f64> = (0..phi.len()).map(|k| start.unwrapped(k)).collect();
-        let (time, phi, winding, omega) = (start.time, &phi[..], &winding[..], &omega[..]);
-        let mut values = Vec::new();
-        outputs.evaluate(
-            &Moment { mechanism, time, phi, winding, omega, kernel: &kernel },
-            &mut OutputScratch::default(),
-            &[],
-            &mut values,
-        );
-        let named = outputs.heads().zip(values);
-        found.outputs = named.map(|((name, unit), value)| (name.into(), unit.into(), value)).collect();
-    }
+    found.outputs = outputs(mechanism, start, &phi, &omega, &kernel);
     found.walls = contacts(mechanism, start, &phi, omega, &kernel);
     found
+}
+
+/// Name, unit and value of each of the scene's outputs, after an evaluation.
+fn outputs(
+    mechanism: &Mechanism,
+    start: &Motion,
+    phi: &[f64],
+    omega: &[f64],
+    kernel: &Kernel<f64>,
+) -> Vec<(String, String, f64)> {
+    let Some(outputs) = &mechanism.outputs else { return Vec::new() };
+    let winding: Vec<f64> = (0..phi.len()).map(|k| start.unwrapped(k)).collect();
+    let moment = Moment { mechanism, time: start.time, phi, winding: &winding, omega, kernel };
+    let mut values = Vec::new();
+    outputs.evaluate(&moment, &mut OutputScratch::default(), &[], &mut values);
+    if mechanism.hides_forces(kernel) {
+        outputs.withhold(&mut values);
+    }
+    let named = outputs.heads().zip(values);
+    named.map(|((name, unit), value)| (name.into(), unit.into(), value)).collect()
 }
 
 /// The body a row's force or torque acts on, and the one it comes from.

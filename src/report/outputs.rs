@@ -15,6 +15,15 @@ fn left_open(mechanism: &Mechanism, outcome: &Outcome) -> Vec<bool> {
     mechanism.open_outputs(Time::from(last.t), &last.phi, &last.omega)
 }
 
+/// A figure of an output.
+fn told(x: f64) -> String {
+    match x {
+        _ if x.is_nan() => "not known".into(),
+        _ if x.is_infinite() => "unbounded".into(),
+        _ => figure(x),
+    }
+}
+
 /// What the record of a run says; nothing for a scene without outputs.
 pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> {
     let outputs = mechanism.outputs.as_ref()?;
@@ -45,16 +54,23 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome
         .map(|Extremes { name, unit, min, max, mean, rms }| {
             let head = format!("{name} [{unit}]");
             let numbers = [min[0], min[1], max[0], max[1], *mean, *rms];
-            let mut cells: Vec<String> =
-                std::iter::once(head).chain(numbers.into_iter().map(figure)).collect();
+            let mut cells: Vec<String> = std::iter::once(head).chain(numbers.into_iter().map(told)).collect();
             // Of a constant the times of both extremes are those of rounding.
-            if cells[1] == cells[3] && max[0] - min[0] <= CONSTANT * max[0].abs().max(min[0].abs()) {
+            let is_bounded = min[0].is_finite() && max[0].is_finite();
+            if is_bounded
+                && cells[1] == cells[3]
+                && max[0] - min[0] <= CONSTANT * max[0].abs().max(min[0].abs())
+            {
                 (cells[2], cells[4]) = (CONSTANT_TOLD.into(), CONSTANT_TOLD.into());
             }
             cells
         })
         .collect();
     page.table(&["output", "least", "at t [s]", "largest", "at t [s]", "mean", "rms"], &rows);
+    if rows.iter().flatten().any(|cell| cell == "not known") {
+        let why = "what is not known: limits of forces or accelerations at singular positions on the way";
+        page.entry("", why);
+    }
     if left_open(mechanism, outcome).contains(&true) {
         page.entry(
             "",

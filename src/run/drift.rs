@@ -182,7 +182,8 @@ pub(super) fn units(mechanism: &Mechanism) -> Vec<f64> {
     mechanism.with_all_parts().constraints.iter().map(|row| unit(row.is_in_radians())).collect()
 }
 
-/// How near to a singular position a run came at its output times.
+/// How near to a singular position a run came at its output times, and between them where forces or
+/// accelerations are among its outputs.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Singular {
     /// The least singular value of the rows' Jacobian over the largest, angles in rad and lengths in sizes of
@@ -279,6 +280,14 @@ impl Drift {
         self.constraints.iter().map(|(name, _)| name.as_str()).eq(rows)
             && self.units.len() == self.constraints.len()
             && excursions.all(|excursion| excursion.intervals.len() == INTERVALS && excursion.until > 0.0)
+    }
+
+    /// Takes the nearest to a singular position it came between output times.
+    pub(super) fn take_passage(&mut self, passage: Option<Singular>) {
+        let known = self.singular.as_ref().map_or(f64::INFINITY, |singular| singular.smallest);
+        if let Some(passage) = passage.filter(|passage| passage.smallest < known) {
+            self.singular = Some(passage);
+        }
     }
 
     /// Takes a sample after so many steps; names the first limit it exceeds.

@@ -6,9 +6,14 @@
 //! between the extremes known so far, as in most steps of a long run, one low degree serves, and the cheapest
 //! interpolation of the motion.  Steps in which an output has a corner or jumps are taken apart there.
 
+mod found;
 mod irregular;
 mod parts;
+mod singular;
 
+use self::found::Found;
+use self::singular::SingularPassage;
+use super::drift::Singular;
 use super::halvings::Halvings;
 use super::observer::{Inside, StepWatcher};
 use super::rounding::changes;
@@ -16,7 +21,7 @@ use crate::arithmetic::DoubleDouble;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch, Outputs};
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated};
+use crate::stepping::search::{Chebyshev, Curve, Interpolants, interpolated};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -51,7 +56,8 @@ const DOUBTS: u32 = 2;
 /// Halvings of the bracket of an extreme, and golden sections of one beside a corner.
 const ROUNDS: usize = 48;
 
-/// What an output came to over a run.
+/// What an output came to over a run: infinite where it grows without bound at a singular position, not a
+/// number where its limit there is not known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Extremes {
     /// Its name.
@@ -80,57 +86,6 @@ impl Extremes {
     }
 }
 
-/// What is known of one output so far.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Found {
-    min: [f64; 2],
-    max: [f64; 2],
-    integral: DoubleDouble,
-    square: DoubleDouble,
-}
-
-impl Default for Found {
-    fn default() -> Self {
-        Self {
-            min: [f64::INFINITY, 0.0],
-            max: [f64::NEG_INFINITY, 0.0],
-            integral: DoubleDouble::default(),
-            square: DoubleDouble::default(),
-        }
-    }
-}
-
-impl Found {
-    /// True where a curve that is known well enough stays well between the extremes, or is `rounding` as they
-    /// are.
-    fn holds(&self, curve: &Chebyshev, rounding: f64) -> bool {
-        let ([lowest, highest], size) = (curve.range(), curve.most());
-        if size <= rounding && self.min[0] <= rounding && self.max[0] >= -rounding {
-            return true;
-        }
-        let is_constant = highest - lowest <= CONSTANT * size;
-        // The value of a constant is known to its last digits only.
-        let margin = if is_constant { -4.0 * CONSTANT } else { MARGIN } * size;
-        curve.tail() <= PASSED * size && lowest - margin > self.min[0] && highest + margin < self.max[0]
-    }
-
-    /// Adds the integrals over a step of an interpolant and of its square.
-    fn sum_up(&mut self, curve: &Chebyshev, nodes: &Nodes, values: &[f64], span: f64) {
-        self.integral += DoubleDouble::product(curve.integral(), span);
-        let square = nodes.integral(values.iter().map(|value| value * value));
-        self.square += DoubleDouble::product(square, span);
-    }
-
-    fn see(&mut self, value: f64, t: f64) {
-        if value < self.min[0] {
-            self.min = [value, t];
-        }
-        if value > self.max[0] {
-            self.max = [value, t];
-        }
-    }
-}
-
 /// What is remembered between steps.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct ExtremesMemory {
@@ -147,6 +102,10 @@ pub(super) struct ExtremesMemory {
     still: Vec<f64>,
     /// Short parts, one after the other, in which no interpolant has resolved each output.
     unresolved: Vec<u8>,
+    /// The singular position that is near.
+    passage: Option<SingularPassage>,
+    /// The nearest to one it came on the way through.
+    singular: Option<Singular>,
 }
 
 /// Looks at the outputs of every step.
@@ -157,6 +116,8 @@ pub(super) struct ExtremesDetector {
     scratch: OutputScratch,
     /// The branches their formulas are evaluated on; none: those that hold at each place.
     branches: Vec<bool>,
+    /// The least share of a constraint in the step so far.
+    least: f64,
     pub halvings: Halvings,
     pub memory: ExtremesMemory,
 }
@@ -171,6 +132,7 @@ impl ExtremesDetector {
             coordinates: Default::default(),
             scratch: OutputScratch::default(),
             branches: Vec::new(),
+            least: f64::INFINITY,
             halvings: Halvings::default(),
             memory: ExtremesMemory { found: vec![Found::default(); count], ..ExtremesMemory::default() },
         })
@@ -192,7 +154,8 @@ impl ExtremesDetector {
         let fits = memory.found.len() == count
             && [0, count].contains(&memory.rounding.len())
             && [0, conditions].contains(&memory.still.len())
-            && [0, count].contains(&memory.unresolved.len());
+            && [0, count].contains(&memory.unresolved.len())
+            && memory.passage.as_ref().is_none_or(|passage| passage.fits(count));
         if fits {
             self.memory = memory;
         }
@@ -203,18 +166,18 @@ impl ExtremesDetector {
     pub fn extremes(&self) -> Vec<Extremes> {
         let span = self.memory.span.hi;
         let Some(outputs) = self.mechanism.outputs.as_ref().filter(|_| span > 0.0) else { return Vec::new() };
-        let extremes = |((name, unit), found): ((&str, &str), &Found)| Extremes {
-            name: name.to_owned(),
-            unit: unit.to_owned(),
-            min: found.min,
-            max: found.max,
-            mean: found.integral.hi / span,
-            rms: match found.square.hi / span {
-                square if square < 0.0 => 0.0,
-                square => square.sqrt(),
-            },
+        let extremes = |((name, unit), found): ((&str, &str), Found)| {
+            let [mean, rms] = found.means(span);
+            Extremes {
+                name: name.to_owned(),
+                unit: unit.to_owned(),
+                min: found.min,
+                max: found.max,
+                mean,
+                rms,
+            }
         };
-        outputs.heads().zip(&self.memory.found).map(extremes).collect()
+        outputs.heads().zip(self.found_at_end()).map(extremes).collect()
     }
 
     /// Appends the outputs at a motion.
@@ -242,6 +205,7 @@ impl ExtremesDetector {
         let Some(outputs) = &mechanism.outputs else { return R::default() };
         if outputs.needs_equations() {
             kernel.accelerations(mechanism, motion.time, phi, omega, Bias::default());
+            self.least = self.least.min(mechanism.standing_share(kernel));
         } else {
             kernel.place(mechanism, phi);
         }
@@ -289,6 +253,14 @@ impl ExtremesDetector {
             found.sum_up(curve, nodes, values, span);
         });
         true
+    }
+
+    /// Looks at a step, or the beginning or end of one.
+    fn look_over(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) {
+        match self.condition_count() {
+            0 => self.look_at(inside, begin, span),
+            _ => self.look_at_parts(inside, begin, span),
+        }
     }
 
     /// Takes the outputs at the end of a run, where a jump has made the event that ends it happen: no step
@@ -413,10 +385,10 @@ impl StepWatcher for ExtremesDetector {
             self.memory.rounding = rounding_of(&self.changes(inside.at(begin)));
         }
         self.halvings.begin();
-        match self.condition_count() {
-            0 => self.look_at(inside, begin, span),
-            _ => self.look_at_parts(inside, begin, span),
-        }
+        self.least = f64::INFINITY;
+        let before = self.memory.found.clone();
+        self.look_over(inside, begin, span);
+        self.watch_singular(inside, before);
         self.halvings.is_too_much().then_some(end)
     }
 }

@@ -414,8 +414,9 @@ impl Running {
     pub fn finish(mut self) -> Outcome {
         self.contact_driver.end(self.outcome.last.t, &mut self.outcome);
         self.outcome.statistics = self.contact_driver.statistics();
-        self.outcome.extremes =
-            self.contact_driver.extremes.as_ref().map_or_else(Vec::new, ExtremesDetector::extremes);
+        let extremes = self.contact_driver.extremes.as_ref();
+        self.outcome.drift.take_passage(extremes.and_then(ExtremesDetector::singular));
+        self.outcome.extremes = extremes.map_or_else(Vec::new, ExtremesDetector::extremes);
         let Statistics { steps, newton_steps, .. } = self.outcome.statistics;
         if newton_steps > 0 {
             let note = format!(

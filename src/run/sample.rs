@@ -85,7 +85,8 @@ impl Sample {
     /// False where any number of it is not finite; nothing after that means anything.
     pub fn is_finite(&self) -> bool {
         let scalars = [self.t, self.kinetic, self.potential, self.work, self.stabilizer, self.imbalance];
-        let vectors = [&self.centre, &self.velocity, &self.constraints, &self.motors];
+        // Motors have no value at singular positions.
+        let vectors = [&self.centre, &self.velocity, &self.constraints];
         scalars
             .iter()
             .chain(&self.phi)
@@ -112,6 +113,8 @@ pub struct Sampler {
     reference: Option<DoubleDouble>,
     sample: Sample,
     scratch: OutputScratch,
+    /// True where the last sample was of a singular position.
+    was_singular: bool,
 }
 
 impl Sampler {
@@ -136,6 +139,7 @@ impl Sampler {
                 ..Sample::default()
             },
             scratch: OutputScratch::default(),
+            was_singular: false,
             holding: Arc::clone(&mechanism),
             mechanism,
         }
@@ -227,6 +231,14 @@ impl Sampler {
             let force = -self.plain.multiplier[r];
             sample.motors[r] = if row.moves() { [force, -force * here.drive.hi] } else { [0.0, 0.0] };
         }
+        // Where it stays at a singular position no limit is hidden.
+        let is_singular = self.holding.hides_forces(&self.plain);
+        let is_hidden = is_singular && !self.was_singular;
+        self.was_singular = is_singular;
+        if is_hidden {
+            let moving = mechanism.constraints.iter().zip(&mut sample.motors).filter(|(row, _)| row.moves());
+            moving.for_each(|(_, motor)| *motor = [f64::NAN; 2]);
+        }
         if let Some(outputs) = &mechanism.outputs {
             let moment = Moment {
                 mechanism: &self.holding,
@@ -238,6 +250,9 @@ impl Sampler {
             };
             sample.outputs.clear();
             outputs.evaluate(&moment, &mut self.scratch, &[], &mut sample.outputs);
+            if is_hidden {
+                outputs.withhold(&mut sample.outputs);
+            }
         }
         sample
     }

@@ -58,7 +58,7 @@ impl Finished<'_> {
             };
             let output = self.scene.outputs.iter().find(|output| is_that(&output.formula))?;
             let extremes = self.outcome.extremes.iter().find(|one| one.name == output.name)?;
-            Some(extremes.peak()).filter(|peak| (from..=to).contains(&peak[1]))
+            Some(extremes.peak()).filter(|peak| (from..=to).contains(&peak[1]) && peak[0].is_finite())
         };
         [peak(&["torque", "force"]), peak(&["power"])]
     }
@@ -72,7 +72,7 @@ impl Finished<'_> {
         };
         // What lies outside of the window would stretch the chart to it.
         let [from, to] = trace.window.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let seen = |extreme: &[f64; 2]| (from..=to).contains(&extreme[1]);
+        let seen = |extreme: &[f64; 2]| (from..=to).contains(&extreme[1]) && extreme[0].is_finite();
         let heads = self.mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
         let outputs = heads.enumerate().map(|(k, (name, unit))| OutputSeries {
             name: plain(name),

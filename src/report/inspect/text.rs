@@ -1,8 +1,13 @@
 //! The report of a moment as a page of text.
 
 use super::{Inspection, Reaction};
-use crate::report::page::{Page, figure};
+use crate::report::page::{self, Page};
 use crate::scene::Scene;
+
+/// A figure.
+fn figure(x: f64) -> String {
+    if x.is_nan() { "not known".into() } else { page::figure(x) }
+}
 
 impl Inspection {
     /// The report as a page.
@@ -135,7 +140,11 @@ impl Inspection {
         let all: Vec<(&String, Option<bool>)> = known.chain(rows).collect();
         let open: Vec<&str> =
             all.iter().filter(|(_, known)| *known == Some(false)).map(|(name, _)| name.as_str()).collect();
-        if !open.is_empty() {
+        if self.is_singular {
+            let text = "accelerations, and what constraints exert: at a singular position they are limits \
+                along the motion, which the state alone does not tell; run it from before, with outputs";
+            page.entry("indeterminate", text);
+        } else if !open.is_empty() {
             let text = format!(
                 "{}: constraints are redundant here, and rigid bodies do not tell how these joints share the \
                     load; shown are the forces of least norm",

@@ -273,7 +273,11 @@ impl Study {
                     let found = extreme.map(|found| if is_max { found.max } else { found.min });
                     asked.value = found.map_or(f64::NAN, |[value, _]| value);
                     asked.range = extreme.map_or([f64::NAN; 2], |found| [found.min[0], found.max[0]]);
-                    found.map(|[_, t]| t).ok_or_else(|| nothing("no extreme"))
+                    match found {
+                        Some([value, t]) if value.is_finite() => Ok(t),
+                        Some(_) => Err("unbounded or not known at a singular position on the way".into()),
+                        None => Err(nothing("no extreme")),
+                    }
                 }
                 Measure::Flip => match driver.flips.as_ref().and_then(|flips| flips.flip) {
                     Some(flip) => {

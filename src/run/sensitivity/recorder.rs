@@ -2,8 +2,10 @@
 
 use super::extreme::ExtremeTurn;
 use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs, outputs_beside};
+use super::variation::plain;
 use super::{Look, Query, SensitivityError, Variation, refused};
 use crate::dynamics::Motion;
+use crate::dynamics::kernel::{Bias, Kernel};
 
 /// Most rows over time.
 const MOST_ROWS: f64 = 1e6;
@@ -24,6 +26,9 @@ pub(super) fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, Sensitiv
 const NO_JUMP: f64 = 1e-6;
 const OFF: f64 = 1e-3;
 
+/// Share of the weakest constraint below which forces are those of a singular position.
+const BESIDE: f64 = 1e-6;
+
 /// What was seen at one time.
 pub(super) struct RecordedTime {
     pub t: f64,
@@ -39,6 +44,8 @@ pub(super) struct RecordedTime {
     pub times: Vec<(usize, Vec<f64>)>,
     /// How outputs turn at their extremes, by the number of the measure.
     pub turns: Vec<(usize, ExtremeTurn)>,
+    /// True at a singular position, and so near to one that differences of forces are rounding.
+    pub is_singular: bool,
 }
 
 /// Sees a run at the times asked for.
@@ -84,6 +91,7 @@ impl Look for SensitivityRecorder<'_> {
             moves: None,
             times,
             turns,
+            is_singular: self.asks_for_forces(variation, time) && is_singular(variation, motion),
         });
     }
 
@@ -96,6 +104,24 @@ impl Look for SensitivityRecorder<'_> {
             *after = outputs_beside(variation, motion, 1.0);
         }
     }
+}
+
+impl SensitivityRecorder<'_> {
+    /// True where an extreme of forces or accelerations is asked for at a time.
+    fn asks_for_forces(&self, variation: &Variation, time: f64) -> bool {
+        let outputs = variation.mechanism.outputs.as_ref();
+        let follows = outputs.map_or(&[][..], |outputs| outputs.follows_equations());
+        let is_force = |asked: &Query| asked.output.is_some_and(|output| follows.get(output) == Some(&true));
+        self.asked.iter().any(|asked| asked.is_extreme() && asked.t == Ok(time) && is_force(asked))
+    }
+}
+
+/// True of a motion at a singular position, or beside it.
+fn is_singular(variation: &Variation, motion: &Motion) -> bool {
+    let (t, phi, omega) = plain(motion);
+    let mut kernel = Kernel::new(&variation.mechanism);
+    kernel.accelerations(&variation.mechanism, t, &phi, &omega, Bias::default());
+    variation.mechanism.standing_share(&kernel) < BESIDE
 }
 
 impl RecordedTime {
@@ -151,6 +177,11 @@ fn extreme(number: usize, asked: &Query, t: f64, at: &RecordedTime) -> Result<(f
         .into_iter()
         .fold(0.0, |most: f64, side| most.max((value(side) - value(&at.derived)).abs()));
     let has_jump = jump > NO_JUMP * asked.range[0].abs().max(asked.range[1].abs());
+    if at.is_singular {
+        return Err(format!(
+            "the extreme at {t} s is at a singular position, where the state does not tell it"
+        ));
+    }
     let corner = || format!("the extreme at {t} s is a corner of the curve, at an impact or an event");
     let (side, late) = match &at.moves {
         // A jump or a corner moves in time.
