@@ -437,6 +437,8 @@ def test_only_false_ends_a_run(free):
 def test_an_event_is_a_number(free):
     with pytest.raises(ValueError, match="event lost is not a number"):
         free.run(until=1, events=[dl.Event("lost", lambda at: float("nan"))])
+    with pytest.raises(ValueError, match="event up: direction is -1, 0 or 1, not 5"):
+        dl.Event("up", lambda at: at.t - 1, direction=5)
 
 
 def test_wrong_words_name_what_there_is(free):

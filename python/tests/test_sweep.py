@@ -54,6 +54,8 @@ def test_a_list_of_points(free):
         same(sweep, free.sweep(points, until=4, method="taylor", client=client, parts=4))
     with pytest.raises(dl.RequestRefused, match="finite"):
         free.sweep({"bar1.phi": [0.1, np.nan]})
+    with pytest.raises(ValueError, match="bar1.phi: .* real numbers"):
+        free.sweep({"bar1.phi": np.array([0.1, 0.2 + 0.1j])})
     with pytest.raises(ValueError, match="one length"):
         free.sweep({"bar1.phi": [0.1, 0.2], "bar2.phi": [0.1]})
     with pytest.raises(dl.DriftlessError):

@@ -40,6 +40,7 @@ pub fn object(found: &Fit) -> Value {
     })
 }
 
+#[cfg(feature = "charts")]
 fn residuals(column: &FittedColumn) -> impl Iterator<Item = Option<f64>> {
     column
         .measured

@@ -62,7 +62,7 @@ class Builder:
         return self.add("motors", name=name, body=body, law=law, **fields)
 
     def wall(self, name: str, **fields: Any) -> Builder:
-        """A wall: ``through``, ``normal``, ``restitution``."""
+        """A wall for a ``point`` of a ``body``: ``line={"through": [x, y], "normal": [x, y]}``, ``restitution``."""
         return self.add("walls", name=name, **fields)
 
     def start(self, body: str, **fields: float) -> Builder:

@@ -253,6 +253,11 @@ class Event:
     direction: int = 0
     stop: bool = False
 
+    def __post_init__(self) -> None:
+        """Refuses a direction that is none."""
+        if self.direction not in (-1, 0, 1):
+            raise ValueError(f"event {self.name}: direction is -1, 0 or 1, not {self.direction!r}")
+
     def described(self) -> tuple[str, Callable[[_core.Moment], float], int, bool]:
         """As the native part takes it."""
         return self.name, self.function, self.direction, self.stop

@@ -202,6 +202,9 @@ def _points(vary: Mapping[str, Any]) -> tuple[list[tuple[str, float, float, int]
             f"{ranges[0]}: a tuple is a range of a grid, where every name has one; beside arrays write "
             "numpy.linspace(from, to, count), or a list"
         )
+    for name, value in vary.items():
+        if np.iscomplexobj(value):
+            raise ValueError(f"{name}: a list of points has real numbers, not complex ones")
     try:
         arrays = [np.asarray(value, dtype=float) for value in vary.values()]
     except (TypeError, ValueError) as error:
