@@ -93,7 +93,7 @@ fn gravity_sets_the_clock() {
 fn bars_of_very_unequal_mass_and_length() {
     for (mass, length) in [(1e6, 1.0), (1e-6, 1.0), (1.0, 1e3), (1.0, 1e-3), (1e6, 1e-3), (1e-6, 1e3)] {
         let mut scene = shipped("free", &[]);
-        scene.name = format!("ratio-{mass}-{length}");
+        scene.name = format!("ratio-{mass:e}-{length:e}");
         let bar = &mut scene.bars[1];
         (bar.mass, bar.length, bar.centre[0]) =
             (bar.mass * mass, bar.length * length, bar.centre[0] * length);

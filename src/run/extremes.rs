@@ -12,7 +12,7 @@ mod parts;
 mod singular;
 
 use self::found::Found;
-use self::singular::SingularPassage;
+use self::singular::PassageMemory;
 use super::drift::Singular;
 use super::halvings::Halvings;
 use super::observer::{Inside, StepWatcher};
@@ -103,7 +103,7 @@ pub(super) struct ExtremesMemory {
     /// Short parts, one after the other, in which no interpolant has resolved each output.
     unresolved: Vec<u8>,
     /// The singular position that is near.
-    passage: Option<SingularPassage>,
+    passage: Option<PassageMemory>,
     /// The nearest to one it came on the way through.
     singular: Option<Singular>,
 }

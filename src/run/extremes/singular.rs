@@ -51,7 +51,7 @@ const INTERVALS: u32 = 256;
 
 /// What is remembered near a singular position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct SingularPassage {
+pub(super) struct PassageMemory {
     /// From and to these times \[s\] it is near, so far.
     begin: f64,
     end: f64,
@@ -69,7 +69,7 @@ pub(super) struct SingularPassage {
 
 /// What an output comes to on one side.
 #[derive(Clone)]
-enum Limit {
+enum SideLimit {
     /// Coefficients of a polynomial, and up to which share of the way to the farther end it is that.
     Curve(Vec<f64>, f64),
     /// Without bound, in this sense.
@@ -121,7 +121,7 @@ impl ExtremesDetector {
         self.memory.found = before;
         self.look_over(inside, begin, (from - begin).hi);
         let before = std::mem::replace(&mut self.memory, kept).found;
-        self.memory.passage = Some(SingularPassage {
+        self.memory.passage = Some(PassageMemory {
             begin: from.hi,
             end: from.hi,
             before,
@@ -175,7 +175,7 @@ impl ExtremesDetector {
     }
 
     /// Remembers the outputs at a time where they are of use; returns the share of the weakest constraint.
-    fn remember_at(&mut self, inside: &mut dyn Inside, t: Time, passage: &mut SingularPassage) -> f64 {
+    fn remember_at(&mut self, inside: &mut dyn Inside, t: Time, passage: &mut PassageMemory) -> f64 {
         let values = self.values_at(inside.at(t));
         let share = self.mechanism.standing_share(&self.kernel);
         if share >= USELESS && share.is_finite() {
@@ -186,7 +186,7 @@ impl ExtremesDetector {
 
     /// Counts what is remembered up to a time of a step, where a singular position was passed.
     fn close(&mut self, inside: &mut dyn Inside, to: Time) {
-        let Some(mut passage) = self.memory.passage.take().filter(SingularPassage::is_singular) else {
+        let Some(mut passage) = self.memory.passage.take().filter(PassageMemory::is_singular) else {
             return;
         };
         passage.end = to.hi;
@@ -207,7 +207,7 @@ impl ExtremesDetector {
     }
 
     /// The passage, or the one before that came nearer.
-    fn nearer(&self, passage: &SingularPassage) -> Option<Singular> {
+    fn nearer(&self, passage: &PassageMemory) -> Option<Singular> {
         let [_, t, smallest] = passage.least;
         let is_nearer = self.memory.singular.as_ref().is_none_or(|known| smallest < known.smallest);
         if !is_nearer || smallest.is_nan() {
@@ -239,7 +239,7 @@ impl ExtremesDetector {
     }
 }
 
-impl SingularPassage {
+impl PassageMemory {
     /// Whether it is one of so many outputs.
     pub fn fits(&self, count: usize) -> bool {
         self.before.len() == count && self.samples.iter().all(|(_, _, values)| values.len() == count)
@@ -276,34 +276,34 @@ impl SingularPassage {
     }
 
     /// What an output comes to on both sides.
-    fn limits(&self, all: &[Point], sides: &[Vec<Point>; 2], rounding: f64) -> [Limit; 2] {
+    fn limits(&self, all: &[Point], sides: &[Vec<Point>; 2], rounding: f64) -> [SideLimit; 2] {
         let is_zero = true;
         for share in SHARES {
             let is_in = |at: f64| at.abs() <= share;
             if sides.iter().all(|side| within(side, is_in).len() > ONE)
                 && let Some(curve) = alike(&within(all, is_in), BOTH, rounding, is_zero)
             {
-                return [Limit::Curve(curve.clone(), share), Limit::Curve(curve, share)];
+                return [SideLimit::Curve(curve.clone(), share), SideLimit::Curve(curve, share)];
             }
         }
         let limit = |side: &Vec<Point>| {
             let told = |share: f64| {
                 let near = within(side, |at| at.abs() <= share);
                 if let Some(curve) = alike(&near, ONE, rounding, is_zero) {
-                    return Some(Limit::Curve(curve, share));
+                    return Some(SideLimit::Curve(curve, share));
                 }
                 let times: Vec<Point> =
                     near.iter().map(|[at, y, weight]| [*at, y * at.abs(), *weight]).collect();
                 let most = times.iter().fold(0.0, |most: f64, point| most.max(point[1].abs()));
                 let curve = alike(&times, ONE, rounding, is_zero)?;
-                (curve[0].abs() > POLE * most).then_some(Limit::Unbounded(curve[0]))
+                (curve[0].abs() > POLE * most).then_some(SideLimit::Unbounded(curve[0]))
             };
-            SHARES.into_iter().find_map(told).unwrap_or(Limit::Unknown)
+            SHARES.into_iter().find_map(told).unwrap_or(SideLimit::Unknown)
         };
         let mut found = sides.each_ref().map(limit);
         for (side, end) in [self.begin, self.end].into_iter().enumerate() {
             let is_short = (end - self.least[1]).abs() < SHORT * self.reach();
-            if is_short && matches!(found[side], Limit::Unknown) {
+            if is_short && matches!(found[side], SideLimit::Unknown) {
                 found[side] = found[1 - side].clone();
             }
         }
@@ -311,23 +311,23 @@ impl SingularPassage {
     }
 
     /// Adds what an output comes to between the singular position and one end, times over the longest one.
-    fn count(&self, found: &mut Found, end: f64, side: &[Point], limit: Limit, rounding: f64) {
+    fn count(&self, found: &mut Found, end: f64, side: &[Point], limit: SideLimit, rounding: f64) {
         match limit {
-            Limit::Curve(curve, share) => {
+            SideLimit::Curve(curve, share) => {
                 let to = end.clamp(-share, share);
                 self.count_curve(found, &curve, [0.0, to]);
                 if to != end {
                     self.count_rest(found, side, [to, end], rounding, HALVINGS);
                 }
             }
-            Limit::Unbounded(sense) => {
+            SideLimit::Unbounded(sense) => {
                 let centre = self.least[1];
                 let seen = side.iter().filter(|point| point[2] >= SMALL.powf(1.5));
                 seen.for_each(|[at, y, _]| found.see(*y, centre + at * self.reach()));
                 found.see(f64::INFINITY.copysign(sense), centre);
             }
-            Limit::Unknown if end != 0.0 => found.forget(),
-            Limit::Unknown => {}
+            SideLimit::Unknown if end != 0.0 => found.forget(),
+            SideLimit::Unknown => {}
         }
     }
 
