@@ -2,7 +2,7 @@
 
 use driftless::run::{Action, Direction, Event};
 use driftless::{Configuration, Mechanism, Motion, Site};
-use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -76,8 +76,17 @@ impl Moment {
     }
 }
 
-/// What an event function failed with.
-pub type Failed = Arc<Mutex<Option<PyErr>>>;
+/// What Python functions that a run asks have raised.
+#[derive(Default)]
+pub struct Raised {
+    /// What an event function failed with.
+    pub error: Option<PyErr>,
+    /// Ctrl-C in an event function or a callback, after which the run is as without it.
+    pub interrupt: Option<PyErr>,
+}
+
+/// The same, as event functions and their run share it.
+pub type Failed = Arc<Mutex<Raised>>;
 
 struct PyEvent {
     name: String,
@@ -108,7 +117,16 @@ impl Event for PyEvent {
             bodies: self.sites.iter().enumerate().map(body).collect(),
         };
         let value = Python::attach(|py| {
-            let value = self.function.bind(py).call1((moment,))?.extract::<f64>()?;
+            let moment = Py::new(py, moment)?;
+            let call = || self.function.bind(py).call1((&moment,))?.extract::<f64>();
+            let value = match call() {
+                // Ctrl-C while it computed: it is asked once more, so that the run can be gone on with.
+                Err(error) if error.is_instance_of::<PyKeyboardInterrupt>(py) => {
+                    self.failed.lock().unwrap_or_else(PoisonError::into_inner).interrupt = Some(error);
+                    call()?
+                }
+                other => other?,
+            };
             if value.is_nan() {
                 let (name, t) = (&self.name, at.time());
                 return Err(PyValueError::new_err(format!("the event {name} is not a number at t = {t} s")));
@@ -117,7 +135,7 @@ impl Event for PyEvent {
         });
         value.unwrap_or_else(|error| {
             // The run ends at its next look.
-            self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+            self.failed.lock().unwrap_or_else(PoisonError::into_inner).error.get_or_insert(error);
             1.0
         })
     }

@@ -1,7 +1,7 @@
 //! Runs: integrated without the global lock, looked at now and then for Ctrl-C.
 
 use crate::errors::{Interrupted, of_plan, of_run, refused};
-use crate::event::{Failed, events};
+use crate::event::{Failed, Raised, events};
 use crate::request::asked;
 use crate::scene::Scene;
 use driftless::report::charts::{Chart, draw, motion};
@@ -15,7 +15,7 @@ use driftless::run::{
 use driftless::stepping::interruption;
 use driftless::{Level, Outcome, Trajectory, chart};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
@@ -55,6 +55,8 @@ struct Watch<'a> {
     /// Where it is enough \[s\].
     end: f64,
     failed: Option<PyErr>,
+    /// Where Ctrl-C in the callback is noted.
+    raised: Failed,
 }
 
 /// An event as Python describes it: name, function, direction, whether it ends the run.
@@ -86,6 +88,11 @@ impl Observer for Watch<'_> {
         match told {
             Ok(true) => ControlFlow::Continue(()),
             Ok(false) => ControlFlow::Break(()),
+            Err(error) if Python::attach(|py| error.is_instance_of::<PyKeyboardInterrupt>(py)) => {
+                // Its row is there: the run pauses at its next look, and can be gone on with.
+                self.raised.lock().unwrap_or_else(PoisonError::into_inner).interrupt = Some(error);
+                ControlFlow::Continue(())
+            }
             Err(error) => {
                 self.failed = Some(error);
                 ControlFlow::Break(())
@@ -182,7 +189,8 @@ fn carry(
 ) -> PyResult<Raw> {
     let shown = Shown::new(&scene.get().mechanism);
     let (recorder, end) = (dense.map(|_| Recorder::default()), dense.unwrap_or(f64::INFINITY));
-    let mut watch = Watch { shown, numbers, recorder, callback, end, failed: None };
+    let raised = Failed::clone(failed);
+    let mut watch = Watch { shown, numbers, recorder, callback, end, failed: None, raised };
     // The windows of these are integrated in one call each, which cannot pause.
     let is_windowed = matches!(running.plan().method, MethodId::Dopri5 | MethodId::Dop853);
     loop {
@@ -203,11 +211,12 @@ fn carry(
             });
             if is_over { Ok(true) } else { py.check_signals().map(|()| false) }
         };
-        let failure = failed.lock().unwrap_or_else(PoisonError::into_inner).take();
-        if let Some(error) = watch.failed.take().or(failure) {
+        let Raised { error, interrupt } =
+            std::mem::take(&mut *failed.lock().unwrap_or_else(PoisonError::into_inner));
+        if let Some(error) = watch.failed.take().or(error) {
             return Err(error);
         }
-        match looked {
+        match interrupt.map_or(looked, Err) {
             Ok(true) => break,
             Ok(false) => {}
             Err(error) => return Err(interrupted(py, &scene, &running, watch.numbers, error)),
@@ -257,7 +266,8 @@ fn go_beside(py: Python<'_>, running: &mut Running, watch: &mut Watch, failed: &
 }
 
 fn has_failed(failed: &Failed) -> bool {
-    failed.lock().unwrap_or_else(PoisonError::into_inner).is_some()
+    let raised = failed.lock().unwrap_or_else(PoisonError::into_inner);
+    raised.error.is_some() || raised.interrupt.is_some()
 }
 
 /// The interruption with what the run goes on from.

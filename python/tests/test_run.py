@@ -248,6 +248,36 @@ except KeyboardInterrupt as stop:
     assert np.array_equal(run.rows, whole.rows) and run.report["result"] == whole.report["result"]
 
 
+@pytest.mark.parametrize("kind", ["event", "callback"])
+def test_ctrl_c_in_a_function_leaves_a_checkpoint(free, kind):
+    asked = 0
+
+    def asks():
+        nonlocal asked
+        asked += 1
+        if asked == 45:
+            signal.raise_signal(signal.SIGINT)
+
+    def height(at):
+        asks()
+        return at.position("bar2", (0.6, 0))[1] + 0.5
+
+    functions = {
+        "event": {"events": [dl.Event("height", height)]},
+        "callback": {"callback": lambda t, row: asks()},
+    }[kind]
+    options = {"until": 20, "every": 0.1, "method": "dp8", "rtol": 1e-9, "trust": "off"}
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(dl.Interrupted) as interrupted:
+            free.run(**functions, **options)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    run, whole = dl.resume(interrupted.value.checkpoint, **functions), free.run(**functions, **options)
+    assert np.array_equal(run.rows, whole.rows) and run.events == whole.events
+    assert len(run.t) == 201 and (kind == "callback" or len(run.events) > 5)
+
+
 def test_commands_of_the_program(scenes):
     crank = dl.load(scenes / "crank_rocker.json")
     assert crank.check()["scene"] == "crank_rocker"
