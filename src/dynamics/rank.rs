@@ -132,6 +132,9 @@ impl Metric {
                 a[j * r + i] = a[i * r + j];
             }
         }
+        if self.redundant == 0 {
+            return self.verdict(&shares(a, &metric.rows, false));
+        }
         let verdict = self.verdict(&shares(a.clone(), &metric.rows, false));
         if self.is_open(&verdict) { self.pivoted(a, &metric.rows) } else { verdict }
     }

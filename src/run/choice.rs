@@ -175,11 +175,11 @@ fn chosen(
     };
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
     let is_expanded = mechanism.recursion.is_some() && is_kept && mechanism.has_series();
+    let damped = stiffness.filter(|stiffness| is_overdamped(stiffness, until));
     if !mechanism.frictions.is_empty() && request.step.is_none() {
-        let is_overdamped = stiffness.is_some_and(|stiffness| is_overdamped(stiffness, until));
         let method = match n > MANY_COORDINATES {
             true => MethodId::Dp8,
-            false if is_overdamped => MethodId::Radau(5),
+            false if damped.is_some() => MethodId::Radau(5),
             false => MethodId::Taylor,
         };
         return (
@@ -210,7 +210,7 @@ fn chosen(
         return (MethodId::Gauss(8), format!("a fixed step was given; {why}"));
     }
     let tolerance = request.rtol.or(request.atol);
-    if let Some(damped) = stiffness.filter(|stiffness| is_overdamped(stiffness, until)) {
+    if let Some(damped) = damped {
         let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
         let mode = damped
             .culprit

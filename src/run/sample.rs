@@ -114,7 +114,7 @@ pub struct Sampler {
     sample: Sample,
     scratch: OutputScratch,
     /// True where the last sample was of a singular position.
-    was_singular: bool,
+    pub was_singular: bool,
 }
 
 impl Sampler {

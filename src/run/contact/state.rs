@@ -19,6 +19,8 @@ pub(in crate::run) struct ContactDriverState {
     place: DriverState,
     /// Energy less work at the start, shifted by impacts \[J\].
     reference: Option<DoubleDouble>,
+    /// True where the last row was at a singular position.
+    was_singular: bool,
     /// Contacts held, in the order of their rows.
     contacts: Vec<usize>,
     /// Modes of the places with friction.
@@ -46,6 +48,7 @@ impl ContactDriver {
         ContactDriverState {
             place: self.driver.place(),
             reference: self.sampler.reference(),
+            was_singular: self.sampler.was_singular,
             contacts: self.mechanism.held.clone(),
             modes: self.mechanism.modes.clone(),
             held: self.held.clone(),
@@ -82,6 +85,7 @@ impl ContactDriver {
         let ContactDriverState {
             place,
             reference,
+            was_singular,
             contacts,
             modes,
             held,
@@ -130,6 +134,7 @@ impl ContactDriver {
             contact_driver.mechanism = holding;
         }
         contact_driver.sampler.refer(reference);
+        contact_driver.sampler.was_singular = was_singular;
         let acting = Arc::clone(&contact_driver.mechanism);
         if let Some(events) = &mut contact_driver.events {
             events.watch_friction(&acting);

@@ -45,6 +45,8 @@ pub(in crate::run) struct EventMemory {
     /// Those whose functions were at zero throughout the last part of a step, as rates are of what sticks or
     /// lies on a wall.
     pub(super) still: Vec<usize>,
+    /// The event from outside that has just changed the motion, and the side of zero its function goes to.
+    pub(super) leaving: Option<(usize, i8)>,
     /// True where what is to be done cannot be: the motion is driven back onto that condition from both
     /// sides.
     pub slides: bool,
@@ -73,8 +75,8 @@ pub(in crate::run) struct EventDetector {
     pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
     pub(super) undefined: Option<usize>,
-    /// What events from outside that changed the motion are to do.
-    pub(super) returns: returns::Returns,
+    /// The event from outside that came true again before that could be told.
+    pub(super) lost: Option<usize>,
     /// Parts of the last step that were halved.
     pub halvings: Halvings,
     /// Events since somebody last took them.
@@ -116,7 +118,7 @@ impl EventDetector {
             closers,
             tolerance: 0.0,
             undefined: None,
-            returns: returns::Returns::default(),
+            lost: None,
             halvings: Halvings::default(),
             found,
             count: 0,
@@ -231,6 +233,7 @@ impl EventDetector {
             && memory.largest.len() == functions
             && memory.last.iter().all(|(event, _)| *event < functions)
             && memory.due.iter().map(|due| &due.0).chain(&memory.still).all(|event| *event < functions)
+            && memory.leaving.is_none_or(|(event, _)| event < functions)
             && memory.pending.as_ref().is_none_or(|(event, _)| *event < functions);
         if fits {
             self.memory = memory;
@@ -392,7 +395,7 @@ impl StepWatcher for EventDetector {
         if self.undefined.is_some() || self.halvings.is_too_much() {
             return Some(end);
         }
-        if self.returns.lost.is_some() {
+        if self.lost.is_some() {
             return Some(begin);
         }
         self.memory.woken.clear();

@@ -270,7 +270,7 @@ impl EventDetector {
         let may_begin = self.memory.sides[event] == 0 && !part.is_resolved;
         let beyond =
             (is_corner || may_begin).then(|| self.values(inside.at(begin + AFTER * part.span))[event]);
-        let EventMemory { sides, largest, last, due, still, .. } = &mut self.memory;
+        let EventMemory { sides, largest, last, due, still, leaving, .. } = &mut self.memory;
         let (side, largest) = (&mut sides[event], &mut largest[event]);
         *largest = largest.max(most);
         // A function that stays at zero, as that of a point at rest on a wall, passes it by rounding alone.
@@ -282,7 +282,7 @@ impl EventDetector {
         }
         let was_still = still.contains(&event);
         still.retain(|other| *other != event);
-        let goes_to = self.returns.take_left(event);
+        let goes_to = leaving.take_if(|(other, _)| *other == event).map(|(_, side)| side);
         let is_at_zero = first.abs() <= NO_VALUE * *largest;
         if is_at_zero && *side != 0 && sign(next) == -*side {
             all.push(part.passage(begin, event, *side < 0));

@@ -58,6 +58,7 @@ impl Found {
             self.max = [value, t];
         }
     }
+
     /// What it comes to is not known any more.
     pub fn forget(&mut self) {
         (self.min, self.max) = ([f64::NAN; 2], [f64::NAN; 2]);

@@ -17,7 +17,7 @@ use crate::dynamics::schur::{NEAR, SINGULAR};
 use crate::dynamics::{Motion, Time};
 use crate::run::drift::Singular;
 use crate::run::observer::Inside;
-use crate::stepping::search::golden_sections;
+use crate::stepping::search::{golden_sections, value};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
@@ -234,7 +234,7 @@ impl ExtremesDetector {
 
     /// The share of the weakest constraint at a motion.
     fn share(&mut self, motion: &Motion) -> f64 {
-        self.values_at(motion);
+        self.with_outputs(motion, |_, _, _| ());
         self.mechanism.standing_share(&self.kernel)
     }
 }
@@ -359,7 +359,7 @@ impl PassageMemory {
         let (mut integral, mut square) = (0.0, 0.0);
         for i in 0..=INTERVALS {
             let at = from + (to - from) * (f64::from(i) / f64::from(INTERVALS));
-            let value = polynomial(curve, at);
+            let [value, _] = value(curve, at);
             found.see(value, centre + at * reach);
             // Simpson's rule.
             let weight = match i {
@@ -385,7 +385,7 @@ fn within(points: &[Point], is_in: impl Fn(f64) -> bool) -> Vec<Point> {
 fn alike(points: &[Point], degree: usize, rounding: f64, is_zero: bool) -> Option<Vec<f64>> {
     let (curve, lower) = (fitted(points, degree)?, fitted(points, degree - LOWER)?);
     let most = points.iter().fold(0.0, |most: f64, point| most.max(point[1].abs()));
-    let apart = |at: f64| (polynomial(&curve, at) - polynomial(&lower, at)).abs();
+    let apart = |at: f64| (value(&curve, at)[0] - value(&lower, at)[0]).abs();
     let is_alike = |at: f64| apart(at) <= (ALIKE * most).max(ROUNDING * rounding);
     ((!is_zero || is_alike(0.0)) && points.iter().all(|point| is_alike(point[0]))).then_some(curve)
 }
@@ -401,9 +401,4 @@ fn fitted(points: &[Point], degree: usize) -> Option<Vec<f64>> {
     let qr = powers.qr();
     let found = qr.r().solve_upper_triangular(&(qr.q().transpose() * values))?;
     found.iter().all(|x| x.is_finite()).then(|| found.iter().copied().collect())
-}
-
-/// A polynomial at a place.
-fn polynomial(coefficients: &[f64], at: f64) -> f64 {
-    coefficients.iter().rev().fold(0.0, |sum, coefficient| sum * at + coefficient)
 }

@@ -17,18 +17,16 @@ impl Scene {
         if let Some(ground) = self.bars.iter().position(|bar| bar.name == GROUND) {
             return Some(format!("bars[{ground}].name: `{GROUND}` is what does not move"));
         }
-        let among = |names: Vec<NamedList>| faulty(&names);
-        among(vec![("bars", self.bars[..self.own_bars()].iter().map(|part| &*part.name).collect())])
-            .or_else(|| {
-                let hinges = self.hinges[..self.own_hinges()].iter();
-                among(vec![("hinges", hinges.map(|part| &*part.name).collect())])
-            })
-            .or_else(|| among(vec![("welds", self.welds.iter().map(|part| &*part.name).collect())]))
-            .or_else(|| among(vec![("walls", self.walls.iter().map(|part| &*part.name).collect())]))
-            .or_else(|| among(vec![("events", self.events.iter().map(|part| &*part.name).collect())]))
-            .or_else(|| among(vec![("points", self.points.iter().map(|part| &*part.name).collect())]))
-            .or_else(|| self.loads().into_iter().find_map(among))
-            .or_else(|| among(self.constraint_names()))
+        let own = [
+            ("bars", self.bars[..self.own_bars()].iter().map(|part| &*part.name).collect()),
+            ("hinges", self.hinges[..self.own_hinges()].iter().map(|part| &*part.name).collect()),
+            ("welds", self.welds.iter().map(|part| &*part.name).collect()),
+            ("walls", self.walls.iter().map(|part| &*part.name).collect()),
+            ("events", self.events.iter().map(|part| &*part.name).collect()),
+            ("points", self.points.iter().map(|part| &*part.name).collect()),
+        ];
+        let kinds = own.map(|list: NamedList| vec![list]).into_iter();
+        kinds.chain(self.loads()).chain([self.constraint_names()]).find_map(|lists| faulty(&lists))
     }
 
     /// Names of what acts with a force or a torque, kind by kind, by numbers and by formulas.

@@ -15,27 +15,11 @@ const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Share of its largest value within which a function is at its zero after a change.
 const AT_ZERO: f64 = 1e-9;
 
-/// What is known of an event that has changed the motion.
-#[derive(Clone, Debug, Default)]
-pub(in crate::run::event) struct Returns {
-    /// The event, and the side of zero to which the new rates take its function.
-    left: Option<(usize, i8)>,
-    /// One whose function was on the other side at once, without an event.
-    pub lost: Option<usize>,
-}
-
-impl Returns {
-    /// The side to which an event was to go after its change, where that is this one; told once.
-    pub fn take_left(&mut self, event: usize) -> Option<i8> {
-        self.left.take_if(|left| left.0 == event).map(|left| left.1)
-    }
-}
-
 impl EventDetector {
     /// Remembers to which side of zero an event from outside goes that has just changed the motion.
     pub fn leave(&mut self, event: usize, motion: &Motion) {
         let side = self.side_ahead(event, motion);
-        self.returns.left = (side != 0).then_some((event, side));
+        self.memory.leaving = (side != 0).then_some((event, side));
     }
 
     /// The side of zero to which the rates take the function of an event from outside that is at its zero; 0
@@ -76,12 +60,12 @@ impl EventDetector {
             |t: Time| self.memory.last.iter().any(|(last, at)| *last == event && (t - *at).hi <= same);
         let mut returns = passages.iter().filter(|passage| passage.event == event && passage.rises == rises);
         if next == -side && self.counts(event, rises) && returns.all(|passage| is_the_last(passage.t)) {
-            self.returns.lost = Some(event);
+            self.lost = Some(event);
         }
     }
 
     /// The name of the event that came true again before that could be told.
     pub fn take_lost(&mut self) -> Option<String> {
-        self.returns.lost.take().map(|event| self.name(event).into())
+        self.lost.take().map(|event| self.name(event).into())
     }
 }
