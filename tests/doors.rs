@@ -721,10 +721,10 @@ fn a_spring_that_loses_its_length_inside_a_step_is_found_by_every_method() {
     }
 }
 
-/// A ball dropped from 1 m, whose event at the ground changes its rate by a factor.
-fn dropped(factor: f64, direction: Direction, request: Request) -> Outcome {
+/// A ball dropped from 1 m.
+fn dropped_ball(gravity: f64) -> Simulation {
     let scene = SceneBuilder::new("ball")
-        .gravity([0.0, -9.81])
+        .gravity([0.0, -gravity])
         .body("b", 1.0, [0.0, 0.0], 0.1, 0.1)
         .start("b", 0.0, 0.0)
         .with("origin", vec![0.0, 1.0])
@@ -732,9 +732,13 @@ fn dropped(factor: f64, direction: Direction, request: Request) -> Outcome {
         .until(6.0, 0.5)
         .build()
         .expect("a scene");
-    let simulation = Simulation::new(&scene).expect("equations").options(request);
-    let site = simulation.site("b", [0.0, 0.0]).expect("a body");
-    let ground = When(
+    Simulation::new(&scene).expect("equations")
+}
+
+/// Its event at the ground, which changes its rate by a factor.
+fn bounce(factor: f64, direction: Direction) -> Box<dyn Event> {
+    let site = dropped_ball(9.81).site("b", [0.0, 0.0]).expect("a body");
+    Box::new(When(
         "ground",
         direction,
         move |at: &Configuration<f64>| at.position(&site)[1],
@@ -743,8 +747,11 @@ fn dropped(factor: f64, direction: Direction, request: Request) -> Outcome {
             next.omega[2] = next.omega[2].scale(factor);
             Action::Change(Change::default().to(next))
         },
-    );
-    simulation.event(ground).run().expect("a run")
+    ))
+}
+
+fn dropped(factor: f64, direction: Direction, request: Request) -> Outcome {
+    dropped_ball(9.81).options(request).boxed_event(bounce(factor, direction)).run().expect("a run")
 }
 
 /// Bounces end at t1 (1 + e)/(1 - e), t1 = sqrt(2 h/g): a run that cannot tell them apart any more stops there, and
@@ -777,6 +784,50 @@ fn events_that_accumulate_stop_the_run() {
     let expected = -0.5 * 9.81 * impact * rest - 0.5 * 9.81 * rest * rest;
     assert_eq!((through.event_count, through.stop.is_none()), (1, true));
     assert!((through.last.phi[2] - expected).abs() < 1e-10, "{:?}", through.last.phi);
+}
+
+/// However slowly the ball is thrown back, it does not fall through the ground.
+#[test]
+fn a_return_that_is_too_soon_is_told_at_any_rate() {
+    for request in every_method() {
+        let method = request.method;
+        if matches!(method, Some(MethodId::Rattle(_))) {
+            continue;
+        }
+        for power in 3..13 {
+            let bounce = bounce(-(10.0_f64.powi(-power)), Direction::Either);
+            let found = dropped_ball(8.0).options(request.clone()).boxed_event(bounce).run().expect("a run");
+            let stop = found.stop.as_ref().map(ToString::to_string).unwrap_or_default();
+            assert!(stop.contains("`ground` comes true again"), "{method:?} 1e-{power}: {stop}");
+            // One more bounce, of 2 v/g, where it can be told.
+            assert!((found.last.t - 0.5).abs() < 1.1 * 10.0_f64.powi(-power) + 1e-7, "{method:?}: {stop}");
+        }
+    }
+}
+
+/// To which side an event leaves zero is remembered where the run pauses at it: a ball that falls 1 m in half a
+/// second, and is thrown back so slowly that it cannot be seen to leave the ground.
+#[test]
+fn an_event_that_comes_true_again_too_soon_does_so_across_a_pause() {
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Gauss(4)] {
+        let request = Request { method: Some(method), ..Request::default() };
+        let simulation = || dropped_ball(8.0).options(request.clone());
+        let bounce = || bounce(-1e-11, Direction::Either);
+        let whole = simulation().boxed_event(bounce()).run().expect("a run");
+        let stop = whole.stop.as_ref().map(ToString::to_string).unwrap_or_default();
+        assert!(stop.contains("`ground` comes true again"), "{method:?}: {stop}");
+        let mut running = Running::new(simulation().boxed_event(bounce()).prepare().expect("a run"));
+        while !running.go(&mut |_| Ok(()), &mut || true).expect("samples") {
+            let bytes = postcard::to_stdvec(&running.snapshot()).expect("bytes");
+            let (snapshot, ball) = (postcard::from_bytes(&bytes).expect("a snapshot"), simulation());
+            running = Running::resume(Arc::clone(ball.mechanism()), &ball.start(), snapshot)
+                .and_then(|running| running.with_events(vec![bounce()]))
+                .expect("it fits");
+        }
+        let pieces = running.finish();
+        assert_eq!((pieces.last, pieces.stop), (whole.last, whole.stop), "{method:?}");
+        assert_eq!(pieces.events, whole.events, "{method:?}");
+    }
 }
 
 /// Asks every step for the motion at a time.

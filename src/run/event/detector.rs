@@ -75,6 +75,8 @@ pub(in crate::run) struct EventDetector {
     pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
     pub(super) undefined: Option<usize>,
+    /// The event from outside whose function left zero to a side, and is on the other one soon in this step.
+    pub(super) returning: Option<(usize, i8)>,
     /// The event from outside that came true again before that could be told.
     pub(super) lost: Option<usize>,
     /// Parts of the last step that were halved.
@@ -118,6 +120,7 @@ impl EventDetector {
             closers,
             tolerance: 0.0,
             undefined: None,
+            returning: None,
             lost: None,
             halvings: Halvings::default(),
             found,
@@ -395,15 +398,16 @@ impl StepWatcher for EventDetector {
         if self.undefined.is_some() || self.halvings.is_too_much() {
             return Some(end);
         }
-        if self.lost.is_some() {
-            return Some(begin);
-        }
         self.memory.woken.clear();
         // In the order of their times for each function.
         let all = passages.clone();
         passages.retain(|passage| self.counts(passage.event, passage.rises));
         for passage in passages.iter_mut().filter(|passage| passage.t > begin && !passage.jumps) {
             passage.t = self.polished(inside, passage);
+        }
+        self.look_for_return((begin, end), &passages);
+        if self.lost.is_some() {
+            return Some(begin);
         }
         let due = std::mem::take(&mut self.memory.due).into_iter();
         let due = due.filter(|&(event, rises)| self.counts(event, rises));

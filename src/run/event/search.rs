@@ -315,9 +315,14 @@ impl EventDetector {
         if leaves {
             *side = sign(part.curve.at(from)[0]);
         }
+        let before = all.len();
         self.zeros(part, event, (from, None), all);
-        if let Some(goes_to) = goes_to {
-            self.look_for_return(inside.span(), event, [goes_to, sign(next)], all);
+        // Where rounding has it on the other side of the zero it leaves.
+        if goes_to.is_some_and(|side| all.get(before).is_some_and(|first| first.rises == (side > 0))) {
+            all.remove(before);
+        }
+        if let Some(goes_to) = goes_to.filter(|goes_to| sign(next) == -goes_to) {
+            self.returning = Some((event, goes_to));
         }
         if part.is_last {
             self.end_at_zero(part, event, inside.span().1, all);

@@ -5,13 +5,15 @@ use super::{EventDetector, Owner, SAME};
 use crate::arithmetic::Scalar;
 use crate::dynamics::{Motion, Time};
 use crate::run::event::search::Passage;
+use crate::run::rounding::last_digits;
 use crate::stepping::search::sign;
 
 /// Part of the time in which a coordinate moves by its unit over which an event function is differenced.
 const BESIDE: f64 = 1.0 / 1024.0;
-/// What a rate must be over the error of its differences, and over their rounding, to have a sign.
+/// What a rate must be over the error of its differences, and over what last digits make of them, to have a
+/// sign.
 const ERROR: f64 = 0.01;
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+const DIGITS: f64 = 8.0;
 /// Share of its largest value within which a function is at its zero after a change.
 const AT_ZERO: f64 = 1e-9;
 
@@ -32,34 +34,33 @@ impl EventDetector {
             .map(|(k, omega)| omega.hi.abs() / if k < angles { 1.0 } else { units.length })
             .fold(1.0 / units.time, f64::max);
         let span = BESIDE / fastest;
-        let at = |ahead: f64| {
+        let value = |motion: &Motion| self.mechanism.seen(motion, |at| self.events[number].value(at));
+        let ahead = |ahead: f64| {
             let mut there = motion.clone();
             there.time = motion.time + ahead;
             for (phi, omega) in there.phi.iter_mut().zip(&motion.omega) {
                 *phi += omega.scale(ahead);
             }
-            self.mechanism.seen(&there, |at| self.events[number].value(at))
+            there
         };
+        let at = |time: f64| value(&ahead(time));
         let [fine, coarse] = [span, 2.0 * span].map(|span| (at(span) - at(-span)) / (2.0 * span));
-        let (rate, largest) = (fine + (fine - coarse) / 3.0, self.memory.largest[event]);
-        let off = ERROR * (fine - coarse).abs() + ROUNDING * largest / span;
-        if at(0.0).abs() <= AT_ZERO * largest && rate.abs() > off { sign(rate) } else { 0 }
+        let rate = fine + (fine - coarse) / 3.0;
+        let rounding = last_digits(&ahead(span), |motion| vec![value(motion)])[0];
+        let off = ERROR * (fine - coarse).abs() + DIGITS * rounding / span;
+        let is_at_zero = at(0.0).abs() <= AT_ZERO * self.memory.largest[event];
+        if is_at_zero && rate.abs() > off { sign(rate) } else { 0 }
     }
 
-    /// Looks whether the return of a function that left zero to a side, and is on the side `next` after it,
-    /// is among the passages of a step.
-    pub(in crate::run::event) fn look_for_return(
-        &mut self,
-        (begin, end): (Time, Time),
-        event: usize,
-        [side, next]: [i8; 2],
-        passages: &[Passage],
-    ) {
+    /// Looks whether the return of a function that left zero to a side, and is on the other one after it, is
+    /// among the passages of a step, which are located.
+    pub(super) fn look_for_return(&mut self, (begin, end): (Time, Time), passages: &[Passage]) {
+        let Some((event, side)) = self.returning.take() else { return };
         let (rises, same) = (side < 0, SAME * (end - begin).hi);
         let is_the_last =
             |t: Time| self.memory.last.iter().any(|(last, at)| *last == event && (t - *at).hi <= same);
         let mut returns = passages.iter().filter(|passage| passage.event == event && passage.rises == rises);
-        if next == -side && self.counts(event, rises) && returns.all(|passage| is_the_last(passage.t)) {
+        if self.counts(event, rises) && returns.all(|passage| is_the_last(passage.t)) {
             self.lost = Some(event);
         }
     }
