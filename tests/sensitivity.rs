@@ -725,6 +725,32 @@ fn short_runs_and_slow_growth_are_undecided() {
     assert_eq!(regime(&template(&rotor.replace("\"TORQUE\"", "0")), 60.0), Regime::Regular);
 }
 
+/// A light bar that floats at the end of another one, near the rate at which large torques cancel: accelerations
+/// are small beside what they are sums of, and differences of them by a number noise.  The values are
+/// differences of runs with thirty digits.
+#[test]
+fn what_cancels_in_accelerations_is_derived() {
+    let text = r#"{"name": "cancelling", "gravity": [0, -9.8125],
+        "bars": [{"name": "b1", "mass": 0.015625, "centre": [0.3125, 0], "inertia": 0.0009765625, "length": 0.453125},
+                 {"name": "b2", "mass": 0.296875, "centre": [0.171875, -0.0625], "inertia": 0.08203125, "length": 0.5}],
+        "hinges": [{"name": "H1", "between": [{"body": "b1", "point": [0.453125, 0]}, {"body": "b2", "point": [0, 0]}]}],
+        "torques": [{"name": "Q0", "body": "b1", "torque": "-0.125*b1.omega*abs(b1.omega)"},
+                    {"name": "QI", "body": "b1", "torque": "2*I-0.25*b1.omega"}],
+        "integrals": {"I": "0.25-b1.sin"},
+        "start": {"b1": {"phi": 0.09375, "omega": -1.0625, "origin": [-0.25, 0.34375], "velocity": [-0.125, -0.109375]},
+                  "b2": {"phi": 0.734375, "omega": 0.125}}, "until": 3, "every": 3}"#;
+    let [inertia, mass] = ["bars.b1.inertia", "bars.b1.mass"];
+    for to in [&[inertia, mass][..], &[inertia], &[mass]] {
+        let found = derived(&template(text), &["b2.phi"], to, 3.0);
+        for (input, slope) in found.inputs.iter().zip(&found.measures[0].slopes) {
+            let expected = if input.path == mass { -0.8896126338 } else { 0.0258955082 };
+            assert_near(*slope, expected, 1e-8, &input.path);
+        }
+        // Steps divided by noise would be thousands.
+        assert!(found.steps[1] < 2000, "{:?}", found.steps);
+    }
+}
+
 #[test]
 fn bands_and_covariances_follow_from_the_jacobian() {
     let request = SensitivityRequest {

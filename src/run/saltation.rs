@@ -72,7 +72,7 @@ impl Delta<'_> {
             let values: Option<Vec<_>> = list.iter().map(of).collect();
             Some(Difference::of(values?, here, *far))
         })
-        .map(|(slopes, _)| slopes)
+        .map(|agreed| agreed.slopes)
     }
 }
 

@@ -72,7 +72,7 @@ impl Side {
             let h = longest * f64::powi(FINER, level as i32);
             Some(Difference::of(self.beside(column, late, h, value)?, &[], place / h))
         })
-        .map(|(slopes, _)| slopes)
+        .map(|agreed| agreed.slopes)
     }
 
     /// Values at the places of a difference of a length, with their weights.

@@ -34,6 +34,18 @@ pub(super) struct Tails {
     pub rough: f64,
 }
 
+/// How far a column need not be resolved.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct ColumnLimits {
+    /// Size below which it need not be.
+    pub floor: f64,
+    /// What rounding leaves of its forcing.
+    pub noise: f64,
+}
+
+/// What coefficients take of noise at the nodes, at most.
+const NOISE: f64 = 4.0;
+
 /// The method with its scratch space.
 pub(super) struct Collocation {
     /// Nodes in a step of length 1.
@@ -64,14 +76,13 @@ impl Collocation {
     /// Solves for a step of columns (dq, dw) of n coordinates; `pull` has B and C at the nodes, n × 2n row by
     /// row, one node after the other, `forcing` F of every column, node by node, empty for columns without.
     ///
-    /// `floors` are sizes of columns below which they need not be resolved.  `None` where there is no
-    /// solution.
+    /// `limits` are how far columns need not be resolved.  `None` where there is no solution.
     pub fn solve(
         &mut self,
         (h, unit): (f64, f64),
         pull: &[f64],
         columns: &[Vec<f64>],
-        (forcing, floors): (&[Vec<f64>], &[f64]),
+        (forcing, limits): (&[Vec<f64>], &[ColumnLimits]),
     ) -> Option<Tails> {
         let mut tails = Tails::default();
         let Some(n) = columns.first().map(|column| column.len() / 2) else { return Some(tails) };
@@ -82,11 +93,12 @@ impl Collocation {
         }
         let Self { last, system, .. } = self;
         let stage = |i: usize, row: usize, k: usize| system[(i * n + row) * width + size + k];
-        for (k, (column, floor)) in columns.iter().zip(floors).enumerate() {
+        for (k, (column, &ColumnLimits { floor, noise })) in columns.iter().zip(limits).enumerate() {
             let (mut left, mut earlier, mut whole, mut rates) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
             for row in 0..n {
                 let part = |last: &[f64]| (0..STAGES).map(|i| last[i] * stage(i, row, k)).sum::<f64>().abs();
                 let [before, but_one, highest] = last.each_ref().map(|last| part(last));
+                let highest = (highest - NOISE * noise).max(0.0);
                 (left, earlier) = (left.max(highest), earlier.max(before).max(but_one));
                 let most = (0..STAGES).fold(0.0, |most: f64, i| most.max(stage(i, row, k).abs()));
                 let rate = (h * most).max(column[n + row].abs());
@@ -180,7 +192,7 @@ mod tests {
                 let forcing =
                     method.nodes.iter().map(|node| libm::cos((k as f64 + node) * h)).collect::<Vec<_>>();
                 let pull = [-4.0, 0.0].repeat(STAGES);
-                let tails = method.solve((h, 1.0), &pull, &columns, (&[forcing], &[0.0]));
+                let tails = method.solve((h, 1.0), &pull, &columns, (&[forcing], &[ColumnLimits::default()]));
                 assert!(tails.is_some_and(|tails| tails.last < 1.0));
                 method.take(h, &mut columns);
             }

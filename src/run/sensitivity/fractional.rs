@@ -9,7 +9,7 @@
 //! known at both ends; what is left without it meets the zero when the motion does, and its equation has no
 //! pole there.  The steps of the motion end at such zeros, as branches of formulas change there.
 
-use super::collocation::{STAGES, Tails};
+use super::collocation::{ColumnLimits, STAGES, Tails};
 use super::variation::{LIMIT, Variation, plain};
 use crate::dynamics::kernel::{Bias, Kernel, dot};
 use crate::dynamics::{Motion, Time};
@@ -33,7 +33,7 @@ impl Variation {
         &mut self,
         step: &mut Step,
         h: f64,
-        (floors, tails): (&[f64], Tails),
+        (limits, tails): (&[ColumnLimits], Tails),
     ) -> Option<f64> {
         let laws = self.mechanism.laws.as_ref();
         if !laws.is_some_and(|laws| laws.formulas.switches()) {
@@ -62,10 +62,10 @@ impl Variation {
             self.rough = self.rough.max(tails.rough);
             return None;
         }
-        let (mut columns, mut shares, mut sizes) = (self.columns.clone(), Vec::new(), floors.to_vec());
+        let (mut columns, mut shares, mut sizes) = (self.columns.clone(), Vec::new(), limits.to_vec());
         for (column, whole) in columns.iter_mut().zip(&mut sizes) {
             let share = (0..n).map(|k| row[k] * (column[k] + after * column[n + k])).sum::<f64>() / speed;
-            *whole += size(&column[n..]).max(size(column) / unit);
+            whole.floor += size(&column[n..]).max(size(column) / unit);
             column.iter_mut().zip(begin).for_each(|(entry, ahead)| *entry -= share * ahead);
             shares.push(share);
         }
@@ -74,7 +74,7 @@ impl Variation {
         let resolved = found.filter(|found| found.rough <= RESOLVED && found.last <= LIMIT);
         let Some(found) = resolved else {
             // The solution that was tried first.
-            let _ = self.method.solve((h, unit), &self.pull, &self.columns, (&self.forcing, floors));
+            let _ = self.method.solve((h, unit), &self.pull, &self.columns, (&self.forcing, limits));
             let is_long = h > SHORTEST * (step.end() - step.begin());
             if found.is_some() && !is_long {
                 self.rough = self.rough.max(tails.rough);
@@ -86,7 +86,7 @@ impl Variation {
         let steepest = |node: &[f64]| node.chunks_exact(2 * n).map(size).fold(0.0, f64::max);
         let off = [nodes.clone().next(), nodes.last()].into_iter().flatten().map(steepest).zip(&sides);
         let off = off.map(|(steepest, (_, phi))| f64::EPSILON * phi * steepest).fold(0.0, f64::max);
-        let each = shares.iter().zip(&sizes).map(|(share, whole)| (share * off).abs() / whole);
+        let each = shares.iter().zip(&sizes).map(|(share, whole)| (share * off).abs() / whole.floor);
         self.rough += each.filter(|each| each.is_finite()).fold(found.rough, f64::max);
         self.method.take(h, &mut columns);
         for (column, share) in columns.iter_mut().zip(shares) {

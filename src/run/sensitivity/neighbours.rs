@@ -73,6 +73,8 @@ pub(in crate::run) struct Neighbours {
     /// Size of a column \[rad/s, m/s\] below which steps need not resolve it to its own accuracy: what moves
     /// it is known to a share of 1e-11 of what changes of the number by its own size do.
     pub floor: f64,
+    /// What rounding leaves of derivatives since somebody last set it to zero, at most.
+    pub noise: f64,
 }
 
 impl Neighbours {
@@ -130,7 +132,7 @@ impl Neighbours {
             let DistanceLevel { far, list } = &all[level];
             Some(Difference::of(list.iter().map(of), &[], *far))
         });
-        let mut start = start.map_or_else(|| vec![0.0; 2 * n], |(start, _)| start);
+        let mut start = start.map_or_else(|| vec![0.0; 2 * n], |agreed| agreed.slopes);
         if scale >= NEAR_ZERO && does_nothing {
             // What there is is rounding, which would grow with time.
             start.fill(0.0);
@@ -150,7 +152,7 @@ impl Neighbours {
         };
         let levels = levels.map(level).collect();
         let unit = base.units.length.min(1.0) / base.units.time;
-        Self { levels, start, error, floor: SMALL * unit / scale }
+        Self { levels, start, error, floor: SMALL * unit / scale, noise: 0.0 }
     }
 
     /// Takes neighbours for parameters, by number, that events have set in `mechanism` with these derivatives
@@ -191,16 +193,17 @@ impl Neighbours {
 
     /// The derivative of what a function tells of each neighbour; `None` where there are none.
     pub fn derivative(&mut self, mut value: impl FnMut(&mut Neighbour) -> Vec<f64>) -> Option<Vec<f64>> {
-        let Self { levels, error, .. } = self;
+        let Self { levels, error, noise, .. } = self;
         let mut of = |neighbour: &mut Neighbour| (neighbour.weight, value(neighbour));
-        let (slopes, finest) = agreeing(levels.len(), |level| {
+        let agreed = agreeing(levels.len(), |level| {
             let DistanceLevel { far, list } = levels.get_mut(level)?;
             Some(Difference::of(list.iter_mut().map(&mut of), &[], *far))
         })?;
-        if finest > 0 {
-            *error = error.max(ROUNDING * levels[finest].far);
+        if agreed.finest > 0 {
+            *error = error.max(ROUNDING * levels[agreed.finest].far);
         }
-        Some(slopes)
+        *noise = noise.max(agreed.noise);
+        Some(agreed.slopes)
     }
 
     /// Goes on with the parts that act, the contacts held and the branches of a mechanism, and with the

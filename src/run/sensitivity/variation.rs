@@ -19,7 +19,7 @@
 use super::super::contact::{ContactDriver, JumpLog};
 use super::super::observer::{Observer, ObserverAdapter, Step};
 use super::super::trust::Ground;
-use super::collocation::{Collocation, STAGES};
+use super::collocation::{Collocation, ColumnLimits, STAGES};
 use super::crossing::SetNumbers;
 use super::expanded::{self, Expansions};
 use super::fractional;
@@ -297,11 +297,14 @@ impl Variation {
         self.look_at_nodes(step, h);
         let unit = self.mechanism.units.time;
         let Self { method, pull, columns, forcing, neighbours, .. } = self;
-        let floor = |neighbours: &Option<Neighbours>| neighbours.as_ref().map_or(0.0, |some| some.floor);
-        let floors: Vec<f64> = neighbours.iter().map(floor).collect();
-        let Some(tails) = method.solve((h, unit), pull, columns, (forcing, &floors)) else { return f64::NAN };
+        let limit = |neighbours: &Option<Neighbours>| {
+            let of = |&Neighbours { floor, noise, .. }: &Neighbours| ColumnLimits { floor, noise };
+            neighbours.as_ref().map(of).unwrap_or_default()
+        };
+        let limits: Vec<ColumnLimits> = neighbours.iter().map(limit).collect();
+        let Some(tails) = method.solve((h, unit), pull, columns, (forcing, &limits)) else { return f64::NAN };
         if tails.rough > fractional::RESOLVED
-            && let Some(tail) = self.fractional_step(step, h, (&floors, tails))
+            && let Some(tail) = self.fractional_step(step, h, (&limits, tails))
         {
             return tail;
         }
@@ -315,6 +318,7 @@ impl Variation {
     fn look_at_nodes(&mut self, step: &mut Step, h: f64) {
         let n = self.mechanism.coordinates();
         self.pull.clear();
+        self.neighbours.iter_mut().flatten().for_each(|neighbours| neighbours.noise = 0.0);
         let forcing = self.forcing.iter_mut();
         forcing.zip(&self.neighbours).for_each(|(forcing, neighbours)| {
             let acts = neighbours.as_ref().is_some_and(|neighbours| !neighbours.levels.is_empty());
