@@ -751,6 +751,25 @@ fn what_cancels_in_accelerations_is_derived() {
     }
 }
 
+/// Small differences of `free` grow tenfold in 1.54 s: those of the tolerance, 1e-14, are 1e-3 rad before 20 s.
+#[test]
+fn beyond_the_horizon_there_are_no_derivatives() {
+    let request = SensitivityRequest {
+        of: vec!["bar2.phi".parse().expect("a measure")],
+        to: vec!["bars.bar1.length".into()],
+        at: Some(40.0),
+        every: Some(1.0),
+        ..SensitivityRequest::default()
+    };
+    let found = sensitivity(&example("free"), &request, &mut || false).expect("sensitivities");
+    let measure = &found.measures[0];
+    let why = measure.why.as_ref().expect("a reason");
+    assert!(why.contains("not known any more") && measure.slopes.is_empty(), "{why}");
+    let last = found.rows.last().expect("rows").t;
+    assert!((13.0..22.0).contains(&last), "the last row is at {last} s");
+    assert!(found.lost.as_ref().is_some_and(|lost| lost.starts_with(&format!("at {} s", last + 1.0))));
+}
+
 #[test]
 fn bands_and_covariances_follow_from_the_jacobian() {
     let request = SensitivityRequest {
