@@ -925,9 +925,16 @@ fn forces_without_bound_at_singular_positions_are_told() {
         "motors": [{"name": "M", "body": "a", "law": {"start": 0.3, "rate": 5.0}}],
         "outputs": {"T": "M.torque", "FB": "B.force", "x": "b.x"},
         "start": {"a": {"phi": 0.3}, "b": {"phi": 0}, "c": {"phi": 0.3}}, "until": 1, "every": 0.01}"#;
-    let mut scene = parse_scene(text, "scene", &[]).expect("a scene");
     let fold = (PI - 0.3) / 5.0;
-    for until in [1.0, fold] {
+    let resting = [
+        r#"{"name": "box", "mass": 1, "centre": [0, 0], "inertia": 0.1}, {"name": "a","#,
+        r#""walls": [{"name": "w", "body": "box", "point": [0, 0], "restitution": 0,
+            "line": {"through": [0, 0], "normal": [0, 1]}}],
+           "start": {"box": {"phi": 0, "omega": 0, "origin": [9, 0], "velocity": [0, 0]},"#,
+    ];
+    let resting = text.replace(r#"{"name": "a","#, resting[0]).replace(r#""start": {"#, resting[1]);
+    for (text, until) in [text, &resting].into_iter().flat_map(|text| [(text, 1.0), (text, fold)]) {
+        let mut scene = parse_scene(text, "scene", &[]).expect("a scene");
         (scene.until, scene.every) = (until, until);
         let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-9));
         let [torque, force] = ["T", "FB"].map(|name| found(&outcome.extremes, name));

@@ -119,6 +119,15 @@ impl Metric {
         }
     }
 
+    /// The metric of the first constraints alone, so many of them.
+    pub fn first(&self, rows: usize) -> Self {
+        let mut metric = self.clone();
+        metric.bounds.levers.truncate(rows);
+        metric.bounds.open.retain(|&row| row < rows);
+        metric.rows.truncate(rows);
+        metric
+    }
+
     /// The verdict on constraints with this Jacobian (r × columns).
     pub fn judge<T: Real>(&self, jacobian: &[T]) -> RankVerdict {
         let (r, n) = (self.rows.len(), self.columns.len());
@@ -251,6 +260,11 @@ impl RankVerdict {
     /// The least share.
     pub fn share(&self) -> f64 {
         self.weakest.share
+    }
+
+    /// The constraint of the least share.
+    pub fn weakest(&self) -> Weakest {
+        self.weakest
     }
 
     /// The least share of the constraints that are not left out.

@@ -112,11 +112,18 @@ impl ConstraintEquation {
 }
 
 impl Mechanism {
-    /// The share of the weakest constraint after an evaluation; infinite where points rest or places stick:
-    /// with these, constraints may depend on each other without a singular position.
+    /// The share of the weakest constraint after an evaluation; where points rest or places stick, of the
+    /// scene's own ones: with the others, constraints may depend on each other without a singular position.
     pub fn standing_share(&self, kernel: &Kernel<f64>) -> f64 {
-        let is_standing = self.standing_rows() == self.constraints.len();
-        if is_standing { kernel.weakest.share } else { f64::INFINITY }
+        self.standing_weakest(kernel).share
+    }
+
+    /// The constraint of that share.
+    pub fn standing_weakest(&self, kernel: &Kernel<f64>) -> Weakest {
+        let (standing, weakest) = (self.standing_rows(), kernel.weakest);
+        // Among fewer constraints no pivot is smaller.
+        let is_own = standing == self.constraints.len() || weakest.share >= NEAR;
+        if is_own { weakest } else { kernel.judge_first(standing).weakest() }
     }
 
     /// True after an evaluation at a singular position of the way: what constraints exert there is the limit

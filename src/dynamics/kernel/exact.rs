@@ -91,6 +91,15 @@ impl<T: Real> Kernel<T> {
         }
     }
 
+    /// How independent the first constraints are among themselves, so many of them, in the last evaluation.
+    pub fn judge_first(&self, rows: usize) -> RankVerdict {
+        let metric = self.metric.first(rows);
+        match &self.bodywise {
+            Some(bodywise) => metric.judge(&bodywise.jacobian(rows, metric.columns.len())),
+            None => metric.judge(&self.jacobian[..rows * metric.columns.len()]),
+        }
+    }
+
     /// The largest C of the last evaluation, angles in rad and lengths in sizes of the mechanism.
     pub fn violation(&self, mechanism: &Mechanism) -> f64 {
         let size = mechanism.size_of_parts();

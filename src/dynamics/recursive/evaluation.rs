@@ -217,6 +217,15 @@ impl<T: Real> Evaluation<T> {
         self.rows.judge(&self.recursion.ways)
     }
 
+    /// The Jacobian of the first constraints by so many coordinates, after [`rows_at`](Self::rows_at).
+    pub fn jacobian(&self, rows: usize, coordinates: usize) -> Vec<T> {
+        let mut jacobian = vec![T::ZERO; rows * coordinates];
+        for (row, entries) in (0..rows).zip(jacobian.chunks_exact_mut(coordinates)) {
+            self.gradient(row).for_each(|(k, g)| entries[k] = g);
+        }
+        jacobian
+    }
+
     /// Replaces x by S⁻¹ x.
     pub fn solve_rows(&mut self, x: &mut [T]) {
         self.rows.solve(&self.recursion.ways, x);

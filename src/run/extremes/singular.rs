@@ -156,7 +156,7 @@ impl ExtremesDetector {
             if least.0 < passage.least[0] {
                 self.share(inside.at(least.1));
                 passage.least = [least.0, least.1.hi, self.mechanism.conditioning(&self.kernel)];
-                passage.weakest = self.kernel.weakest.row;
+                passage.weakest = self.mechanism.standing_weakest(&self.kernel).row;
             }
             for after in (0..BESIDE).map(|i| span * f64::from(-i).exp2().powf(1.0 / f64::from(IN_OCTAVE))) {
                 for t in [least.1 + -after, least.1 + after].into_iter().filter(|t| *t > from && *t < to) {
