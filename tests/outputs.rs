@@ -933,7 +933,18 @@ fn forces_without_bound_at_singular_positions_are_told() {
            "start": {"box": {"phi": 0, "omega": 0, "origin": [9, 0], "velocity": [0, 0]},"#,
     ];
     let resting = text.replace(r#"{"name": "a","#, resting[0]).replace(r#""start": {"#, resting[1]);
-    for (text, until) in [text, &resting].into_iter().flat_map(|text| [(text, 1.0), (text, fold)]) {
+    // A bar on two pins: one of the four constraints depends on the others.
+    let pinned = [
+        r#"{"name": "d", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}, {"name": "a","#,
+        r#""hinges": [{"name": "Y", "between": [{"body": "ground", "point": [9, 0]},
+            {"body": "d", "point": [0, 0]}]},
+           {"name": "Z", "between": [{"body": "ground", "point": [10, 0]}, {"body": "d", "point": [1, 0]}]},"#,
+        r#""start": {"d": {"phi": 0},"#,
+    ];
+    let pinned = (text.replace(r#"{"name": "a","#, pinned[0]))
+        .replace(r#""hinges": ["#, pinned[1])
+        .replace(r#""start": {"#, pinned[2]);
+    for (text, until) in [text, &resting, &pinned].into_iter().flat_map(|text| [(text, 1.0), (text, fold)]) {
         let mut scene = parse_scene(text, "scene", &[]).expect("a scene");
         (scene.until, scene.every) = (until, until);
         let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-9));

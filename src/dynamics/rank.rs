@@ -80,6 +80,8 @@ pub struct RankVerdict {
     pub is_left_out: Vec<bool>,
     /// True where the largest pivots tell them, and not the order.
     is_pivoted: bool,
+    /// True where some are dependent everywhere.
+    has_redundant: bool,
 }
 
 impl Metric {
@@ -168,10 +170,19 @@ impl Metric {
         let is_left_out: Vec<bool> = shares.iter().map(|&share| is_dependent(share)).collect();
         let is_kept = |(row, _): &(usize, &f64)| !is_left_out[*row];
         let kept = shares.iter().enumerate().filter(is_kept).fold(Weakest::NONE, least);
-        // Constraints that are redundant everywhere say nothing of the position.
+        // Constraints that are redundant everywhere say nothing of the position: their shares are the least.
         let is_singular = is_left_out.iter().filter(|&&is_left_out| is_left_out).count() > self.redundant;
-        let weakest = if is_singular { shares.iter().enumerate().fold(Weakest::NONE, least) } else { kept };
-        RankVerdict { weakest, kept: kept.share, is_left_out, is_pivoted: false }
+        let weakest = match is_singular {
+            true => {
+                let size = |&row: &usize| if shares[row].is_nan() { f64::INFINITY } else { shares[row] };
+                let mut rows: Vec<usize> = (0..shares.len()).collect();
+                rows.sort_by(|one, other| size(one).total_cmp(&size(other)));
+                rows.get(self.redundant).map_or(kept, |row| least(Weakest::NONE, (*row, &shares[*row])))
+            }
+            false => kept,
+        };
+        let has_redundant = self.redundant > 0;
+        RankVerdict { weakest, kept: kept.share, is_left_out, is_pivoted: false, has_redundant }
     }
 }
 
@@ -309,7 +320,8 @@ impl RankVerdict {
         if !is_right {
             again(None);
         }
-        Weakest { is_near, ..mass }
+        // The least of all pivots may be that of a constraint that is redundant everywhere.
+        Weakest { is_near, ..if self.has_redundant { self.weakest } else { mass } }
     }
 }
 

@@ -127,9 +127,9 @@ impl Mechanism {
     }
 
     /// True after an evaluation at a singular position of the way: what constraints exert there is the limit
-    /// along the motion, which the state alone does not tell.
+    /// along the motion, which the state alone does not tell.  Of a start there, they are those of least norm.
     pub fn hides_forces(&self, kernel: &Kernel<f64>) -> bool {
-        !self.leaves_forces_open() && self.standing_share(kernel) < SINGULAR
+        self.assembly.singular.is_empty() && self.standing_share(kernel) < SINGULAR
     }
 
     /// The scale of every row, see [`ConstraintEquation::scale`].
