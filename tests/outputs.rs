@@ -884,14 +884,19 @@ fn forces_at_singular_positions_are_limits_along_the_motion() {
         let along = -4.0 * length * rate.powi(2);
         let moment = 0.15 * (g - rate.powi(2) * 0.15 * sin) - 0.15 * sin * 0.45 * rate.powi(2);
         let across = -(moment + length * sin * along) / length;
-        [(2.0 * g - across).abs(), (along * cos).hypot(across)]
+        let normal = (2.0 * g - across).abs();
+        let twice = if 0.3 + rate * t < 1.55 { normal } else { 2.0 * normal };
+        [normal, (along * cos).hypot(across), twice, (along * cos).abs()]
     };
     let steps = 100_000;
-    let rows: Vec<[f64; 2]> = (0..=steps).map(|i| forces(f64::from(i) / f64::from(steps))).collect();
-    let scene = parse_scene(EQUAL_SLIDER_CRANK, "scene", &[]).expect("a scene");
+    let rows: Vec<[f64; 4]> = (0..=steps).map(|i| forces(f64::from(i) / f64::from(steps))).collect();
+    let more = r#""outputs": {"jump": "if(a.phi < 1.55, 1, 2)*s.force", "size": "abs(B.fx)","#;
+    let text = EQUAL_SLIDER_CRANK.replace(r#""outputs": {"#, more);
+    let scene = parse_scene(&text, "scene", &[]).expect("a scene");
     for (method, rtol) in [(MethodId::Taylor, 1e-9), (MethodId::Radau(5), 1e-9), (MethodId::Dp8, 1e-11)] {
         let outcome = run(&scene, &adaptive(method, rtol));
-        for (k, name) in ["S", "FB"].into_iter().enumerate() {
+        assert!(found(&outcome.extremes, "size").min[0] >= 0.0, "{method:?}");
+        for (k, name) in ["S", "FB", "jump", "size"].into_iter().enumerate() {
             let told = found(&outcome.extremes, name);
             let values = || rows.iter().map(|row| row[k]);
             let mean = values().sum::<f64>() / f64::from(steps);
@@ -900,8 +905,10 @@ fn forces_at_singular_positions_are_limits_along_the_motion() {
                 (told.max[0], values().fold(0.0, f64::max)),
                 (told.mean, mean - 0.5 * (rows[0][k] + rows[steps as usize][k]) / f64::from(steps)),
             ] {
-                // The least magnitude is a zero between two of the times.
-                assert!((value - expected).abs() < 4e-4, "{method:?} {name}: {value} for {expected}");
+                // The least magnitude is a zero between two of the times; beside a singular position the dense
+                // output of Radau's method has few digits.
+                let most = if name == "jump" && method == MethodId::Radau(5) { 0.05 } else { 4e-4 };
+                assert!((value - expected).abs() < most, "{method:?} {name}: {value} for {expected}");
             }
         }
         let nearest = outcome.drift.singular.as_ref().expect("a singular position");
@@ -923,7 +930,7 @@ fn forces_without_bound_at_singular_positions_are_told() {
         {"name": "B", "between": [{"body": "b", "point": [0.5, 0]}, {"body": "c", "point": [0.2, 0]}]},
         {"name": "C", "between": [{"body": "ground", "point": [0.5, 0]}, {"body": "c", "point": [0, 0]}]}],
         "motors": [{"name": "M", "body": "a", "law": {"start": 0.3, "rate": 5.0}}],
-        "outputs": {"T": "M.torque", "FB": "B.force", "x": "b.x"},
+        "outputs": {"T": "M.torque", "FB": "B.force", "x": "b.x", "y": "B.fx"},
         "start": {"a": {"phi": 0.3}, "b": {"phi": 0}, "c": {"phi": 0.3}}, "until": 1, "every": 0.01}"#;
     let fold = (PI - 0.3) / 5.0;
     let resting = [
@@ -944,7 +951,10 @@ fn forces_without_bound_at_singular_positions_are_told() {
     let pinned = (text.replace(r#"{"name": "a","#, pinned[0]))
         .replace(r#""hinges": ["#, pinned[1])
         .replace(r#""start": {"#, pinned[2]);
-    for (text, until) in [text, &resting, &pinned].into_iter().flat_map(|text| [(text, 1.0), (text, fold)]) {
+    for (text, until) in [text, &resting, &pinned]
+        .into_iter()
+        .flat_map(|text| [(text, 1.0), (text, fold), (text, fold + 1e-3)])
+    {
         let mut scene = parse_scene(text, "scene", &[]).expect("a scene");
         (scene.until, scene.every) = (until, until);
         let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-9));
@@ -952,7 +962,63 @@ fn forces_without_bound_at_singular_positions_are_told() {
         assert!((torque.min[0] + 5.886).abs() < 1e-6 && (torque.min[1] - fold).abs() < 1e-6, "{torque:?}");
         assert!(force.max[0] == f64::INFINITY && (force.max[1] - fold).abs() < 1e-6, "{force:?}");
         assert!(force.mean == f64::INFINITY && force.rms == f64::INFINITY && force.min[0] > 0.0, "{force:?}");
+        // Along the coupler it changes its sense.
+        let along = found(&outcome.extremes, "y");
+        let is_passed = along.min[0] == f64::NEG_INFINITY && along.max[0] == f64::INFINITY;
+        assert!(is_passed || until == fold, "{along:?}");
         let is_known = outcome.last.outputs.iter().map(|value| value.is_finite()).collect::<Vec<_>>();
-        assert_eq!(is_known, [until == 1.0, until == 1.0, true]);
+        let is_beside = until != fold;
+        assert_eq!(is_known, [is_beside, is_beside, true, is_beside]);
     }
+}
+
+/// A rod that is longer than its crank by 6e-9 m turns back within 2e-4 rad of the singular position, where
+/// forces have peaks of thousands of N: those of the way through are no answer.
+#[test]
+fn forces_of_a_near_miss_are_not_those_of_a_singular_position() {
+    let longer = 0.300_000_006;
+    let rod = -(0.3 * 0.3_f64.sin() / longer).asin();
+    let text = EQUAL_SLIDER_CRANK
+        .replace(
+            r#"{"body": "b", "point": [0.3, 0]}"#,
+            &format!(r#"{{"body": "b", "point": [{longer}, 0]}}"#),
+        )
+        .replace(r#""b": {"phi": -0.3}"#, &format!(r#""b": {{"phi": {rod}}}"#))
+        .replace(r#""until": 1"#, r#""until": 0.5"#);
+    let outcome = run(&parse_scene(&text, "scene", &[]).expect("a scene"), &adaptive(MethodId::Taylor, 1e-9));
+    for name in ["T", "S", "FB"] {
+        let told = found(&outcome.extremes, name);
+        assert!(told.min[0].is_nan() && told.max[0].is_nan() && told.rms.is_nan(), "{told:?}");
+    }
+    assert!(found(&outcome.extremes, "x").max[0] < 0.6);
+}
+
+/// The least force in a hinge lies 0.007 rad beside the position where it is without bound; rows tell it.
+#[test]
+fn extremes_beside_a_pole_are_found() {
+    let text = EQUAL_SLIDER_CRANK
+        .replace(r#""gravity": [0, -9.81]"#, r#""gravity": [0, 0]"#)
+        .replace(
+            r#"{"name": "b", "mass": 1, "centre": [0.15, 0]"#,
+            r#"{"name": "b", "mass": 1, "centre": [0.15, 0.01]"#,
+        )
+        .replace(r#""T": "M.torque""#, r#""FA": "A.force""#)
+        .replace(r#""until": 1"#, r#""until": 0.3"#);
+    let scene = parse_scene(&text, "scene", &[]).expect("a scene");
+    let outcome = run(&scene, &adaptive(MethodId::Taylor, 1e-9));
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let request = Request { every: Some(2e-5), ..Request::default() };
+    let plan = Plan::new(&scene, &mechanism, &request).expect("a plan");
+    let rows = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &mechanism.start(&scene));
+    let mut least = f64::INFINITY;
+    integrate(rows.expect("a run"), &mut |sample| {
+        least = least.min(sample.outputs[0]);
+        Ok(())
+    })
+    .expect("samples");
+    let told = found(&outcome.extremes, "FA");
+    assert!(
+        (least - 5e-3..=least).contains(&told.min[0]) && told.max[0] == f64::INFINITY,
+        "{told:?} {least}"
+    );
 }

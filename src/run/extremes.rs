@@ -8,6 +8,7 @@
 
 mod found;
 mod irregular;
+mod limits;
 mod parts;
 mod singular;
 

@@ -9,16 +9,20 @@
 //! ```
 //!
 //! While a singular position is near, the outputs are remembered; once it is passed, those that follow from
-//! the equations count as the polynomials tell, and are not known where two degrees differ.
+//! the equations count as the polynomials tell, and are not known where two degrees differ.  Where
+//! they do, or an output is without bound, that is so in the core only, where constraints are nearly left out;
+//! around it outputs are searched as everywhere.
+//!
+//! A mechanism that all but reaches a singular position turns back there: rates jump, and forces have peaks
+//! that no polynomial tells.
 
+use super::limits::{OutputNear, both_limits};
 use super::{ExtremesDetector, Found};
-use crate::arithmetic::DoubleDouble;
 use crate::dynamics::schur::{NEAR, SINGULAR};
 use crate::dynamics::{Motion, Time};
 use crate::run::drift::Singular;
 use crate::run::observer::Inside;
-use crate::stepping::search::{golden_sections, value};
-use nalgebra::{DMatrix, DVector};
+use crate::stepping::search::golden_sections;
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 
@@ -29,25 +33,12 @@ const BESIDE: i32 = 32;
 const IN_OCTAVE: i32 = 4;
 const ROUNDS: usize = 48;
 const MOST: usize = 4096;
-/// Share below which a least one is looked for, and outputs are too inaccurate to be of use.
+/// Share of the core, in which a least one is looked for.
 const SMALL: f64 = 1e-4;
+/// Share below which outputs are too inaccurate for polynomials.
 const USELESS: f64 = 1e-6;
-/// Shares of the way to the farther end on which a limit is looked for, and halvings of the rest.
-const SHARES: [f64; 5] = [1.0, 0.5, 0.25, 0.125, 0.0625];
-const HALVINGS: u32 = 3;
-/// Degrees of polynomials over both sides and over one, and how much lower that of the other one is.
-const BOTH: usize = 8;
-const ONE: usize = 6;
-const LOWER: usize = 2;
-/// Two polynomials tell what differs by no more over the largest value, or over magnitudes of rounding.
-const ALIKE: f64 = 1e-5;
-const ROUNDING: f64 = 1e5;
-/// p(0) over the largest |p| above which an output is without bound.
-const POLE: f64 = 1e-3;
-/// The length of one side over that of both below which the other one's polynomial serves for it.
-const SHORT: f64 = 0.1;
-/// Intervals in which a polynomial is looked at; an even number.
-const INTERVALS: u32 = 256;
+/// Part of the largest rate by which one jumps where the motion turns back.
+const JUMP: f64 = 1e-3;
 
 /// What is remembered near a singular position.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,10 +46,13 @@ pub(super) struct PassageMemory {
     /// From and to these times \[s\] it is near, so far.
     begin: f64,
     end: f64,
-    /// What was known before it.
+    /// What was known before it; that and what is known of it outside of the core, and of that before it.
     before: Vec<Found>,
-    /// Times, shares of the weakest constraint, and outputs.
-    samples: Vec<(f64, f64, Vec<f64>)>,
+    outside: Vec<Found>,
+    until_core: Vec<Found>,
+    /// From and to these times \[s\] the core is.
+    core: Option<[f64; 2]>,
+    samples: Vec<NearSample>,
     /// The least share, when \[s\], and the least singular value there.
     least: [f64; 3],
     /// The constraint that is weakest there.
@@ -67,18 +61,16 @@ pub(super) struct PassageMemory {
     is_long: bool,
 }
 
-/// What an output comes to on one side.
-#[derive(Clone)]
-enum SideLimit {
-    /// Coefficients of a polynomial, and up to which share of the way to the farther end it is that.
-    Curve(Vec<f64>, f64),
-    /// Without bound, in this sense.
-    Unbounded(f64),
-    Unknown,
+/// Outputs near a singular position.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct NearSample {
+    t: f64,
+    /// Share of the weakest constraint.
+    share: f64,
+    outputs: Vec<f64>,
+    /// Rates, those of translational coordinates over the size of the mechanism \[rad/s, 1/s\].
+    rates: Vec<f64>,
 }
-
-/// Time from the singular position over the longest one, output, and weight.
-type Point = [f64; 3];
 
 impl ExtremesDetector {
     /// Looks for singular positions after a step has been looked at, with what had been found before it.
@@ -117,19 +109,35 @@ impl ExtremesDetector {
 
     /// Begins to remember, where a singular position comes near in a step.
     fn open(&mut self, inside: &mut dyn Inside, (begin, from): (Time, Time), before: Vec<Found>) {
-        let kept = self.memory.clone();
-        self.memory.found = before;
-        self.look_over(inside, begin, (from - begin).hi);
-        let before = std::mem::replace(&mut self.memory, kept).found;
-        self.memory.passage = Some(PassageMemory {
+        let mut passage = PassageMemory {
             begin: from.hi,
             end: from.hi,
-            before,
+            before: Vec::new(),
+            outside: before,
+            until_core: Vec::new(),
+            core: None,
             samples: Vec::new(),
             least: [f64::INFINITY, from.hi, f64::NAN],
             weakest: 0,
             is_long: false,
-        });
+        };
+        self.look_outside(inside, (begin, from), &mut passage);
+        passage.before.clone_from(&passage.outside);
+        passage.until_core.clone_from(&passage.outside);
+        self.memory.passage = Some(passage);
+    }
+
+    /// Looks for extremes in a part of a step outside of the core.
+    fn look_outside(
+        &mut self,
+        inside: &mut dyn Inside,
+        (from, to): (Time, Time),
+        passage: &mut PassageMemory,
+    ) {
+        let kept = self.memory.clone();
+        self.memory.found = std::mem::take(&mut passage.outside);
+        self.look_over(inside, from, (to - from).hi);
+        passage.outside = std::mem::replace(&mut self.memory, kept).found;
     }
 
     /// Remembers a part of a step.
@@ -164,6 +172,25 @@ impl ExtremesDetector {
                 }
             }
         }
+        let core = (0..=PLACES).filter(|&i| shares[i] < SMALL);
+        if let (Some(first), Some(last)) = (core.clone().next(), core.last()) {
+            let ends = [first.saturating_sub(1), PLACES.min(last + 1)].map(|i| place(i as f64));
+            match &mut passage.core {
+                Some([_, end]) => {
+                    // What lies between is a part of the core.
+                    *end = ends[1].hi;
+                    passage.outside.clone_from(&passage.until_core);
+                }
+                None => {
+                    passage.core = Some(ends.map(|end| end.hi));
+                    self.look_outside(inside, (from, ends[0]), &mut passage);
+                    passage.until_core.clone_from(&passage.outside);
+                }
+            }
+            self.look_outside(inside, (ends[1], to), &mut passage);
+        } else {
+            self.look_outside(inside, (from, to), &mut passage);
+        }
         passage.end = to.hi;
         passage.is_long = passage.samples.len() > MOST;
         if passage.is_long && passage.is_singular() {
@@ -176,10 +203,13 @@ impl ExtremesDetector {
 
     /// Remembers the outputs at a time where they are of use; returns the share of the weakest constraint.
     fn remember_at(&mut self, inside: &mut dyn Inside, t: Time, passage: &mut PassageMemory) -> f64 {
-        let values = self.values_at(inside.at(t));
+        let outputs = self.values_at(inside.at(t));
         let share = self.mechanism.standing_share(&self.kernel);
-        if share >= USELESS && share.is_finite() {
-            passage.samples.push((t.hi, share, values));
+        if share >= SINGULAR && share.is_finite() {
+            let (angles, size) = (self.mechanism.bodies.len(), self.mechanism.size_of_parts());
+            let omega = self.coordinates[2].iter().enumerate();
+            let rates = omega.map(|(k, omega)| if k < angles { *omega } else { omega / size }).collect();
+            passage.samples.push(NearSample { t: t.hi, share, outputs, rates });
         }
         share
     }
@@ -242,7 +272,10 @@ impl ExtremesDetector {
 impl PassageMemory {
     /// Whether it is one of so many outputs.
     pub fn fits(&self, count: usize) -> bool {
-        self.before.len() == count && self.samples.iter().all(|(_, _, values)| values.len() == count)
+        let rates = self.samples.first().map_or(0, |sample| sample.rates.len());
+        let is_one = |sample: &NearSample| sample.outputs.len() == count && sample.rates.len() == rates;
+        [&self.before, &self.outside, &self.until_core].into_iter().all(|known| known.len() == count)
+            && self.samples.iter().all(is_one)
     }
 
     /// True where the motion goes, or went, through a singular position and away from it.
@@ -252,153 +285,50 @@ impl PassageMemory {
 
     /// What is known with what outputs come to here.
     fn found(&self, rounding: &[f64]) -> Vec<Found> {
-        let mut found = self.before.clone();
         let (centre, reach) = (self.least[1], self.reach());
-        for (k, found) in found.iter_mut().enumerate() {
+        let over_reach = |ends: [f64; 2]| ends.map(|end| (end - centre) / reach);
+        let [ends, core] = [[self.begin, self.end], self.core.unwrap_or([centre; 2])].map(over_reach);
+        let is_passed = !self.turns_back();
+        let found = |k: usize| {
             let rounding = rounding.get(k).copied().unwrap_or_default();
-            let point = |(t, share, values): &(f64, f64, Vec<f64>)| {
-                [(t - centre) / reach, values[k], share.powf(1.5)]
-            };
-            let all: Vec<Point> =
-                self.samples.iter().map(point).filter(|point| point[1].is_finite()).collect();
-            let sides = [-1.0, 1.0].map(|sign| within(&all, |at| sign * at > 0.0));
-            let limits = self.limits(&all, &sides, rounding);
-            for ((end, side), limit) in [self.begin, self.end].into_iter().zip(&sides).zip(limits) {
-                self.count(found, (end - centre) / reach, side, limit, rounding);
-            }
-        }
-        found
+            let points = self.points(|sample| sample.outputs[k]);
+            let nearest = [-1.0, 1.0].map(|sign| {
+                let side = self.samples.iter().map(|sample| [(sample.t - centre) / reach, sample.outputs[k]]);
+                let side = side.filter(|[at, y]| sign * at > 0.0 && y.is_finite());
+                side.min_by(|[a, _], [b, _]| a.abs().total_cmp(&b.abs()))
+            });
+            let output = OutputNear { centre, reach, ends, rounding, points, nearest };
+            let [mut all, mut outside] = [self.before[k], self.outside[k]];
+            output.count(&mut all, ends, is_passed);
+            output.count(&mut outside, core, is_passed);
+            // What polynomials tell everywhere has less rounding in it.
+            if all.min[0].is_finite() && all.max[0].is_finite() { all } else { outside }
+        };
+        (0..self.outside.len()).map(found).collect()
+    }
+
+    /// True where rates jump: it is no singular position that is passed.
+    fn turns_back(&self) -> bool {
+        let count = self.samples.first().map_or(0, |sample| sample.rates.len());
+        let rates = self.samples.iter().flat_map(|sample| &sample.rates);
+        let most = rates.fold(0.0, |most: f64, rate| most.max(rate.abs()));
+        let jumps = |k: usize| {
+            let limits = both_limits(&self.points(|sample| sample.rates[k]));
+            limits.is_some_and(|[before, after]| (after - before).abs() > JUMP * most)
+        };
+        (0..count).any(jumps)
+    }
+
+    /// What is remembered, over time and with weights.
+    fn points(&self, of: impl Fn(&NearSample) -> f64) -> Vec<[f64; 3]> {
+        let (centre, reach) = (self.least[1], self.reach());
+        let point = |sample: &NearSample| [(sample.t - centre) / reach, of(sample), sample.share.powf(1.5)];
+        let useful = self.samples.iter().filter(|sample| sample.share >= USELESS);
+        useful.map(point).filter(|point| point[1].is_finite()).collect()
     }
 
     /// The time from the singular position to the farther end \[s\].
     fn reach(&self) -> f64 {
         (self.least[1] - self.begin).max(self.end - self.least[1])
     }
-
-    /// What an output comes to on both sides.
-    fn limits(&self, all: &[Point], sides: &[Vec<Point>; 2], rounding: f64) -> [SideLimit; 2] {
-        let is_zero = true;
-        for share in SHARES {
-            let is_in = |at: f64| at.abs() <= share;
-            if sides.iter().all(|side| within(side, is_in).len() > ONE)
-                && let Some(curve) = alike(&within(all, is_in), BOTH, rounding, is_zero)
-            {
-                return [SideLimit::Curve(curve.clone(), share), SideLimit::Curve(curve, share)];
-            }
-        }
-        let limit = |side: &Vec<Point>| {
-            let told = |share: f64| {
-                let near = within(side, |at| at.abs() <= share);
-                if let Some(curve) = alike(&near, ONE, rounding, is_zero) {
-                    return Some(SideLimit::Curve(curve, share));
-                }
-                let times: Vec<Point> =
-                    near.iter().map(|[at, y, weight]| [*at, y * at.abs(), *weight]).collect();
-                let most = times.iter().fold(0.0, |most: f64, point| most.max(point[1].abs()));
-                let curve = alike(&times, ONE, rounding, is_zero)?;
-                (curve[0].abs() > POLE * most).then_some(SideLimit::Unbounded(curve[0]))
-            };
-            SHARES.into_iter().find_map(told).unwrap_or(SideLimit::Unknown)
-        };
-        let mut found = sides.each_ref().map(limit);
-        for (side, end) in [self.begin, self.end].into_iter().enumerate() {
-            let is_short = (end - self.least[1]).abs() < SHORT * self.reach();
-            if is_short && matches!(found[side], SideLimit::Unknown) {
-                found[side] = found[1 - side].clone();
-            }
-        }
-        found
-    }
-
-    /// Adds what an output comes to between the singular position and one end, times over the longest one.
-    fn count(&self, found: &mut Found, end: f64, side: &[Point], limit: SideLimit, rounding: f64) {
-        match limit {
-            SideLimit::Curve(curve, share) => {
-                let to = end.clamp(-share, share);
-                self.count_curve(found, &curve, [0.0, to]);
-                if to != end {
-                    self.count_rest(found, side, [to, end], rounding, HALVINGS);
-                }
-            }
-            SideLimit::Unbounded(sense) => {
-                let centre = self.least[1];
-                let seen = side.iter().filter(|point| point[2] >= SMALL.powf(1.5));
-                seen.for_each(|[at, y, _]| found.see(*y, centre + at * self.reach()));
-                found.see(f64::INFINITY.copysign(sense), centre);
-            }
-            SideLimit::Unknown if end != 0.0 => found.forget(),
-            SideLimit::Unknown => {}
-        }
-    }
-
-    /// Adds what an output comes to in a part of a side, by polynomials.
-    fn count_rest(
-        &self,
-        found: &mut Found,
-        side: &[Point],
-        [from, to]: [f64; 2],
-        rounding: f64,
-        halvings: u32,
-    ) {
-        let (low, high) = (from.min(to), from.max(to));
-        let part = within(side, |at| (low..=high).contains(&at));
-        let middle = 0.5 * (from + to);
-        match alike(&part, ONE, rounding, false) {
-            Some(curve) => self.count_curve(found, &curve, [from, to]),
-            None if halvings == 0 => found.forget(),
-            None => {
-                self.count_rest(found, side, [from, middle], rounding, halvings - 1);
-                self.count_rest(found, side, [middle, to], rounding, halvings - 1);
-            }
-        }
-    }
-
-    /// Adds what a polynomial comes to in a part of a side.
-    fn count_curve(&self, found: &mut Found, curve: &[f64], [from, to]: [f64; 2]) {
-        let (centre, reach) = (self.least[1], self.reach());
-        let (mut integral, mut square) = (0.0, 0.0);
-        for i in 0..=INTERVALS {
-            let at = from + (to - from) * (f64::from(i) / f64::from(INTERVALS));
-            let [value, _] = value(curve, at);
-            found.see(value, centre + at * reach);
-            // Simpson's rule.
-            let weight = match i {
-                0 | INTERVALS => 1.0,
-                _ => 2.0 + 2.0 * f64::from(i % 2),
-            };
-            integral += weight * value;
-            square += weight * value * value;
-        }
-        let share = (to - from).abs() * reach / (3.0 * f64::from(INTERVALS));
-        found.integral += DoubleDouble::product(integral, share);
-        found.square += DoubleDouble::product(square, share);
-    }
-}
-
-/// The points at such times.
-fn within(points: &[Point], is_in: impl Fn(f64) -> bool) -> Vec<Point> {
-    points.iter().copied().filter(|point| is_in(point[0])).collect()
-}
-
-/// The polynomial of a degree through points, in the least squares, where one of a lower degree is like it:
-/// at the points, and at zero where that is asked.
-fn alike(points: &[Point], degree: usize, rounding: f64, is_zero: bool) -> Option<Vec<f64>> {
-    let (curve, lower) = (fitted(points, degree)?, fitted(points, degree - LOWER)?);
-    let most = points.iter().fold(0.0, |most: f64, point| most.max(point[1].abs()));
-    let apart = |at: f64| (value(&curve, at)[0] - value(&lower, at)[0]).abs();
-    let is_alike = |at: f64| apart(at) <= (ALIKE * most).max(ROUNDING * rounding);
-    ((!is_zero || is_alike(0.0)) && points.iter().all(|point| is_alike(point[0]))).then_some(curve)
-}
-
-/// The polynomial of a degree through points, in the least squares; `None` of too few of them.
-fn fitted(points: &[Point], degree: usize) -> Option<Vec<f64>> {
-    if points.len() <= degree {
-        return None;
-    }
-    let weight = |i: usize| points[i][2];
-    let powers = DMatrix::from_fn(points.len(), degree + 1, |i, k| weight(i) * points[i][0].powi(k as i32));
-    let values = DVector::from_fn(points.len(), |i, _| weight(i) * points[i][1]);
-    let qr = powers.qr();
-    let found = qr.r().solve_upper_triangular(&(qr.q().transpose() * values))?;
-    found.iter().all(|x| x.is_finite()).then(|| found.iter().copied().collect())
 }
