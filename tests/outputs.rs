@@ -1022,3 +1022,14 @@ fn extremes_beside_a_pole_are_found() {
         "{told:?} {least}"
     );
 }
+
+/// A root of what becomes negative has no mean.
+#[test]
+fn what_has_no_value_at_some_times_has_no_mean() {
+    let text =
+        EQUAL_SLIDER_CRANK.replace(r#""T": "M.torque""#, r#""T": "sqrt(0.5 s - t)", "N": "sqrt(-1 s - t)""#);
+    let outcome = run(&parse_scene(&text, "scene", &[]).expect("a scene"), &adaptive(MethodId::Taylor, 1e-9));
+    let [later, never] = ["T", "N"].map(|name| found(&outcome.extremes, name));
+    assert!(later.mean.is_nan() && later.rms.is_nan() && later.max[0] > 0.7, "{later:?}");
+    assert!([never.min[0], never.max[0], never.mean, never.rms].into_iter().all(f64::is_nan), "{never:?}");
+}

@@ -8,6 +8,7 @@ use serde_json::{Map, Value, json};
 /// An output that changes by less over its size does so by rounding.
 const CONSTANT: f64 = 1e-12;
 const CONSTANT_TOLD: &str = "constant";
+const UNKNOWN: &str = "not known";
 
 /// Which outputs have forces in them that are those of least norm among what rigid bodies leave open.
 fn left_open(mechanism: &Mechanism, outcome: &Outcome) -> Vec<bool> {
@@ -18,7 +19,7 @@ fn left_open(mechanism: &Mechanism, outcome: &Outcome) -> Vec<bool> {
 /// A figure of an output.
 fn told(x: f64) -> String {
     match x {
-        _ if x.is_nan() => "not known".into(),
+        _ if x.is_nan() => UNKNOWN.into(),
         _ if x.is_infinite() => "unbounded".into(),
         _ => figure(x),
     }
@@ -67,9 +68,21 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome
         })
         .collect();
     page.table(&["output", "least", "at t [s]", "largest", "at t [s]", "mean", "rms"], &rows);
-    if rows.iter().flatten().any(|cell| cell == "not known") {
+    let follows = mechanism.outputs.iter().flat_map(|outputs| outputs.follows_equations());
+    let is_unknown = |cells: &Vec<String>| cells.iter().any(|cell| cell == UNKNOWN);
+    let is_limit = |follows: &bool| *follows && outcome.drift.singular.is_some();
+    let limits: Vec<bool> = rows
+        .iter()
+        .zip(follows)
+        .filter(|(cells, _)| is_unknown(cells))
+        .map(|(_, follows)| is_limit(follows))
+        .collect();
+    if limits.contains(&true) {
         let why = "what is not known: limits of forces or accelerations at singular positions on the way";
         page.entry("", why);
+    }
+    if limits.contains(&false) {
+        page.entry("", "what is not known: the formula has no value at some times");
     }
     if left_open(mechanism, outcome).contains(&true) {
         page.entry(

@@ -167,7 +167,11 @@ impl ExtremesDetector {
     pub fn extremes(&self) -> Vec<Extremes> {
         let span = self.memory.span.hi;
         let Some(outputs) = self.mechanism.outputs.as_ref().filter(|_| span > 0.0) else { return Vec::new() };
-        let extremes = |((name, unit), found): ((&str, &str), Found)| {
+        let extremes = |((name, unit), mut found): ((&str, &str), Found)| {
+            // It has had no value at all.
+            if found.min[0] > found.max[0] {
+                found.forget();
+            }
             let [mean, rms] = found.means(span);
             Extremes {
                 name: name.to_owned(),

@@ -67,7 +67,9 @@ impl Found {
     /// Mean and root of the mean square over so long a time \[s\].
     pub fn means(&self, span: f64) -> [f64; 2] {
         match [self.min[0], self.max[0]].map(f64::is_finite) {
-            [true, true] => [self.integral.hi / span, (self.square.hi / span).max(0.0).sqrt()],
+            [true, true] => {
+                [self.integral.hi / span, (self.square.hi / span).clamp(0.0, f64::INFINITY).sqrt()]
+            }
             [true, false] if self.max[0] > 0.0 => [f64::INFINITY; 2],
             [false, true] if self.min[0] < 0.0 => [f64::NEG_INFINITY, f64::INFINITY],
             _ if self.min[0].is_nan() => [f64::NAN; 2],
