@@ -357,9 +357,10 @@ fn slider_crank(r: f64, l: f64, motors: &str) -> Scene {
             {{"name": "A", "between": [{{"body": "a", "point": [{r}, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
         "sliders": [{{"name": "S", "point": {{"body": "b", "point": [{l}, 0]}},
             "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}}}],
-        "start": {{"a": {{"phi": 1.3}}, "b": {{"phi": -0.4}}}}, {motors} "until": 1, "every": 1}}"#,
+        "start": {{"a": {{"phi": 1.3}}, "b": {{"phi": {}}}}}, {motors} "until": 1, "every": 1}}"#,
         0.5 * r,
-        0.5 * l
+        0.5 * l,
+        -(r * 1.3_f64.sin() / l).asin()
     );
     parse_scene(&text, "sd", &[]).unwrap_or_else(|error| panic!("{error}"))
 }
@@ -415,6 +416,126 @@ fn ways_of_motion_that_cross_are_passed_straight_and_named() {
     let last = |found: &Kinematics| found.positions.last().map(|at| at.phi.clone()).expect("positions");
     for (a, b) in last(&found).iter().zip(last(&other)) {
         assert!((a - b).abs() < 1e-9, "{a} {b}");
+    }
+}
+
+/// A crank as long as its rod, the rod's angle -theta: at pi/2 and 3 pi/2 the pin may turn about the crank's hinge.
+/// The torque is that of virtual power, g r (m/2 + 3 M/2) there, the rod does not accelerate; gravity g along the
+/// rail has a moment about the crank pin that no bounded force of the rail balances.
+#[test]
+fn forces_at_change_points_are_limits_along_the_motion() {
+    let (r, w, g) = (0.5, 4.0, 1.3);
+    let motor = r#""motors": [{"name": "M", "body": "a", "law": {"start": 1.3, "rate": 4}}],
+        "outputs": {"rail": "S.force", "A.y": "A.fy", "A.x": "A.fx", "b.alpha": "b.alpha"},"#;
+    let mut scene = slider_crank(r, r, motor);
+    let range = |found: &Kinematics, name: &str| -> [[f64; 2]; 2] {
+        let range = found.ranges.iter().find(|range| range.name == name).expect("a column");
+        [range.min, range.max]
+    };
+    for (count, text) in [(360, "M=0..6.283185307179586"), (500, "M")] {
+        scene.gravity = [g, -9.81];
+        let found = over(&scene, text, count);
+        assert_eq!(found.change_points.len(), 2, "{:?}", found.change_points);
+        let torque = |at: f64| {
+            let (sine, cosine) = at.sin_cos();
+            let (weight, along) = (9.81 * r * 1.5 * cosine, g * r * 3.5 * sine);
+            weight + along + w * w * 4.0 * r * r * sine * cosine
+        };
+        let most = (0..100_000).map(|k| torque(TAU * f64::from(k) / 1e5)).fold(f64::MIN, f64::max);
+        assert!(
+            (range(&found, "M.torque")[1][0] - most).abs() < 1e-8,
+            "{:?} {most}",
+            range(&found, "M.torque")
+        );
+        let [min, max] = range(&found, "A.y");
+        assert_eq!([min[0], max[0]], [f64::NEG_INFINITY, f64::INFINITY]);
+        assert!(found.change_points.contains(&min[1]) && found.change_points.contains(&max[1]));
+        assert!(range(&found, "b.alpha").as_flattened().iter().step_by(2).all(|alpha| alpha.abs() < 1e-8));
+        let page = driftless::report::kinematics::text(&found);
+        assert!(page.contains("unbounded") && !page.contains("not known"), "{page}");
+        let mut hidden = 0;
+        for at in &found.positions {
+            if at.force.is_nan() {
+                assert!(at.outputs.iter().chain(&at.alpha).all(|value| value.is_nan()), "{at:?}");
+                assert!(at.drive.cos().abs() < 1e-3, "{at:?}");
+                hidden += 1;
+            } else {
+                assert!((at.force - torque(at.drive)).abs() < 1e-8, "{at:?} {}", torque(at.drive));
+            }
+        }
+        assert_eq!(hidden, if count == 360 { 2 } else { 0 });
+        // Without gravity along the rail the rod leans on it with M (9.81 - 2 r w^2 sin(theta)) / 2 and hangs on the
+        // crank with M (9.81 + r w^2 sin(theta)) / 2.
+        scene.gravity = [0.0, -9.81];
+        let found = over(&scene, text, count);
+        let mut pin = range(&found, "A.y").map(|[value, at]| [value.abs(), at]);
+        pin.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let [back, front] = [3.0 * FRAC_PI_2, FRAC_PI_2];
+        let expected = [[9.81 - 8.0, back], [9.81 + 8.0, front], [9.81 + w * w, back]];
+        for (found, [value, at]) in [pin[0], pin[1], range(&found, "rail")[1]].iter().zip(expected) {
+            assert!(
+                (found[0] - value).abs() < 1e-8 && (found[1] - at).abs() < 1e-4,
+                "{found:?} {value} {at}"
+            );
+        }
+    }
+}
+
+#[test]
+fn torques_at_change_points_of_parallelograms_are_those_of_virtual_work() {
+    let bar = |name: &str, length: f64| {
+        let centre = 0.5 * length;
+        format!(
+            r#"{{"name": "{name}", "mass": 1, "centre": [{centre}, 0], "inertia": 0.1, "length": {length}}}"#
+        )
+    };
+    let hinge = |at: usize, [a, x]: [&str; 2], [b, y]: [&str; 2]| {
+        let end = |body: &str, x: &str| format!(r#"{{"body": "{body}", "point": [{x}, 0]}}"#);
+        format!(r#"{{"name": "H{at}", "between": [{}, {}]}}"#, end(a, x), end(b, y))
+    };
+    let ground = |at, x, crank| hinge(at, ["ground", x], [crank, "0"]);
+    let cranks = ["a", "c", "e"].map(|name| bar(name, 1.0)).to_vec();
+    let first = vec![
+        ground(0, "0", "a"),
+        ground(1, "1.7", "c"),
+        ground(2, "2.9", "e"),
+        hinge(3, ["a", "1"], ["b", "0"]),
+    ];
+    let two = [
+        hinge(4, ["b", "1.7"], ["c", "1"]),
+        hinge(5, ["c", "1"], ["d", "0"]),
+        hinge(6, ["d", "1.2"], ["e", "1"]),
+    ];
+    let one = [hinge(4, ["b", "1.7"], ["c", "1"]), hinge(5, ["b", "2.9"], ["e", "1"])];
+    let couplings =
+        [(vec![bar("b", 1.7), bar("d", 1.2)], two.to_vec(), 3.5), (vec![bar("b", 2.9)], one.to_vec(), 2.5)];
+    for (rods, joints, amplitude) in couplings {
+        let text = format!(
+            r#"{{"name": "p", "gravity": [0, -9.81], "until": 1, "every": 1, "bars": [{}], "hinges": [{}],
+                "motors": [{{"name": "M", "body": "a", "law": {{"start": 0.37, "rate": 4}}}}],
+                "outputs": {{"along": "H3.fx", "b.alpha": "b.alpha"}},
+                "start": {{"a": {{"phi": 0.37}}, "b": {{"phi": 0}}, "c": {{"phi": 0.37}}, "e": {{"phi": 0.37}}}}}}"#,
+            [cranks.clone(), rods].concat().join(", "),
+            [first.clone(), joints].concat().join(", ")
+        );
+        let scene = parse_scene(&text, "p", &[]).unwrap_or_else(|error| panic!("{error}"));
+        let found = over(&scene, "M", 120);
+        assert_eq!(found.change_points.len(), 2, "{amplitude}: {:?}", found.change_points);
+        for (point, expected) in found.change_points.iter().zip([PI, TAU]) {
+            assert!((point - expected).abs() < 1e-6, "{amplitude}: {point}");
+        }
+        let [torque, along, alpha] = [&found.ranges[0], &found.ranges[1], &found.ranges[2]];
+        let most = 9.81 * amplitude;
+        assert!(
+            (torque.min[0] + most).abs() < 1e-8 && (torque.max[0] - most).abs() < 1e-8,
+            "{torque:?} {most}"
+        );
+        assert_eq!(
+            [along.min[0], along.max[0]],
+            [f64::NEG_INFINITY, f64::INFINITY],
+            "{amplitude}: {along:?}"
+        );
+        assert!(alpha.min[0].abs() < 1e-8 && alpha.max[0].abs() < 1e-8, "{alpha:?}");
     }
 }
 

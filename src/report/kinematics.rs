@@ -2,6 +2,7 @@
 
 #[cfg(feature = "charts")]
 use super::drawing::{MechanismDrawing, names_of};
+use super::outputs::{note_unknown, told};
 use super::page::{Page, counted, figure};
 #[cfg(feature = "charts")]
 use crate::chart::{
@@ -21,7 +22,7 @@ use std::fmt::Write;
 const LISTED: usize = 8;
 
 /// One object: `drive`, `positions` (their number), `limits`, `dead_centres`, `change_points`, `extremes`,
-/// `assemblies`, `left_out`.  The value of an extreme without bound is null.
+/// `assemblies`, `left_out`.  The value of an extreme that is without bound or not known is null.
 pub fn object(found: &Kinematics) -> Value {
     let range = [found.positions.first(), found.positions.last()].map(|at| at.map(|at| at.drive));
     let extremes = found.ranges.iter().map(|Range { name, unit, min, max }| {
@@ -110,13 +111,13 @@ pub fn text(found: &Kinematics) -> String {
     let rows: Vec<Vec<String>> = (found.ranges.iter())
         .map(|Range { name, unit, min, max }| {
             let numbers = [min[0], min[1], max[0], max[1]];
-            let told = |x: f64| if x.is_infinite() { "unbounded".to_owned() } else { figure(x) };
             std::iter::once(format!("{name} [{unit}]")).chain(numbers.into_iter().map(told)).collect()
         })
         .collect();
     let at = format!("at [{unit}]");
     page.entry("extremes", "over the whole range, between positions as well");
     page.table(&["column", "least", &at, "largest", &at], &rows);
+    note_unknown(&mut page, &rows);
     if !found.mechanism.redundant().is_empty() {
         page.entry(
             "",

@@ -9,6 +9,7 @@ use serde_json::{Map, Value, json};
 const CONSTANT: f64 = 1e-12;
 const CONSTANT_TOLD: &str = "constant";
 const UNKNOWN: &str = "not known";
+const LIMITS: &str = "what is not known: limits of forces or accelerations at singular positions on the way";
 
 /// Which outputs have forces in them that are those of least norm among what rigid bodies leave open.
 fn left_open(mechanism: &Mechanism, outcome: &Outcome) -> Vec<bool> {
@@ -17,7 +18,7 @@ fn left_open(mechanism: &Mechanism, outcome: &Outcome) -> Vec<bool> {
 }
 
 /// A figure of an output.
-fn told(x: f64) -> String {
+pub(super) fn told(x: f64) -> String {
     match x {
         _ if x.is_nan() => UNKNOWN.into(),
         _ if x.is_infinite() => "unbounded".into(),
@@ -43,6 +44,13 @@ pub(super) fn object(mechanism: &Mechanism, outcome: &Outcome) -> Option<Value> 
         (name.to_owned(), told)
     };
     Some(Value::Object(outputs.heads().enumerate().map(of).collect::<Map<String, Value>>()))
+}
+
+/// Says what is not known, where some cells are.
+pub(super) fn note_unknown(page: &mut Page, rows: &[Vec<String>]) {
+    if rows.iter().flatten().any(|cell| cell == UNKNOWN) {
+        page.entry("", LIMITS);
+    }
 }
 
 /// What the page of a run says.
@@ -78,8 +86,7 @@ pub(super) fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome
         .map(|(_, follows)| is_limit(follows))
         .collect();
     if limits.contains(&true) {
-        let why = "what is not known: limits of forces or accelerations at singular positions on the way";
-        page.entry("", why);
+        page.entry("", LIMITS);
     }
     if limits.contains(&false) {
         page.entry("", "what is not known: the formula has no value at some times");

@@ -13,7 +13,9 @@ mod parts;
 mod singular;
 
 use self::found::Found;
+pub(in crate::run) use self::limits::{OutputNear, Point, SideLimit};
 use self::singular::PassageMemory;
+pub(in crate::run) use self::singular::{SMALL, USELESS};
 use super::drift::Singular;
 use super::halvings::Halvings;
 use super::observer::{Inside, StepWatcher};
@@ -336,7 +338,7 @@ impl ExtremesDetector {
 }
 
 /// Magnitudes that are rounding of functions that change so much.
-fn rounding_of(changes: &[f64]) -> Vec<f64> {
+pub(in crate::run) fn rounding_of(changes: &[f64]) -> Vec<f64> {
     changes.iter().map(|change| if change.is_finite() { ROUNDING * change } else { 0.0 }).collect()
 }
 

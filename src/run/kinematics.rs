@@ -33,7 +33,7 @@ use extremes::SolvedRange;
 use serde::Serialize;
 use std::sync::Arc;
 use travel::SliderTravel;
-use walk::{DriveWalk, IN_LINE, LimitApproach, SolvedPosition};
+use walk::{DriveWalk, IN_LINE, LimitApproach, SolvedPosition, between};
 
 /// Relative width at which a searched time is taken for found.
 const FOUND: f64 = 1e-13;
@@ -53,7 +53,7 @@ pub struct Position {
     pub phi: Vec<f64>,
     /// Rates \[rad/s, m/s\].
     pub omega: Vec<f64>,
-    /// Accelerations \[rad/s², m/s²\].
+    /// Accelerations \[rad/s², m/s²\]; at a change point these, forces and outputs made of either are NaN.
     pub alpha: Vec<f64>,
     /// Torque \[N·m\] or force \[N\] of the drive.
     pub force: f64,
@@ -105,9 +105,10 @@ pub struct Range {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Least value, and where; infinite where it falls without bound towards a limit, and the limit.
+    /// Least value, and where; infinite where it falls without bound towards a limit or a change point, and
+    /// that; NaN where its limit at a change point is not known.
     pub min: [f64; 2],
-    /// Largest value, and where; infinite where it grows without bound towards a limit, and the limit.
+    /// Largest value, in the same way.
     pub max: [f64; 2],
 }
 
@@ -191,7 +192,7 @@ pub fn kinematics(
             }
         }
     }
-    let all = SolvedRange::new(sides, approaches);
+    let mut all = SolvedRange::new(sides, approaches);
     let rows = &all.positions[all.rows.clone()];
     let mut found = Kinematics {
         branches: mechanism.other_assemblies(&scene, ATTEMPTS, 1.0).0,
@@ -211,13 +212,13 @@ pub fn kinematics(
         limits,
         transmissions,
     };
-    found.search(&all, &mut here);
+    found.search(&mut all, &mut here);
     Ok(found)
 }
 
 impl Kinematics {
     /// Looks between positions, and up to limits, for dead centres, change points and extremes.
-    fn search(&mut self, range: &SolvedRange, walk: &mut DriveWalk) {
+    fn search(&mut self, range: &mut SolvedRange, walk: &mut DriveWalk) {
         let all = &range.positions[..];
         let coordinates = self.mechanism.coordinates();
         let own = self.mechanism.own_bodies().len();
@@ -245,13 +246,36 @@ impl Kinematics {
             self.turn_back(&travel.name, (all, &rates), walk, (rate, value));
         }
         self.dead_centres.sort_by(|a, b| a.drive.total_cmp(&b.drive));
+        self.find_change_points(range, walk);
+        self.extremes(range, walk);
+    }
+
+    /// Finds where ways of motion cross, and what columns come to there; positions just there have neither
+    /// forces nor accelerations.
+    fn find_change_points(&mut self, range: &mut SolvedRange, walk: &mut DriveWalk) {
+        let all = &range.positions[..];
+        let mut found = Vec::new();
         for [before, after] in all.windows(2).filter_map(|pair| <&[SolvedPosition; 2]>::try_from(pair).ok()) {
             if before.orientation.zip(after.orientation).is_some_and(|(before, after)| before * after < 0.0) {
                 let sign = |walk: &DriveWalk| walk.orientation().unwrap_or(0.0);
-                self.change_points.extend(walk.root([before, after], sign).map(|found| found.drive));
+                found.extend(walk.root([before, after], sign).map(|_| walk.solved()));
             }
         }
-        self.extremes(range, walk);
+        found.extend(walk.more_singular(range, &found));
+        found.sort_by(|a, b| a.position.drive.total_cmp(&b.position.drive));
+        self.change_points = found.iter().map(|at| at.position.drive).collect();
+        let parts = found.iter().zip(between(all, &found));
+        let singular: Vec<_> = parts.map(|(at, ends)| walk.beside_singular(all, at, ends)).collect();
+        for (position, solved) in self.positions.iter_mut().zip(&all[range.rows.clone()]) {
+            if singular.iter().any(|one| one.hides(solved)) {
+                position.alpha.fill(f64::NAN);
+                position.force = f64::NAN;
+                if let Some(outputs) = &self.mechanism.outputs {
+                    outputs.withhold(&mut position.outputs);
+                }
+            }
+        }
+        range.singular = singular;
     }
 
     /// Finds where something turns back between positions, at which it has these rates, and at the last of

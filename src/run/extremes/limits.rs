@@ -25,10 +25,10 @@ const INTERVALS: u32 = 256;
 const ROUNDS: usize = 32;
 
 /// Time from the singular position over the longest one, value, and weight.
-pub(super) type Point = [f64; 3];
+pub(in crate::run) type Point = [f64; 3];
 
 /// An output beside a singular position.
-pub(super) struct OutputNear {
+pub(in crate::run) struct OutputNear {
     /// The singular position and the time from it to the farther end \[s\].
     pub centre: f64,
     pub reach: f64,
@@ -43,7 +43,7 @@ pub(super) struct OutputNear {
 
 /// What an output comes to on one side.
 #[derive(Clone)]
-enum SideLimit {
+pub(in crate::run) enum SideLimit {
     /// Coefficients of a polynomial, and up to which share of the way to the farther end it is that.
     Curve(Vec<f64>, f64),
     /// The same over the time from the singular position, times the sense it is without bound in.
@@ -54,15 +54,25 @@ enum SideLimit {
 impl OutputNear {
     /// Adds what it comes to between these times over the longest one, before and after the singular
     /// position; nothing is known of it where `is_passed` is false.
-    pub fn count(&self, found: &mut Found, core: [f64; 2], is_passed: bool) {
-        let sides = [-1.0, 1.0].map(|sign| within(&self.points, |at| sign * at > 0.0));
+    pub(super) fn count(&self, found: &mut Found, core: [f64; 2], is_passed: bool) {
+        let sides = self.sides();
         let limits = if is_passed { self.limits(&sides) } else { [SideLimit::Unknown, SideLimit::Unknown] };
         for ((end, side), limit) in core.into_iter().zip(&sides).zip(limits) {
             self.count_side(found, end, side, limit);
         }
     }
 
+    /// What is remembered before and after the singular position.
+    fn sides(&self) -> [Vec<Point>; 2] {
+        [-1.0, 1.0].map(|sign| within(&self.points, |at| sign * at > 0.0))
+    }
+
     /// What it comes to on both sides.
+    pub fn both_sides(&self) -> [SideLimit; 2] {
+        self.limits(&self.sides())
+    }
+
+    /// The same, by the points on them.
     fn limits(&self, sides: &[Vec<Point>; 2]) -> [SideLimit; 2] {
         let is_zero = true;
         for share in SHARES {

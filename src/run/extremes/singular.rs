@@ -34,9 +34,9 @@ const IN_OCTAVE: i32 = 4;
 const ROUNDS: usize = 48;
 const MOST: usize = 4096;
 /// Share of the core, in which a least one is looked for.
-const SMALL: f64 = 1e-4;
+pub(in crate::run) const SMALL: f64 = 1e-4;
 /// Share below which outputs are too inaccurate for polynomials.
-const USELESS: f64 = 1e-6;
+pub(in crate::run) const USELESS: f64 = 1e-6;
 /// Part of the largest rate by which one jumps where the motion turns back.
 const JUMP: f64 = 1e-3;
 

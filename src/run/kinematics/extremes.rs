@@ -1,7 +1,7 @@
-//! Extremes over a range, at positions and between them.
+//! Extremes over a range, at positions and between them, at limits and at singular positions.
 
 use super::Limit;
-use super::walk::{DriveWalk, LimitApproach, SolvedPosition};
+use super::walk::{DriveWalk, LimitApproach, SingularPosition, SolvedPosition};
 use crate::stepping::search::golden_sections;
 use std::ops::Range;
 
@@ -21,6 +21,8 @@ pub(super) struct SolvedRange {
     pub rows: Range<usize>,
     /// The limits that end it, below and above.
     pub limits: [Option<LimitApproach>; 2],
+    /// The singular positions it leads through.
+    pub singular: Vec<SingularPosition>,
 }
 
 impl SolvedRange {
@@ -33,19 +35,31 @@ impl SolvedRange {
         let before = before.unwrap_or_default();
         let rows = before.len()..before.len() + count;
         let positions = before.into_iter().rev().chain(below.into_iter().rev()).chain(above);
-        Self { positions: positions.chain(after.unwrap_or_default()).collect(), rows, limits }
+        let positions = positions.chain(after.unwrap_or_default()).collect();
+        Self { positions, rows, limits, singular: Vec::new() }
+    }
+
+    /// A column at a value of the drive where the state tells `plain`: beside singular positions what
+    /// polynomials tell.
+    fn value(&self, column: usize, drive: f64, plain: f64) -> f64 {
+        self.singular.iter().fold(plain, |value, one| one.value(column, drive, value))
     }
 }
 
 impl DriveWalk {
     /// The least value of a column, times a sign, over positions, between them and at limits, and the drive's
-    /// value at the first of them; nothing where it has none.
+    /// value at the first of them; nothing where it has none, NaN where a singular position leaves it open.
     ///
     /// Between positions it is looked for on both sides of every one that is not above its neighbours, of
     /// many those that may hide most.
     pub fn least(&mut self, range: &SolvedRange, column: usize, sign: f64) -> Option<[f64; 2]> {
+        if range.singular.iter().any(|one| one.is_unknown(column)) {
+            return Some([f64::NAN; 2]);
+        }
         let all = &range.positions;
-        let values: Vec<f64> = all.iter().map(|one| sign * one.position.column(column)).collect();
+        let value = |drive: f64, plain: f64| sign * range.value(column, drive, plain);
+        let at = |one: &SolvedPosition| value(one.position.drive, one.position.column(column));
+        let values: Vec<f64> = all.iter().map(at).collect();
         let size = usual_size(&values[range.rows.clone()]);
         let beside = |k: usize| [k.saturating_sub(1), (k + 1).min(all.len() - 1)];
         // As far below a position as a neighbour is above it, at most.
@@ -55,10 +69,13 @@ impl DriveWalk {
             let at = limit.as_ref().and_then(|limit| Some([sign * limit.column(column)?, limit.drive]));
             at.filter(|at| at[0] < f64::INFINITY)
         });
-        if let Some(unbounded) = at_limits.iter().flatten().find(|at| at[0] == f64::NEG_INFINITY) {
-            return Some(*unbounded);
-        }
         let [at_lower, at_upper] = at_limits;
+        let at_singular = range.singular.iter().flat_map(|one| one.unbounded(column));
+        let at_singular = at_singular.map(|[value, drive]| [sign * value, drive]);
+        let mut ends = at_lower.into_iter().chain(at_singular).chain(at_upper);
+        if let Some(unbounded) = ends.find(|at| at[0] == f64::NEG_INFINITY) {
+            return Some(unbounded);
+        }
         let is_low = |k: &usize| {
             let is_above = |j: usize| values[j] >= values[*k] || values[j].is_nan();
             let is_under = |at: Option<[f64; 2]>| at.is_some_and(|at| at[0] < values[*k]);
@@ -82,7 +99,7 @@ impl DriveWalk {
             let look = |t: f64| {
                 self.restore(from);
                 self.go(t)?;
-                let value = sign * self.column(column);
+                let value = value(self.drive(), self.column(column));
                 if value < here[0] {
                     here = [value, self.drive()];
                 }

@@ -2,9 +2,11 @@
 
 mod approach;
 mod fold;
+mod singular;
 mod step;
 
 pub(super) use approach::LimitApproach;
+pub(super) use singular::{SingularPosition, between};
 
 use super::independence::{Independence, determinant, in_jacobian, size};
 use super::transmission::Transmission;
@@ -36,6 +38,8 @@ pub(super) struct SolvedPosition {
     usual: f64,
     /// See [`DriveWalk::orientation`].
     pub orientation: Option<f64>,
+    /// The share of the weakest constraint.
+    pub share: f64,
     /// All there is to know of it.
     pub position: Position,
 }
@@ -229,7 +233,8 @@ impl DriveWalk {
     /// What another walk can go on from.
     pub fn solved(&self) -> SolvedPosition {
         let (orientation, position) = (self.orientation(), self.position());
-        SolvedPosition { state: self.state.clone(), usual: self.usual, orientation, position }
+        let (share, usual) = (self.share(), self.usual);
+        SolvedPosition { state: self.state.clone(), usual, orientation, share, position }
     }
 
     /// Back to a position.

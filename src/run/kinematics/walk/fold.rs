@@ -20,6 +20,12 @@ const FAST: f64 = 1e-3;
 const ITERATIONS: usize = 12;
 
 impl DriveWalk {
+    /// True where rates are as large as beside a limit, that near to a singular position.
+    pub(super) fn is_as_fast_as_beside_limit(&self) -> bool {
+        let least = jacobian(&self.mechanism, &self.kernel).singular_values().min();
+        self.fastest_of_jacobian() * least > FAST * self.drive_rate()
+    }
+
     /// Brings a position beside a limit onto all rows, with its rates, accelerations and multipliers; false,
     /// and nothing done, of any other.
     pub(super) fn solve_beside_limit(&mut self) -> bool {
