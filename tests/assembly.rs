@@ -521,6 +521,19 @@ fn the_closest_start_keeps_the_law_of_a_gear() {
     assert!((there[of("wheel")].0 - wheel).abs() < 1e-3, "{there:?} {closest:?}");
 }
 
+/// Where a motor's law names the angle it drives, phi = 2 phi, the closest start names it as well.
+#[test]
+fn the_closest_start_gives_an_angle_that_a_law_gives_by_itself() {
+    let text = r#"{"name": "self", "gravity": [0, 0], "start": {"bar": {"phi": 1.5}}, "until": 1, "every": 1,
+        "bars": [{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "bar", "point": [0, 0]}]}],
+        "motors": [{"name": "M", "body": "bar", "law": "2*bar.phi"}]}"#;
+    let scene = parse_scene(text, "self", &[]).unwrap_or_else(|error| panic!("{error}"));
+    let CompileError::Impossible { closest, .. } = refused(&scene) else { panic!("{:?}", refused(&scene)) };
+    let written: Value = serde_json::from_str(&format!("{{{}}}", closest.written)).expect("JSON");
+    assert_eq!(written["start"]["bar"]["phi"].as_f64().map(f64::abs), Some(0.0), "{}", closest.written);
+}
+
 /// A gear and a rack give what they drive from the angle of a bar, however far that is.
 #[test]
 fn what_gears_and_racks_give_is_found_however_large_it_is() {

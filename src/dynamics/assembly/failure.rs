@@ -4,7 +4,7 @@ use super::newton::{AssemblyProblem, GivenNumber, Goal};
 use super::{ClosedStart, DEPENDENT, DISTINCT};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics::compile::{Body, CompileError, quoted};
-use crate::dynamics::constraint::{ConstraintEquation, RowMeasure};
+use crate::dynamics::constraint::RowMeasure;
 
 /// Configurations apart by less are not told apart by a rough value \[rad, or sizes of the mechanism\].
 const ROUGHLY: f64 = 0.3;
@@ -69,25 +69,24 @@ impl AssemblyProblem<'_> {
     }
 
     fn closest(&self, q: &[DoubleDouble], apart: Option<f64>, guesses: [usize; 2]) -> Closest {
+        // What a motor or a gear gives is not to be given, unless its law names the angle it gives.
+        let mut is_driven = vec![false; self.mechanism.coordinates()];
+        self.visit::<f64>(q, &vec![0.0; q.len()], |i, _, gradient| {
+            let row = &self.mechanism.constraints[i];
+            let turned = match (&row.measure, &row.aim) {
+                (_, Some(aim)) => aim.angles.first().copied(),
+                (&RowMeasure::Angle { body, .. }, _) if row.law.is_some() => Some(body),
+                _ => None,
+            };
+            turned.into_iter().for_each(|body| is_driven[body] |= gradient[body] == 1.0);
+        });
         let geared = self.mechanism.geared_bodies();
         let q: Vec<f64> = (0..q.len()).map(|k| self.principal(q, k, &geared)).collect();
         let entry = |(body, phi): (&Body, &f64)| {
             format!("\"{}\": {{\"phi\": {}}}", body.name, (phi * 1e4).round() / 1e4)
         };
-        // What a motor or a gear gives is not to be given.
-        let is_driven = |body: usize| {
-            let drives = |row: &ConstraintEquation| {
-                let turned = match (&row.measure, &row.aim) {
-                    (_, Some(aim)) => aim.angles.first().copied(),
-                    (&RowMeasure::Angle { body, .. }, _) if row.law.is_some() => Some(body),
-                    _ => None,
-                };
-                turned == Some(body)
-            };
-            self.mechanism.constraints.iter().any(drives)
-        };
         let given =
-            self.mechanism.own_bodies().iter().zip(&q).enumerate().filter(|(body, _)| !is_driven(*body));
+            self.mechanism.own_bodies().iter().zip(&q).enumerate().filter(|(body, _)| !is_driven[*body]);
         let all: Vec<String> = given.map(|(_, one)| entry(one)).collect();
         Closest { written: format!("\"start\": {{{}}}", all.join(", ")), q, apart, guesses }
     }
