@@ -264,6 +264,27 @@ fn a_spring_on_a_free_body_is_watched_for_zero_length() {
     }
 }
 
+/// A ball on a thread to its hook moves on the line through both: from rest at y₀ to the hook, about the place
+/// `rest` where its weight stretches the thread.
+#[test]
+fn a_spring_loses_its_length_wherever_the_step_before_ended() {
+    let text = r#"{"name": "thread", "gravity": [0, -9.81], "until": 0.8, "every": 0.1,
+        "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+        "springs": [{"name": "thread", "between": [{"body": "ground", "point": [0, 0]}, {"body": "ball", "point": [0, 0]}],
+                     "stiffness": 10, "free_length": 0.3}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 1.0147211876072686], "velocity": [0, 0]}}}"#;
+    let scene = parse_scene(text, "thread", &[]).expect("a scene");
+    let rest: f64 = 0.3 - 0.981;
+    let t = (-rest / (1.0147211876072686 - rest)).acos() / 10.0_f64.sqrt();
+    // By the last of these a step ends 1.2e-6 free lengths before the hook.
+    for (name, rtol) in [("dp8", 1e-10), ("taylor", 1e-12), ("dp5", 1e-9), ("dp5", 7.38e-10)] {
+        let outcome = run(&scene, &Request { rtol: Some(rtol), every: Some(0.1), ..by(name, 0.8) });
+        let stop = outcome.stop.unwrap_or_else(|| panic!("{name} at {rtol:e} passed the hook"));
+        assert_eq!(stop.cause, Cause::SpringWithoutLength, "{name}: {stop}");
+        assert!((stop.t - t).abs() < 1e-6, "{name} at {rtol:e}: {} instead of {t}", stop.t);
+    }
+}
+
 /// Two bodies that know nothing of each other: a bar meets a wall without restitution and falls from it at
 /// once, a ball meets the floor a moment later or before, in the same step.  Rounding may turn the bar's rate
 /// against the wall it has just left, which must not hide the ball's impact.

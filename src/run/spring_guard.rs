@@ -7,7 +7,7 @@
 //! [search](crate::stepping::search) for all events looks on its dense output for zeros of the squared length
 //!
 //! ```text
-//! g = |D|² - (1e-6 L0)²,     |g''| <= 2 |D'|² + 2 |D| |D''|
+//! g = (|D| / 1e-6 L0)² - 1,     |g''| <= (2 |D'|² + 2 |D| |D''|) / (1e-6 L0)²
 //! ```
 //!
 //! Mechanisms whose springs are too far from their places for that are integrated without.
@@ -20,10 +20,10 @@ use crate::stepping::{Cause, StepError};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
-/// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of the free
-/// length.
+/// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of a length
+/// that counts as none.
 const DEGREES: [usize; 3] = [8, 16, 32];
-const RESOLVED: f64 = 1e-9;
+const RESOLVED: f64 = 1e-3;
 
 /// True where the two ends of a spring can meet.
 fn can_shrink(spring: &CompiledSpring) -> bool {
@@ -73,13 +73,13 @@ fn ends(
     [spring.span.position(z), spring.span.velocity(z, &at.omega)]
 }
 
-/// |D|² less what counts as none, over the free length: D's components over it.
+/// The square of |D| over what counts as none, less 1: D's components over that.
 struct Length(Vec<Chebyshev>);
 
 impl Curve for Length {
     fn at(&self, t: f64) -> [f64; 2] {
         let [x, y] = [self.0[0].at(t), self.0[1].at(t)];
-        [x[0] * x[0] + y[0] * y[0] - NONE * NONE, 2.0 * (x[0] * x[1] + y[0] * y[1])]
+        [x[0] * x[0] + y[0] * y[0] - 1.0, 2.0 * (x[0] * x[1] + y[0] * y[1])]
     }
 
     fn about(&self, centre: f64, radius: f64) -> IntervalBounds {
@@ -138,10 +138,10 @@ fn searched(
     at: &mut dyn FnMut(f64) -> BodyAngles,
     z: &mut Vec<Complex<f64>>,
 ) -> Option<f64> {
-    let free = spring.free_length;
+    let none = NONE * spring.free_length;
     let ends_at = |share: f64, row: &mut Vec<f64>| {
         let [here, _] = ends(spring, bodies, &at(share * span), z);
-        row.extend([here.re / free, here.im / free]);
+        row.extend([here.re / none, here.im / none]);
     };
     let length = Length(interpolated(&DEGREES, ends_at, |_, part, _| part.tail() < RESOLVED).curves);
     match crossing(&length, 1.0) {
