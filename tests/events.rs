@@ -493,3 +493,54 @@ fn digits_of_the_inputs_are_counted_after_the_last_impact() {
     println!("{input_error:.1e} beside {expected:.1e}");
     assert!(input_error > expected / 3.0 && input_error < 30.0 * expected, "{input_error:e}, {expected:e}");
 }
+
+/// A cube and a fifth power pass zero where their roots do, and as often, however flat they are there; what
+/// their events set acts from then on.
+#[test]
+fn a_zero_of_a_higher_order_is_one_event() {
+    let scene = |events: &str| {
+        let text = format!(
+            r#"{{"name": "powers", "gravity": [0, -9.81], "until": 3, "every": 0.1, "parameters": {{"k": 0}},
+            "bars": [{{"name": "b", "length": 1, "width": 0.1, "thickness": 0.01, "density": 1000}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "torques": [{{"name": "T", "body": "b", "torque": "k"}}],
+            "start": {{"b": {{"phi": 1, "omega": 9}}}},
+            "events": [{events}]}}"#
+        );
+        parse_scene(&text, "powers", &[]).expect("a scene")
+    };
+    let seen = scene(
+        r#"{"name": "root", "when": "b.sin"}, {"name": "cube", "when": "b.sin^3"},
+        {"name": "product", "when": "b.sin*b.sin*b.sin"}, {"name": "fifth", "when": "b.sin^5"},
+        {"name": "one", "when": "(b.phi - 4)^3"}, {"name": "two", "when": "(b.phi - 4)^3*(b.phi - 4.3)^3"},
+        {"name": "touches", "when": "(b.phi - 4)^2"}"#,
+    );
+    let set = |function: &str| {
+        scene(&format!(
+            r#"{{"name": "up", "when": "{function}", "direction": "rising", "set": {{"k": 0.3}}}},
+            {{"name": "down", "when": "{function}", "direction": "falling", "set": {{"k": -0.3}}}}"#
+        ))
+    };
+    for name in ["taylor", "dp8", "dp5", "radau9", "gauss8"] {
+        let outcome = run(&seen, &Request { every: Some(0.1), ..by(name, 3.0) });
+        let times = |event: &str| -> Vec<f64> {
+            outcome.events.iter().filter(|seen| &*seen.name == event).map(|seen| seen.t).collect()
+        };
+        let roots = times("root");
+        assert_eq!(roots.len(), 10, "{name}");
+        for event in ["cube", "product", "fifth"] {
+            let found = times(event);
+            assert_eq!(found.len(), 10, "{name}, {event}: {found:?}");
+            for (t, root) in found.iter().zip(&roots) {
+                assert!((t - root).abs() < 1e-6, "{name}, {event}: {t} instead of {root}");
+            }
+        }
+        let counts = ["one", "two", "touches"].map(|event| times(event).len());
+        assert_eq!(counts, [1, 2, 0], "{name}");
+        let [root, cube] = ["b.sin", "b.sin^3"].map(|function| {
+            let outcome = run(&set(function), &Request { every: Some(0.1), ..by(name, 3.0) });
+            (outcome.event_count, outcome.last.phi[0])
+        });
+        assert!(root.0 == cube.0 && (root.1 - cube.1).abs() < 1e-5, "{name}: {root:?} {cube:?}");
+    }
+}

@@ -40,17 +40,8 @@ impl EventDetector {
             }
             let rises = value > 0.0;
             if side != 0 && rises != (side > 0) {
-                let mut at = |share: f64| self.values(inside.at(part.begin + share * part.span))[event];
-                let (mut from, mut to) = (before, node);
-                loop {
-                    let middle = 0.5 * (from + to);
-                    let is_instant = (to - from) * part.span <= f64::EPSILON * part.begin.hi.abs();
-                    if middle <= from || middle >= to || is_instant {
-                        break;
-                    }
-                    if (at(middle) > 0.0) == rises { to = middle } else { from = middle }
-                }
-                let ends = [at(from), at(to)].map(f64::abs);
+                let [from, to] = self.bisected(inside, part, event, [before, node], rises);
+                let ends = [from, to].map(|share| self.value_at(inside, part, event, share).abs());
                 let is_pole = !ends.iter().all(|end| *end <= POLE * most);
                 let jumps = ends[0].min(ends[1]) > off;
                 if !is_pole {
@@ -61,6 +52,35 @@ impl EventDetector {
             (side, before) = (sign(value), node);
         }
         self.memory.sides[event] = side;
+    }
+
+    /// The value of a function at a share of a part.
+    pub(super) fn value_at(&self, inside: &mut dyn Inside, part: &StepPart, event: usize, share: f64) -> f64 {
+        self.values(inside.at(part.begin + share * part.span))[event]
+    }
+
+    /// Shares of a part, next to one another, between which a function that `rises` or falls from one to the
+    /// other passes zero.
+    pub(super) fn bisected(
+        &self,
+        inside: &mut dyn Inside,
+        part: &StepPart,
+        event: usize,
+        [mut from, mut to]: [f64; 2],
+        rises: bool,
+    ) -> [f64; 2] {
+        loop {
+            let middle = 0.5 * (from + to);
+            let is_instant = (to - from) * part.span <= f64::EPSILON * part.begin.hi.abs();
+            if middle <= from || middle >= to || is_instant {
+                return [from, to];
+            }
+            if (self.value_at(inside, part, event, middle) > 0.0) == rises {
+                to = middle
+            } else {
+                from = middle
+            }
+        }
     }
 
     /// True where a function that is not kept at zero is within this share of its largest value from it.

@@ -8,7 +8,9 @@ use crate::dynamics::Time;
 use crate::run::friction::FrictionWatch;
 use crate::run::halvings::turns;
 use crate::run::observer::Inside;
-use crate::stepping::search::{Chebyshev, Curve, Interpolants, Nodes, interpolated, oscillates, root, sign};
+use crate::stepping::search::{
+    Chebyshev, Curve, Interpolants, Nodes, ROUNDING, interpolated, oscillates, root, sign,
+};
 
 /// Degrees of the interpolants.
 const DEGREES: [usize; 3] = [8, 16, 32];
@@ -34,8 +36,10 @@ pub(super) const NO_VALUE: f64 = 1e-12;
 /// What the value of a condition must be over what its interpolant may be off by, for its sign to tell a
 /// side, and the part of a step within which that is looked for: at a zero of a higher order it takes a
 /// while.
-const CLEAR: f64 = 10.0;
+pub(super) const CLEAR: f64 = 10.0;
 const SOON: f64 = 1e-2;
+/// Share of a step up to which a zero behind its end is at its end.
+const NEAR: f64 = 1e-6;
 /// How many times later it is looked again where that may take the whole step.
 const LATER: f64 = 1.25;
 /// Share of a step after which a function has left a corner that began it, and share of its largest value
@@ -105,7 +109,7 @@ fn ahead() -> impl Iterator<Item = f64> {
 
 /// Where a curve has left what it may be `off` by about its zero, from `share` on; `None` where that is not
 /// soon.
-fn clear(curve: &Chebyshev, share: f64, off: f64) -> Option<f64> {
+pub(super) fn clear(curve: &Chebyshev, share: f64, off: f64) -> Option<f64> {
     let is_clear = |at: &f64| *at >= 1.0 || curve.at(*at)[0].abs() > CLEAR * off;
     ahead().take_while(|&step| step < SOON).map(|step| share + step).find(is_clear)
 }
@@ -284,8 +288,16 @@ impl EventDetector {
         still.retain(|other| *other != event);
         let goes_to = leaving.take_if(|(other, _)| *other == event).map(|(_, side)| side);
         let is_at_zero = first.abs() <= NO_VALUE * *largest;
-        if is_at_zero && *side != 0 && sign(next) == -*side {
-            all.push(part.passage(begin, event, *side < 0));
+        let came = *side;
+        let passes = is_at_zero && came != 0 && sign(next) == -came;
+        // What is flat about a zero ahead has not passed it yet.
+        let is_ahead = passes
+            && !(is_woken || was_still)
+            && part.is_resolved
+            && sign(first) == came
+            && part.is_flat(0.0, self.tolerance);
+        if passes && !is_ahead {
+            all.push(part.passage(begin, event, came < 0));
         }
         let mut is_behind = due.iter().any(|(due, _)| *due == event)
             || last.iter().any(|(last, before)| *last == event && is_now(before));
@@ -316,7 +328,9 @@ impl EventDetector {
             *side = sign(part.curve.at(from)[0]);
         }
         let before = all.len();
+        let came = if is_ahead { came } else { *side };
         self.zeros(part, event, (from, None), all);
+        self.settle(inside, part, event, (from, came), before, all);
         // Where rounding has it on the other side of the zero it leaves.
         if goes_to.is_some_and(|side| all.get(before).is_some_and(|first| first.rises == (side > 0))) {
             all.remove(before);
@@ -334,14 +348,15 @@ impl EventDetector {
     fn end_at_zero(&mut self, part: &StepPart, event: usize, end: Time, all: &mut Vec<Passage>) {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
         let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
-        if *side != 0 && value.abs() <= off && sign(slope) == -*side {
+        let is_near = value.abs() <= off.min(NEAR * slope.abs());
+        if *side != 0 && is_near && sign(slope) == -*side {
             all.push(part.passage(end, event, *side < 0));
             *side = -*side;
         }
     }
 
-    /// Zeros of an interpolant from a share of the part on; where it is `off` by so much about them, the side
-    /// behind one is told where it has left that.
+    /// Zeros of an interpolant from a share of the part on; where it is `off` by so much about them, by
+    /// rounding at least, the side behind one is told where it has left that.
     fn zeros(
         &mut self,
         part: &StepPart,
@@ -356,7 +371,10 @@ impl EventDetector {
                 // The part that follows tells.
                 break;
             }
-            share = off.and_then(|off| clear(part.curve, next, off)).unwrap_or(next);
+            share = match off {
+                Some(off) => clear(part.curve, next, off).unwrap_or(next),
+                None => clear(part.curve, next, ROUNDING * part.curve.most()).unwrap_or(next + SOON),
+            };
             let after = sign(part.curve.at(share.min(1.0))[0]);
             // At the very end of a step what follows is not known: it is on the other side.
             *side = if after == 0 || share >= 1.0 { -*side } else { after };
