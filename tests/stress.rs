@@ -171,6 +171,41 @@ fn a_scene_without_a_known_end_gets_one() {
     assert!((found - known).abs() < 1e-12, "{found:e} {known:e}");
 }
 
+/// A motion that an event ends is compared with the reference there, and at another time it is off by what
+/// it does in between: a bar that turns freely at 2 rad/s reaches 1 rad at 0.5 s.
+#[test]
+fn a_motion_that_an_event_ends_is_judged_where_it_ends() {
+    let text = r#"{"name": "stopped", "gravity": [0, -9.81], "until": 1, "every": 1,
+        "bars": [{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "events": [{"name": "enough", "when": "t - 0.5", "action": "stop"}],
+        "start": {"b": {"phi": 0.3, "omega": 0}}}"#;
+    let case = |text: String| Case {
+        name: "stopped".into(),
+        origin: "stopped.json".into(),
+        text,
+        tolerance: 1e-6,
+        expected: Expected::Unknown,
+    };
+    let turning = text
+        .replace("-9.81", "0")
+        .replace("t - 0.5", "b.phi - 1")
+        .replace("\"phi\": 0.3, \"omega\": 0", "\"phi\": 0, \"omega\": 2");
+    let cases = vec![case(text.to_owned()), case(turning.clone())];
+    let methods: Vec<MethodId> = ["dp8", "taylor", "gauss8", "rattle4"].map(method).into();
+    let plan = Stress { cases, methods, max_evaluations: 100_000, threads: 1 };
+    for cell in stress(&plan, &mut |_| true).iter().flat_map(|line| &line.cells) {
+        assert_eq!(cell.verdict, Verdict::Right, "{cell:?}");
+        assert!(cell.error.is_some_and(|error| error < 1e-6), "{cell:?}");
+    }
+    // The same place half a millisecond later would be off by 2 rad/s times that.
+    let (coordinates, rates) = (vec![1.0], vec![2.0]);
+    let late = Expected::Motion { t: 0.5005, coordinates, rates };
+    let seen = cell(&Case { expected: late, ..case(turning) }, method("dp8"), 100_000);
+    let off = seen.error.expect("an error");
+    assert!(seen.verdict == Verdict::Wrong && (off - 1e-3).abs() < 1e-9, "{seen:?}");
+}
+
 #[test]
 fn a_spring_that_loses_its_length_stops_every_method_that_shows_its_steps() {
     for name in ["dp5", "dp8", "taylor", "radau5", "gauss4", "gauss16", "rattle2", "rattle8"] {

@@ -62,8 +62,10 @@ pub enum Expected {
         /// Rates \[rad/s\].
         rates: Vec<f64>,
     },
-    /// All coordinates and rates at the horizon.
+    /// All coordinates and rates at the end: the horizon, or where an event stops the motion.
     Motion {
+        /// When that is \[s\].
+        t: f64,
         /// Angles of all bodies \[rad\], then positions of those that translate, over the mechanism's size
         /// ([`DistanceMetric`]).
         coordinates: Vec<f64>,
@@ -225,8 +227,9 @@ fn known(case: &Case) -> Case {
                 Ok(())
             })
             .ok()?;
-        let found =
-            reference(&mechanism, &start, &[trial.stop.is_none().then_some(scene.until)?.into()]).ok()?;
+        // An event may stop the motion before the horizon.
+        let t = if trial.ended_by.is_some() { trial.last.t } else { scene.until };
+        let found = reference(&mechanism, &start, &[trial.stop.is_none().then_some(t)?.into()]).ok()?;
         // What it is off must be nothing beside the tolerance.
         let is_known = found.accuracy.iter().all(|&accuracy| accuracy <= 1e-3 * case.tolerance);
         let motion = found.motions.last().filter(|_| is_known)?;
@@ -234,7 +237,7 @@ fn known(case: &Case) -> Case {
         let coordinates = (0..motion.phi.len()).map(|k| motion.unwrapped(k));
         let rates = motion.omega.iter().map(|omega| omega.hi);
         let [coordinates, rates] = [metric.measured(coordinates).collect(), metric.measured(rates).collect()];
-        Some(Expected::Motion { coordinates, rates })
+        Some(Expected::Motion { t, coordinates, rates })
     };
     let expected = if case.expected == Expected::Unknown {
         end().unwrap_or(Expected::Unknown)

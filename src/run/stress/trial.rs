@@ -38,6 +38,8 @@ pub(super) struct Trial<'a> {
 /// Coordinates and rates at the end of a run, as [`DistanceMetric`] measures them.
 #[derive(Clone, Debug)]
 pub(super) struct TrialEnd {
+    /// When it ended \[s\].
+    pub(super) t: f64,
     pub(super) coordinates: Vec<f64>,
     pub(super) rates: Vec<f64>,
 }
@@ -45,21 +47,25 @@ pub(super) struct TrialEnd {
 impl TrialEnd {
     pub(super) fn of(sample: &Sample, metric: &DistanceMetric) -> Self {
         let measured = |values: &[f64]| metric.measured(values.iter().copied()).collect();
-        Self { coordinates: measured(&sample.phi), rates: measured(&sample.omega) }
+        Self { t: sample.t, coordinates: measured(&sample.phi), rates: measured(&sample.omega) }
     }
 
     /// What is known of it, of the last bodies' angles alone where no more is expected.
     fn known(self, bodies: usize, expected: &Expected) -> Self {
         let Expected::End { angles, rates } = expected else { return self };
         let last = |values: &[f64], count: usize| values[bodies - count..bodies].to_vec();
-        Self { coordinates: last(&self.coordinates, angles.len()), rates: last(&self.rates, rates.len()) }
+        let [coordinates, rates] = [last(&self.coordinates, angles.len()), last(&self.rates, rates.len())];
+        Self { coordinates, rates, ..self }
     }
 
-    /// The largest difference; rates count over 1 rad/s or themselves, and not at all where `other` has none.
+    /// The largest difference; rates count over 1 rad/s or themselves, and not at all where `other` has none,
+    /// and times by what the fastest coordinate changes by between them.
     pub(super) fn apart(&self, other: &Self) -> f64 {
+        let fastest = other.rates.iter().fold(1.0, |most, rate| larger(most, rate.abs()));
+        let late = fastest * (self.t - other.t).abs();
         let coordinates = self.coordinates.iter().zip(&other.coordinates).map(|(a, b)| (a - b).abs());
         let rates = self.rates.iter().zip(&other.rates).map(|(a, b)| (a - b).abs() / b.abs().max(1.0));
-        coordinates.chain(rates).fold(0.0, larger)
+        coordinates.chain(rates).fold(late, larger)
     }
 }
 
@@ -101,10 +107,9 @@ impl Trial<'_> {
             self.score(&outcome, &end, cell);
             // What a run knows it knows the better the smoother its motion is: where that is not far below
             // what is asked for, a finer run decides too.
-            let known = outcome
-                .trust
-                .as_ref()
-                .filter(|trust| trust.how == How::ReferenceSolution && trust.at >= self.scene.until);
+            let at = if outcome.ended_by.is_some() { end.t } else { self.scene.until };
+            let known =
+                outcome.trust.as_ref().filter(|trust| trust.how == How::ReferenceSolution && trust.at >= at);
             let fastest = end.rates.iter().fold(1.0, |most, rate| larger(most, rate.abs()));
             let known = known.and_then(|trust| {
                 let rates = if end.rates.is_empty() { 0.0 } else { trust.rate_error? / fastest };
@@ -162,10 +167,12 @@ impl Trial<'_> {
 
     /// What the end is off, where that is known.
     fn score(&self, outcome: &Outcome, end: &TrialEnd, cell: &mut StressCell) {
+        let known = |t: f64, coordinates: &[f64], rates: &[f64]| {
+            end.apart(&TrialEnd { t, coordinates: coordinates.to_vec(), rates: rates.to_vec() })
+        };
         cell.error = match &self.case.expected {
-            Expected::End { angles: coordinates, rates } | Expected::Motion { coordinates, rates } => {
-                Some(end.apart(&TrialEnd { coordinates: coordinates.clone(), rates: rates.clone() }))
-            }
+            Expected::End { angles, rates } => Some(known(self.scene.until, angles, rates)),
+            Expected::Motion { t, coordinates, rates } => Some(known(*t, coordinates, rates)),
             Expected::Energy | Expected::Stop(_) => Some(outcome.drift.energy.max),
             Expected::Refusal | Expected::Unknown => None,
         };
