@@ -10,6 +10,7 @@ use driftless::run::{MethodId, Outcome, Request, Stabilization, Sweep, SweepPoin
 use driftless::scene::{Scene, Template, Wall, parse_scene};
 use driftless::stepping::Cause;
 use std::f64::consts::PI;
+use std::time::Instant;
 
 /// The methods that take walls.
 const METHODS: [&str; 5] = ["taylor", "dp8", "dp5", "radau5", "radau9"];
@@ -543,4 +544,27 @@ fn a_zero_of_a_higher_order_is_one_event() {
         });
         assert!(root.0 == cube.0 && (root.1 - cube.1).abs() < 1e-5, "{name}: {root:?} {cube:?}");
     }
+}
+
+/// An event far from happening costs a Gauss method of a slider-crank about as much as its steps, where it took
+/// nineteen times as long: every value of the function was a shorter step.
+#[test]
+fn an_event_that_never_happens_costs_little() {
+    let text = std::fs::read_to_string("examples/scenes/slider_crank_torque.json").expect("a shipped scene");
+    let event = r#"{"events": [{"name": "never", "when": "crank.phi - 100"}],"#;
+    let [bare, watched] = [text.clone(), text.replacen('{', event, 1)]
+        .map(|text| parse_scene(&text, "crank", &[]).expect("a scene"));
+    let request = Request { step: Some(2e-3), ..by("gauss8", 0.2) };
+    let cost = |scene: &Scene| {
+        let timed = || {
+            let begin = Instant::now();
+            let phi = run(scene, &request).last.phi;
+            (begin.elapsed(), phi)
+        };
+        let [one, other] = [timed(), timed()];
+        if one.0 < other.0 { one } else { other }
+    };
+    let (bare, watched) = (cost(&bare), cost(&watched));
+    assert_eq!(bare.1, watched.1);
+    assert!(watched.0 < 4 * bare.0, "{:?} instead of {:?}", watched.0, bare.0);
 }

@@ -402,6 +402,18 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
         self.observe(time, M::interpolate_roughly)
     }
 
+    fn coarsely_at(&mut self, time: Time) -> Option<&Motion> {
+        let Self { problem, method, state, from, inside, observed, .. } = self;
+        if time >= state.time || time <= from.time {
+            return Some(self.at(time));
+        }
+        if !method.interpolate_coarsely(from, time, inside) {
+            return None;
+        }
+        problem.read(inside, observed);
+        Some(&self.observed)
+    }
+
     fn landed(&mut self, time: Time) -> Option<&Motion> {
         let Self { problem, method, state, from, inside, observed, .. } = self;
         if time >= state.time || time <= from.time || !method.land(problem, from, time, inside) {

@@ -6,6 +6,7 @@
 
 mod branches;
 mod detector;
+mod far;
 mod flat;
 mod located;
 mod search;

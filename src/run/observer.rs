@@ -18,6 +18,11 @@ pub(super) trait Inside {
     /// The same to nearly its accuracy, where that is cheaper.
     fn roughly_at(&mut self, time: Time) -> &Motion;
 
+    /// The same to a lower order, where [`at`](Inside::at) is dear: it makes a shorter step.
+    fn coarsely_at(&mut self, _time: Time) -> Option<&Motion> {
+        None
+    }
+
     /// The same to the accuracy of the end of a step, where [`at`](Inside::at) is less accurate than that.
     fn landed(&mut self, _time: Time) -> Option<&Motion> {
         None

@@ -266,4 +266,9 @@ impl<P: OdeSystem + Form + ?Sized> Integrator<P> for SymmetricGauss {
         // Where that fails, the state is the beginning of the step.
         let _ = spare.shifted(problem, inside, (time - from.time).hi, &mut Statistics::default());
     }
+
+    /// By the collocation polynomial, from a beginning that is not shifted.
+    fn interpolate_coarsely(&mut self, from: &State, time: Time, inside: &mut State) -> bool {
+        Integrator::<P>::interpolate_coarsely(&mut self.inner, from, time, inside)
+    }
 }

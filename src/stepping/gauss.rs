@@ -215,6 +215,19 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Gauss {
         super::shortened(&mut *spare, problem, from, time, inside);
         self.spare = Some(spare);
     }
+
+    /// By the collocation polynomial.
+    fn interpolate_coarsely(&mut self, from: &State, time: Time, inside: &mut State) -> bool {
+        let share = (time - from.time).hi / self.scratch.step;
+        let is_inside = (0.0..=1.0).contains(&share) && self.scratch.total.len() == from.y.len();
+        if is_inside {
+            inside.clone_from(from);
+            inside.time = time;
+            self.scratch.carry(self.tableau, share, inside);
+            inside.wrap();
+        }
+        is_inside
+    }
 }
 
 impl Gauss {

@@ -237,6 +237,13 @@ pub trait Integrator<P: ?Sized> {
         self.interpolate(problem, from, time, inside);
     }
 
+    /// Writes the same to a lower order, by a polynomial that costs next to nothing; false, and nothing
+    /// written, where the method has none beside [`interpolate`](Integrator::interpolate).
+    #[doc(hidden)]
+    fn interpolate_coarsely(&mut self, _from: &State, _time: Time, _inside: &mut State) -> bool {
+        false
+    }
+
     /// Writes the same to the accuracy of the *end* of a step, by a step that ends there; false, and nothing
     /// written, where [`interpolate`](Integrator::interpolate) is as accurate, or no such step can be made.
     fn land(&mut self, _problem: &mut P, _from: &State, _time: Time, _inside: &mut State) -> bool {

@@ -20,7 +20,7 @@ const RESOLVED: f64 = 1e-11;
 const SHARE: f64 = 0.1;
 /// What the last coefficients of an interpolant may be over the least magnitude it can have: the function has
 /// no zero there, whatever its other digits are.
-const CERTAIN: f64 = 1e-3;
+pub(super) const CERTAIN: f64 = 1e-3;
 /// Halvings of a step whose event functions no interpolant resolves; of parts with many turns or
 /// oscillations there are more, and of those with a place beyond which a function has no value.
 pub(super) const HALVINGS: u32 = 4;
@@ -136,6 +136,9 @@ impl EventDetector {
         depth: u32,
         all: &mut Vec<Passage>,
     ) {
+        if depth == 0 && self.is_far(inside, (begin, span)) {
+            return;
+        }
         self.friction.iter().for_each(FrictionWatch::search);
         let at = |share: f64, row: &mut Vec<f64>| self.append_values(inside.at(begin + share * span), row);
         let (resolved, largest) = (resolved(self.tolerance), &self.memory.largest[..self.before_friction()]);

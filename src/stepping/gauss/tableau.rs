@@ -80,6 +80,17 @@ impl GaussTableau {
         integral(&self.nodes, &self.weights, j, DoubleDouble::ZERO, self.nodes[i]).hi
     }
 
+    /// (1/b_j) ∫_0^share l_j: what increment j has given up to a share of the step.
+    pub fn reached(&self, j: usize, share: f64) -> f64 {
+        let node = |k: usize| self.nodes[k].hi;
+        let others = |x: f64| {
+            let factors = (0..self.nodes.len()).filter(|&k| k != j);
+            factors.fold(1.0, |product, k| product * (x - node(k)) / (node(j) - node(k)))
+        };
+        let weighted = self.weights.iter().enumerate().map(|(k, b)| b.hi * others(share * node(k)));
+        share * weighted.sum::<f64>() / self.weights[j].hi
+    }
+
     /// (b_i/b_j) l_j(1 + c_i): what increment j of one step gives to increment i of the next.
     pub fn carried(&self, i: usize, j: usize) -> f64 {
         (lagrange(&self.nodes, j, DoubleDouble::ONE + self.nodes[i]) * self.weights[i] / self.weights[j]).hi

@@ -42,6 +42,17 @@ impl GaussScratch {
         }
     }
 
+    /// Moves a state from the beginning of the step to a share of it, by the collocation polynomial.
+    pub fn carry(&self, tableau: &GaussTableau, share: f64, state: &mut State) {
+        let s = tableau.nodes.len();
+        for j in 0..s {
+            let reached = tableau.reached(j, share);
+            for (y, increment) in state.y.iter_mut().zip(&self.increment) {
+                *y += reached * increment.0[lane(j, s)];
+            }
+        }
+    }
+
     /// Writes the new state of a method of s stages.
     pub(super) fn commit(&self, state: &mut State, s: usize) {
         for (k, &total) in self.total.iter().enumerate() {
