@@ -652,7 +652,8 @@ fn too_many_rows_are_refused_where_they_are_asked_for() {
     scene["every"] = serde_json::json!(1e-9);
     program.write("fine.json", &scene.to_string());
     program.run("run fine.json --until 3").exits(3).says(&[
-        "an output interval of",
+        "every: an output interval of 1e-9 s up to 3 s",
+        "a longer every in the scene",
         "3e9 rows",
         "at most 1e9",
     ]);

@@ -113,6 +113,8 @@ fn what_refuses_a_scene_says_how_to_mend_it() {
     let program = Program::with_scenes(&["free"]);
     program.write("scene.json", &(program.read("free.json") + "\n{}"));
     program.run("check scene.json").exits(3).says(&["the scene ends before it"]);
+    program.write("scene.json", "{\"name\": \"a\u{0}b\"}");
+    program.run("check scene.json").exits(3).says(&["scene.json:1:", "\\u and four hexadecimal digits"]);
     let refused = program.run("sweep free.json --vary name=1..2:3");
     assert!(!refused.stderr.contains("it must be a name"), "{refused:#?}");
 }

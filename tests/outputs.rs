@@ -482,6 +482,17 @@ fn swinging(every: f64) -> Scene {
 }
 
 #[test]
+fn what_is_made_of_torques_has_their_unit() {
+    let outputs = ["size=abs(M.torque)", "less=-M.torque", "both=max(M.torque, -M.torque)"];
+    let scene = with(with(swinging(0.1), &outputs), &["turned=M.torque*bar.phi"]);
+    let request = Request { until: Some(0.1), ..adaptive(MethodId::Taylor, 1e-9) };
+    let outcome = run(&scene, &request);
+    let unit = |name: &str| found(&outcome.extremes, name).unit.clone();
+    assert_eq!(["size", "less", "both"].map(unit), ["N m", "N m", "N m"]);
+    assert_eq!(["turned", "power"].map(unit), ["J", "W"]);
+}
+
+#[test]
 fn extremes_and_means_are_located_between_rows() {
     let outcome = run(&swinging(3.0), &adaptive(MethodId::Taylor, 1e-14));
     let (inertia, w, amplitude) = (0.5, TAU, 0.3);

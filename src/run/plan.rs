@@ -176,10 +176,13 @@ impl Plan {
         let rows = rows(until, every);
         if rows > MAX_ROWS {
             let reason = format!("{} rows would be written; at most {MAX_ROWS:e}", count(rows));
-            let hint = "a longer output interval";
             return Err(match request.every {
-                Some(_) => usage("--every", reason, hint),
-                None => mismatch(format!("an output interval of {every} s up to {until} s"), &reason, hint),
+                Some(_) => usage("--every", reason, "a longer output interval"),
+                None => mismatch(
+                    format!("every: an output interval of {every:?} s up to {until} s"),
+                    &reason,
+                    "a longer every in the scene, or --every",
+                ),
             });
         }
         let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.constraints.len()) as f64;

@@ -224,6 +224,9 @@ fn syntax_hint(json: &str, at: usize, error: &serde_json::Error) -> &'static str
     } else if error.to_string().starts_with("control character") {
         match rest.find(|c: char| c.is_ascii_control()).map(|at| rest.as_bytes()[at]) {
             Some(b'\t') => "write \\t for a tab inside of quotes",
+            Some(byte) if !matches!(byte, b'\n' | b'\r') => {
+                "leave it out, or write it as \\u and four hexadecimal digits"
+            }
             _ => "this text is not closed by a quote on its line",
         }
     } else if rest.starts_with(|c: char| c.is_ascii_digit())

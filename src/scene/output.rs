@@ -23,6 +23,8 @@ use std::collections::{HashMap, HashSet};
 
 /// The unit of a formula whose dimension a plain number of the scene leaves open.
 const UNKNOWN: &str = "?";
+/// The unit of torques, as the format writes it.
+const TORQUE: &str = "N·m";
 
 /// A formula whose value is an output.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -233,7 +235,7 @@ impl OutputNames {
         for weld in &scene.welds {
             self.add_force(&weld.name, |axis| Quantity::Joint(named(&weld.name), axis));
             let angle = Quantity::Multiplier(format!("{}.angle", weld.name));
-            self.add(&weld.name, "torque", "N·m", angle);
+            self.add(&weld.name, "torque", TORQUE, angle);
         }
         for slider in &scene.sliders {
             let Rail { place, direction } = slider.rail;
@@ -243,10 +245,10 @@ impl OutputNames {
             self.add_force(&slider.name, |axis| Quantity::Push(named(&slider.name), axis));
             if slider.locked {
                 let angle = Quantity::Multiplier(format!("{}.angle", slider.name));
-                self.add(&slider.name, "torque", "N·m", angle);
+                self.add(&slider.name, "torque", TORQUE, angle);
             }
         }
-        let turning = scene.motors.iter().map(|motor| (&motor.name, "torque", "N·m"));
+        let turning = scene.motors.iter().map(|motor| (&motor.name, "torque", TORQUE));
         for (name, quantity, unit) in
             turning.chain(scene.drives.iter().map(|drive| (&drive.name, "force", "N")))
         {
@@ -255,14 +257,14 @@ impl OutputNames {
         }
         for Coupling { name, coupled, .. } in &scene.couplings {
             let (quantity, unit) = match coupled {
-                Coupled::Angle { .. } => ("torque", "N·m"),
+                Coupled::Angle { .. } => ("torque", TORQUE),
                 Coupled::Travel(_) => ("force", "N"),
             };
             self.add(name, quantity, unit, Quantity::Multiplier(named(name)));
             self.add(name, "power", "W", Quantity::Power(named(name)));
         }
         for lock in &scene.locks {
-            self.add(&lock.name, "torque", "N·m", Quantity::Multiplier(named(&lock.name)));
+            self.add(&lock.name, "torque", TORQUE, Quantity::Multiplier(named(&lock.name)));
         }
     }
 
@@ -284,7 +286,7 @@ impl OutputNames {
         for (name, bar, base) in springs.chain(laws) {
             self.add_state(name, "angle", Meaning::RelativeAngle(bar, base));
             self.add_state(name, "rate", Meaning::RelativeRate(bar, base));
-            self.add(name, "torque", "N·m", Quantity::Torsion(name.clone(), bar));
+            self.add(name, "torque", TORQUE, Quantity::Torsion(name.clone(), bar));
         }
         for wall in &scene.walls {
             let point = Place { bar: Some(wall.bar), point: wall.point };
@@ -297,7 +299,7 @@ impl OutputNames {
         }
         for friction in &scene.frictions {
             let (name, unit) = match friction.at {
-                FrictionPlace::Hinge { hinge, .. } => (&scene.hinges[hinge].name, "N·m"),
+                FrictionPlace::Hinge { hinge, .. } => (&scene.hinges[hinge].name, TORQUE),
                 FrictionPlace::Slider(slider) => (&scene.sliders[slider].name, "N"),
                 FrictionPlace::Wall { wall, .. } => (&scene.walls[wall].name, "N"),
             };
@@ -324,6 +326,7 @@ impl OutputNames {
     fn bound(&self, Output { name, formula: text }: &Output) -> Result<BoundOutput, FormulaError> {
         let formula = Formula::parse_with(text, self.names.tables())?;
         let (mut sources, mut dimensions, mut unit) = (Vec::new(), Vec::new(), None);
+        let mut are_torques = true;
         for name in formula.names() {
             let (source, dimension, own) = match (self.names.find(name), self.carried.get(name)) {
                 (Some((meaning, dimension)), _) => {
@@ -337,6 +340,7 @@ impl OutputNames {
                     return Err(formula.unknown(name, &known.collect::<Vec<_>>()));
                 }
             };
+            are_torques &= own == TORQUE;
             let is_alone = formula.text().trim() == name;
             if let Some(dimension) = self.names.integral(name).filter(|_| is_alone) {
                 unit = Some(dimension.map_or_else(|| UNKNOWN.to_owned(), |dimension| dimension.unit()));
@@ -348,7 +352,10 @@ impl OutputNames {
             dimensions.push(dimension);
         }
         let dimension = formula.dimension(&dimensions)?;
+        let is_torque = are_torques && !sources.is_empty();
         let unit = unit.unwrap_or_else(|| match dimension {
+            // What is made of torques alone is one, and no energy.
+            Some(dimension) if is_torque && dimension.is(Dimension::of(TORQUE)) => TORQUE.to_owned(),
             Some(dimension) => dimension.unit(),
             None => UNKNOWN.to_owned(),
         });
