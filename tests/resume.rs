@@ -43,6 +43,12 @@ fn uninterrupted(scene: &Scene, request: &Request) -> Result<String, String> {
     Ok(told(&samples, running.finish()))
 }
 
+fn simulated(scene: &Scene, request: &Request) -> Outcome {
+    let mut running = begun(scene, request).expect("a run");
+    assert!(running.go(&mut |_| Ok(()), &mut || false).expect("samples are kept"));
+    running.finish()
+}
+
 /// The same, paused where `pause` says so; at every pause all goes through bytes into a new run.
 fn interrupted(scene: &Scene, request: &Request, pause: &mut dyn FnMut() -> bool) -> (String, u32) {
     let mut running = begun(scene, request).expect("it began before");
@@ -213,6 +219,49 @@ fn effort_is_not_allowed_anew() {
     let (explicit, series) = (Dp8::new(tolerance), Taylor::new(tolerance));
     assert_eq!(stops_at(explicit.clone(), Seen::Kept), stops_at(explicit, Seen::Enough));
     assert_eq!(stops_at(series.clone(), Seen::Kept), stops_at(series, Seen::Enough));
+}
+
+/// One window that ends on the maximum of evaluations, paused at every row: the same rows and the same stop;
+/// with more allowed, it goes on to where a run that was never cut comes to.
+#[test]
+fn a_window_cut_by_the_maximum_of_evaluations_goes_on() {
+    let scene = shipped("free", &[]);
+    for method in [MethodId::Dopri5, MethodId::Dop853] {
+        let whole = Request { every: Some(1.0), ..request(method, None) };
+        let cut = Request { max_evaluations: Some(200), ..whole.clone() };
+        // Bounded, so that a run that makes no step ends.
+        let mut calls = 0;
+        let at_every_row = &mut || {
+            calls += 1;
+            assert!(calls < 1000, "{method}: no step is made");
+            true
+        };
+        let (pieces, pauses) = interrupted(&scene, &cut, at_every_row);
+        assert!(pieces == uninterrupted(&scene, &cut).expect("a run"), "{method}");
+        assert!(pieces.contains("EffortExhausted") && pauses > 5, "{method}: {pauses} pauses");
+
+        let expected = simulated(&scene, &whole);
+        // From its third row, and from its last one.
+        for rows in [3, pauses] {
+            let mut running = begun(&scene, &cut).expect("a run");
+            let mut left = rows;
+            let mut pause = || {
+                left = left.saturating_sub(1);
+                left == 0
+            };
+            assert!(!running.go(&mut |_| Ok(()), &mut pause).expect("kept"), "{method}");
+            let mut snapshot = running.snapshot();
+            snapshot.allow(10_000_000);
+            let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+            let start = mechanism.start(&scene);
+            let mut running = Running::resume(mechanism, &start, snapshot).expect("it fits");
+            assert!(running.go(&mut |_| Ok(()), &mut || false).expect("kept"));
+            let outcome = running.finish();
+            assert!(outcome.stop.is_none(), "{method}: {:?}", outcome.stop);
+            let off = (outcome.last.phi[1] - expected.last.phi[1]).abs();
+            assert!(off < 1e-6, "{method} from row {rows}: off by {off:e}");
+        }
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@ use super::spring_guard::SpringGuard;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{BodyAngles, Form, Motion, MotionPowers, State, Time};
-use crate::stepping::{Integrator, Statistics, StepError};
+use crate::stepping::{Integrator, Statistics, StepError, interruption};
 
 /// Turns that a state may have at most: all that doubles count.
 pub(super) const MOST_TURNS: u64 = 1 << 53;
@@ -133,6 +133,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             true => own.state.time >= until,
             false => own.method.is_at(&own.state, until),
         };
+        let mut idle = 0;
         self.is_inside = false;
         self.begin(target, flips.as_deref_mut())?;
         while !is_there(self) {
@@ -151,6 +152,8 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
                 if pause() {
                     return Ok(Halt::Pause);
                 }
+                idle += 1;
+                interruption::check(Integrator::<P>::name(&self.method), self.state.time.hi, idle)?;
                 continue;
             }
             self.check_springs()?;
@@ -166,9 +169,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             if let Some(monitor) = &mut monitor {
                 self.show(*monitor);
             }
-            if let Some(event) = event
-                && self.state.time.hi <= until.hi
-            {
+            if let Some(event) = event.filter(|_| self.state.time.hi <= until.hi) {
                 return Ok(Halt::Contact(event));
             }
             self.ahead = event;
@@ -261,9 +262,8 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             self.method.begin(&mut self.problem, &mut state, horizon)?;
             self.method.step(&mut self.problem, &mut state, horizon, &mut Statistics::default())?;
         }
-        (self.state, self.statistics, self.from, self.ahead, self.goes_on) =
-            (place.state, place.statistics, place.from, place.ahead, steps_back);
-        self.is_cut = place.is_cut;
+        (self.state, self.statistics, self.from) = (place.state, place.statistics, place.from);
+        (self.ahead, self.goes_on, self.is_cut) = (place.ahead, steps_back, place.is_cut);
         Ok(self.method.restore_internal_state(&place.known))
     }
 }

@@ -144,13 +144,14 @@ fn step<F: OdeSystem + ?Sized>(
     statistics: &mut Statistics,
 ) -> Result<Option<usize>, StepError> {
     if !rows.has_more(until) {
-        if let Some(failure) = rows.failure.take().filter(|_| rows.until == until) {
+        if rows.after.is_empty() {
+            // It may have been interrupted while it was integrated again.
+            begin(rows, stepper, integrate, field, state, until)?;
+        }
+        if let Some(failure) = rows.failure.clone().filter(|_| rows.until == until) {
             return Err(failure);
         }
-        if WindowRows::recall(state, until).is_some() {
-            // It was interrupted while it was integrated again.
-            begin(rows, stepper, integrate, field, state, until)?;
-        } else {
+        if WindowRows::recall(state, until).is_none() {
             rows.clear();
             part(rows, stepper, integrate, field, state, until, statistics)?;
         }
@@ -164,8 +165,8 @@ fn step<F: OdeSystem + ?Sized>(
     Ok(None)
 }
 
-/// One call of the crate: to `until`, or to where its rows are as many as may be kept.  Where it is
-/// interrupted there are no rows, and nothing is counted.
+/// One call of the crate: to `until`, or to where its rows are as many as may be kept, or all evaluations are
+/// used up.  Where it is interrupted there are no rows, and nothing is counted.
 fn part<F: OdeSystem + ?Sized>(
     kept: &mut WindowRows,
     stepper: &Stepper,
@@ -186,7 +187,7 @@ fn part<F: OdeSystem + ?Sized>(
         what,
         hint: hint.into(),
     };
-    let before = *statistics;
+    let (before, allowed) = (*statistics, statistics.max_evaluations - statistics.evaluations);
     let mut rate = vec![0.0; n];
     field.rhs(state.time, &state.y, &mut rate);
     statistics.evaluations += 1;
@@ -262,6 +263,8 @@ fn part<F: OdeSystem + ?Sized>(
         let what = "the crate made no step".into();
         return Err(stop(Cause::StepTooSmall, state.time.hi, span, what, "take --method taylor or dp8"));
     }
+    // A maximum of evaluations ends it as one of rows does: the next part stops, or goes on with more.
+    kept.failure = kept.failure.take().filter(|failure| failure.cause != Cause::EffortExhausted);
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let next = match steps[..] {
         // One step was enough, or would have been: the second, cut to fit, was still the longer.
@@ -271,8 +274,9 @@ fn part<F: OdeSystem + ?Sized>(
     };
     kept.start.clone_from(state);
     kept.start.low.fill(0.0);
-    kept.start.memory.truncate(1);
-    (kept.until, kept.after, kept.y, kept.unit, kept.last, kept.next) = (until, times, rows, unit, 0, next);
+    kept.start.memory.resize(1, 0.0);
+    (kept.until, kept.after, kept.y, kept.unit) = (until, times, rows, unit);
+    (kept.last, kept.next, kept.allowed) = (0, next, allowed as f64);
     Ok(())
 }
 

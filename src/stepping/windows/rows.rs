@@ -18,6 +18,8 @@ pub struct WindowRows {
     pub(super) last: usize,
     /// The step passed on to the next window \[s\].
     pub(super) next: f64,
+    /// Evaluations it was allowed.
+    pub(super) allowed: f64,
     /// Why the window ends with them, where it failed: told once all are handed out, since whoever looks at
     /// them may change the motion before.
     pub(super) failure: Option<StepError>,
@@ -38,20 +40,21 @@ impl WindowRows {
         self.failure = None;
     }
 
-    /// What a state in the middle of a window remembers: the step passed on, the row it is, and where the
-    /// window began.
+    /// What a state in the middle of a window remembers: the step passed on, the row it is, the evaluations
+    /// allowed, and where the window began.
     pub(super) fn remember(&self, memory: &mut Vec<f64>) {
-        let Self { start, until, .. } = self;
+        let Self { start, until, next, allowed, .. } = self;
         let first = start.memory.first().copied().unwrap_or_default();
         memory.clear();
-        memory.extend([self.next, self.last as f64, first, start.time.hi, start.time.lo, until.hi, until.lo]);
+        memory.extend([*next, self.last as f64, *allowed, first]);
+        memory.extend([start.time.hi, start.time.lo, until.hi, until.lo]);
         memory.extend(start.y.iter().copied().chain(start.turns.iter().map(|&turns| turns as f64)));
     }
 
-    /// The beginning of the window that a state on the way to `until` is in the middle of, and which of its
-    /// rows it is.
-    pub(super) fn recall(state: &State, until: Time) -> Option<(State, usize)> {
-        let (&[_, row, first, time, low, end, end_low], rest) = state.memory.split_first_chunk()?;
+    /// The beginning of the window that a state on the way to `until` is in the middle of, which of its rows
+    /// it is, and the evaluations the window was allowed.
+    pub(super) fn recall(state: &State, until: Time) -> Option<(State, usize, f64)> {
+        let (&[_, row, allowed, first, time, low, end, end_low], rest) = state.memory.split_first_chunk()?;
         let (y, turns) = rest.split_at_checked(state.y.len())?;
         if [end, end_low] != [until.hi, until.lo] || turns.len() != state.turns.len() {
             return None;
@@ -60,7 +63,7 @@ impl WindowRows {
             State { time: Time { hi: time, lo: low }, y: y.to_vec(), memory: vec![first], ..state.clone() };
         start.low.fill(0.0);
         start.turns = turns.iter().map(|&turns| turns as i64).collect();
-        Some((start, row as usize))
+        Some((start, row as usize, allowed))
     }
 
     /// Writes row `last` to a state.
@@ -93,10 +96,17 @@ pub(super) fn begin<F: OdeSystem + ?Sized>(
     until: Time,
 ) -> Result<(), StepError> {
     super::super::refuse_the_past(stepper.name, state, until, field.time_unit())?;
-    if let Some((start, row)) = WindowRows::recall(state, until) {
-        let is_known = rows.start == start && rows.has_more(until);
+    if let Some((start, row, allowed)) = WindowRows::recall(state, until) {
+        let is_known =
+            rows.start == start && rows.until == until && rows.allowed == allowed && row < rows.after.len();
         if !is_known {
-            part(rows, stepper, integrate, field, &start, until, &mut Statistics::default())?;
+            // As often evaluated as before, it comes to the same rows.
+            let mut statistics = Statistics { max_evaluations: allowed as u64, ..Statistics::default() };
+            part(rows, stepper, integrate, field, &start, until, &mut statistics)?;
+            if rows.after.is_empty() {
+                // Interrupted: nothing was done.
+                return Ok(());
+            }
         }
         if row < rows.after.len() {
             let mut there = state.clone();
@@ -106,6 +116,8 @@ pub(super) fn begin<F: OdeSystem + ?Sized>(
                 return Ok(());
             }
         }
+        // It is no row of that window: a new one begins with it.
+        state.memory.truncate(1);
     }
     rows.clear();
     Ok(())
