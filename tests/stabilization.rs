@@ -4,6 +4,7 @@ use crate::common;
 
 use common::shipped;
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
+use driftless::stepping::Cause;
 use std::sync::Arc;
 
 fn run(scene: &str, request: &Request) -> Outcome {
@@ -24,6 +25,26 @@ fn request(method: MethodId, stabilize: Stabilization) -> Request {
         until: Some(3.0),
         every: Some(0.1),
         ..Request::default()
+    }
+}
+
+/// The pilot run that measures Baumgarte's time constant is allowed no more than the run: what stops it stops
+/// the run itself, with all that was reached by then.
+#[test]
+fn a_pilot_run_that_stops_keeps_no_run_from_beginning() {
+    let scene = shipped("motor", &[]);
+    let mechanism = common::compile(&scene);
+    // Not one step, and a few.
+    for most in [1, 40] {
+        let request =
+            Request { max_evaluations: Some(most), ..request(MethodId::Dp8, Stabilization::Baumgarte) };
+        let plan = Plan::new(&scene, &mechanism, &request).expect("a sensible pairing");
+        let start = mechanism.start(&scene);
+        let run = Run::new(Arc::clone(&mechanism), plan, Limits::default(), &start).expect("a beginning");
+        let outcome = integrate(run, &mut |_| Ok(())).expect("no observer fails");
+        assert_eq!(outcome.stop.expect("the maximum is used up").cause, Cause::EffortExhausted);
+        let constant = outcome.plan.time_constant.expect("it was measured");
+        assert!((1e-4..1.0).contains(&constant), "{most} evaluations: {constant} s");
     }
 }
 

@@ -209,7 +209,8 @@ fn cannot_begin(plan: &Plan, what: String) -> StepError {
     }
 }
 
-/// Five mean steps of the unstabilized run over its first output intervals (at most twenty) \[s\].
+/// Five mean steps of the unstabilized run over its first output intervals (at most twenty) \[s\], or up to
+/// where it stops; five output intervals where it makes none.
 fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64, StepError> {
     let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
     let mut driver = build(mechanism, &mut plain, start)?;
@@ -218,12 +219,14 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     for row in 1..=rows {
         match driver.advance(plan.time(row), plan.time(plan.rows), StepWatch::default(), &mut || false) {
             Ok(Halt::Until | Halt::Pause) => {}
-            Ok(Halt::Contact(_) | Halt::Cut) => break,
-            Err(stop) if stop.cause == Cause::RestingContact => break,
-            Err(stop) => return Err(stop),
+            // What stops it stops the run itself, which says so.
+            Ok(Halt::Contact(_) | Halt::Cut) | Err(_) => break,
         }
     }
     let mut motion = Motion::default();
     driver.read(&mut motion);
-    Ok(5.0 * motion.time.hi.max(f64::MIN_POSITIVE) / driver.statistics().steps.max(1) as f64)
+    Ok(match driver.statistics().steps {
+        0 => 5.0 * plan.time(1).hi,
+        steps => 5.0 * motion.time.hi / steps as f64,
+    })
 }
