@@ -8,6 +8,7 @@ use crate::program;
 use common::shipped;
 use driftless::dynamics::multiplier::Multiplier;
 use driftless::dynamics::{Form, Mechanism};
+use driftless::run::trust::Level;
 use driftless::run::{
     Limits, METHODS, MethodId, Outcome, Plan, Problem, Request, Run, Running, Sample, Snapshot, Stabilization,
 };
@@ -262,6 +263,42 @@ fn a_window_cut_by_the_maximum_of_evaluations_goes_on() {
             assert!(off < 1e-6, "{method} from row {rows}: off by {off:e}");
         }
     }
+}
+
+/// The error estimate is allowed no more evaluations than its run, and goes on where more are allowed.
+#[test]
+fn an_estimate_cut_by_the_maximum_of_evaluations_goes_on() {
+    let scene = shipped("four_bars", &[]);
+    let estimated = |most: u64| {
+        let request = Request { max_evaluations: Some(most), ..request(MethodId::Taylor, None) };
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        let (plan, start) =
+            (Plan::new(&scene, &mechanism, &request).expect("a plan"), mechanism.start(&scene));
+        let run = Run::new(mechanism, plan, Limits::default(), &start).expect("a run");
+        Running::new(run.trusted(Level::Full, &start))
+    };
+    let finished = |mut running: Running| {
+        assert!(running.go(&mut |_| Ok(()), &mut || false).expect("samples are kept"));
+        running.finish()
+    };
+    let told = |outcome: Outcome| {
+        let trust = outcome.trust.expect("an estimate was asked for");
+        assert_eq!(trust.why, None);
+        trust.error_estimate.expect("an estimate")
+    };
+    let expected = told(finished(estimated(1_000_000)));
+    let why = finished(estimated(10)).trust.expect("an estimate was asked for").why;
+    assert!(why.as_deref().is_some_and(|why| why.contains("work limit")), "{why:?}");
+    let mut running = estimated(10);
+    let mut last = running.snapshot();
+    while !running.go(&mut |_| Ok(()), &mut || true).expect("kept") {
+        last = running.snapshot();
+    }
+    last.allow(1_000_000);
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let start = mechanism.start(&scene);
+    let found = told(finished(Running::resume(mechanism, &start, last).expect("it fits")));
+    assert!((0.5..2.0).contains(&(found / expected)), "{found:e} for {expected:e}");
 }
 
 #[test]

@@ -90,6 +90,9 @@ impl Snapshot {
         let plan = &mut self.outcome.plan;
         plan.max_evaluations = max_evaluations;
         plan.notes.retain(|note| !note.ends_with(MORE_IS_ALLOWED));
+        if let Some(error_estimator) = &mut self.error_estimator {
+            error_estimator.allow();
+        }
     }
 
     /// The same on the way to a later horizon \[s\]; false, and nothing changed, where that is not later or

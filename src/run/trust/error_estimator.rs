@@ -10,9 +10,9 @@ use super::growth::Nature;
 use super::measured::{Apart, LAST_DIGIT, TrustMeasurement};
 use super::reference_run::{ReferenceRun, SavedReferenceRun, WorkBudget};
 use super::tangent::TangentFlow;
+use super::torques::Torques;
 use super::{CUT, DistanceMetric, HORIZON, LOST, Level, Trust};
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::clock::{Clock, still};
 use crate::run::methods::{MethodId, Stabilization};
@@ -53,6 +53,8 @@ pub(in crate::run) struct ErrorEstimator {
     prices: Prices,
     measured: TrustMeasurement,
     reference_run: Option<ReferenceRun>,
+    /// Why it waits where it is: the run's maximum of evaluations, which may be raised, is used up.
+    cut: Option<String>,
     /// The run's plan.
     run: Plan,
     /// Impacts and lasting contacts of the run.
@@ -69,9 +71,17 @@ pub(in crate::run) struct ErrorEstimator {
 pub(in crate::run) struct SavedEstimator {
     measured: TrustMeasurement,
     reference_run: Option<SavedReferenceRun>,
+    cut: Option<String>,
 }
 
 impl SavedEstimator {
+    /// Goes on where the run's maximum of evaluations, which is raised now, had been used up.
+    pub(in crate::run) fn allow(&mut self) {
+        if self.cut.take().is_some() {
+            self.measured.is_cut = false;
+        }
+    }
+
     /// On the way to a later horizon \[s\].
     pub(in crate::run) fn extend(&mut self, until: f64) {
         if let Some(reference_run) = &mut self.reference_run {
@@ -82,40 +92,6 @@ impl SavedEstimator {
     /// Whether its parts go together.
     pub(in crate::run) fn is_sound(&self) -> bool {
         self.measured.is_sound() && self.reference_run.as_ref().is_none_or(SavedReferenceRun::is_sound)
-    }
-}
-
-/// Torques and forces of motors, gears and cams among them, from positions and rates.
-struct Torques {
-    kernel: Kernel<f64>,
-    of: [Vec<f64>; 2],
-}
-
-impl Torques {
-    /// `None` where there are no motors, or torques depend on what holds a point or switches at the moment.
-    fn new(mechanism: &Mechanism) -> Option<Self> {
-        let is_smooth = mechanism.contacts.is_empty() && !mechanism.is_switched();
-        let has_motors = (0..mechanism.constraints.len()).any(|row| mechanism.is_motor(row));
-        (is_smooth && has_motors)
-            .then(|| Self { kernel: Kernel::new(mechanism), of: [Vec::new(), Vec::new()] })
-    }
-
-    /// The largest difference between two motions, and the largest torque of the second.
-    fn apart(&mut self, mechanism: &Mechanism, motions: [&Motion; 2]) -> [f64; 2] {
-        let Self { kernel, of } = self;
-        for (torques, motion) in of.iter_mut().zip(motions) {
-            let [phi, omega] = motion.rounded();
-            kernel.accelerations(mechanism, motion.time, &phi, &omega, Bias::default());
-            mechanism.share_multipliers(motion.time, kernel, &phi, &omega);
-            torques.clear();
-            let multipliers = kernel.multiplier.iter().enumerate();
-            torques
-                .extend(multipliers.filter(|&(row, _)| mechanism.is_motor(row)).map(|(_, &torque)| torque));
-        }
-        let [one, other] = of;
-        one.iter()
-            .zip(other)
-            .fold([0.0; 2], |[apart, most], (a, b)| [apart.max((*a - *b).abs()), most.max(b.abs())])
     }
 }
 
@@ -171,6 +147,7 @@ impl ErrorEstimator {
             prices,
             measured,
             reference_run,
+            cut: None,
             run: run.clone(),
             events: 0,
             torques: Torques::new(mechanism),
@@ -187,7 +164,7 @@ impl ErrorEstimator {
         kept: SavedEstimator,
         horizon: Time,
     ) -> Result<Option<Self>, StepError> {
-        let SavedEstimator { measured, reference_run } = kept;
+        let SavedEstimator { measured, reference_run, cut } = kept;
         let Some(reference_run) = reference_run else {
             return Ok(Some(Self::with(mechanism, plan, Prices::new(mechanism, plan, plan), measured, None)));
         };
@@ -195,7 +172,8 @@ impl ErrorEstimator {
             return Ok(None);
         };
         let prices = Prices::new(mechanism, reference_run.plan(), plan);
-        Ok(Some(Self::with(mechanism, plan, prices, measured, Some(reference_run))))
+        let resumed = Self::with(mechanism, plan, prices, measured, Some(reference_run));
+        Ok(Some(Self { cut, ..resumed }))
     }
 
     /// All that the rest of it depends on.
@@ -203,6 +181,7 @@ impl ErrorEstimator {
         SavedEstimator {
             measured: self.measured.clone(),
             reference_run: self.reference_run.as_ref().map(ReferenceRun::kept),
+            cut: self.cut.clone(),
         }
     }
 
@@ -211,15 +190,23 @@ impl ErrorEstimator {
         std::mem::take(&mut self.wall)
     }
 
+    /// True where no more would be allowed unless the run itself were: the estimate waits there.
+    fn waits(&self, statistics: Statistics) -> bool {
+        self.measured.level == Level::Full && self.budget(statistics) >= self.most()
+    }
+
+    /// What as many evaluations cost as the run is allowed itself.
+    fn most(&self) -> f64 {
+        self.run.max_evaluations as f64 * self.prices.series[0]
+    }
+
     /// What it may cost after so much work of the run.
     fn budget(&self, statistics: Statistics) -> f64 {
         let run = self.prices.run(self.run.method, statistics);
         let whole = match self.measured.level {
             Level::Auto => grace(&self.mechanism, &self.run) + SHARE * run,
             // No more evaluations than the run is allowed itself.
-            Level::Off | Level::Full => {
-                (FULL_GRACE + FULL_SHARE * run).min(self.run.max_evaluations as f64 * self.prices.series[0])
-            }
+            Level::Off | Level::Full => (FULL_GRACE + FULL_SHARE * run).min(self.most()),
         };
         let is_wide =
             self.reference_run.as_ref().is_some_and(|reference_run| reference_run.plan().in_double_double);
@@ -251,7 +238,7 @@ impl ErrorEstimator {
     /// # Errors
     /// Why it goes no further.
     fn accompany(&mut self, time: Time, statistics: Statistics) -> Result<(), String> {
-        let limit = self.budget(statistics);
+        let (limit, waits) = (self.budget(statistics), self.waits(statistics));
         let Self { reference_run: Some(reference_run), prices, measured, .. } = self else { return Ok(()) };
         let mut budget = WorkBudget { prices, spent: &mut measured.spent, limit, flow: &mut measured.flow };
         let gone = reference_run.go(time, &mut budget);
@@ -260,7 +247,7 @@ impl ErrorEstimator {
             measured.conclude(reference_run.end_flow().as_ref());
         }
         let Err(stop) = gone else { return Ok(()) };
-        let is_dear = reference_run.plan().in_double_double;
+        let is_dear = reference_run.plan().in_double_double && !(waits && stop.is_none());
         let second = is_dear.then(|| finer::second(&self.mechanism, &self.run)).flatten();
         if let Some(finer::Finer { mut plan, name }) = second {
             let from = crate::arithmetic::shown::about(reference_run.motion.time.hi);
@@ -287,7 +274,8 @@ impl ErrorEstimator {
 
     /// Looks at the run.
     fn look(&mut self, motion: &Motion, statistics: Statistics) {
-        let Some(until) = self.reference_run.as_ref().map(|run| run.plan().until) else { return };
+        let reference_run = self.reference_run.as_ref().filter(|_| self.cut.is_none());
+        let Some(until) = reference_run.map(|run| run.plan().until) else { return };
         let t = motion.time.hi;
         if self.measured.seen > 0 && t <= self.measured.until {
             return;
@@ -297,7 +285,8 @@ impl ErrorEstimator {
         if let Err(why) =
             self.accompany(if motion.time > horizon { horizon } else { motion.time }, statistics)
         {
-            return self.end(&why);
+            let waits = self.measured.is_cut && self.waits(statistics);
+            return if waits { self.cut = Some(why) } else { self.end(&why) };
         }
         self.measured.run = self.prices.run(self.run.method, statistics);
         self.limit_flow();
@@ -407,6 +396,8 @@ impl ErrorEstimator {
 
     /// Ends it, for a reason where there is one to be told.
     fn end(&mut self, why: &str) {
+        let cut = self.cut.take();
+        let why = cut.as_deref().unwrap_or(why);
         if let Some(reference_run) = self.reference_run.take() {
             self.measured.conclude(reference_run.tangent.as_ref());
         }
@@ -424,7 +415,7 @@ impl ErrorEstimator {
 
 impl Monitor for ErrorEstimator {
     fn due(&self) -> f64 {
-        if self.reference_run.is_some() { self.measured.due } else { f64::INFINITY }
+        if self.reference_run.is_some() && self.cut.is_none() { self.measured.due } else { f64::INFINITY }
     }
 
     fn observe(&mut self, motion: &Motion, statistics: Statistics) {

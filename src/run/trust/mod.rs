@@ -35,6 +35,7 @@ pub mod inputs;
 mod measured;
 mod reference_run;
 pub mod tangent;
+mod torques;
 
 pub use distance::DistanceMetric;
 pub(super) use error_estimator::{ErrorEstimator, SavedEstimator};
