@@ -172,8 +172,8 @@ impl ExtremesDetector {
                 }
             }
         }
-        let core = (0..=PLACES).filter(|&i| shares[i] < SMALL);
-        if let (Some(first), Some(last)) = (core.clone().next(), core.last()) {
+        let is_core = |i: &usize| shares[*i] < SMALL;
+        if let (Some(first), Some(last)) = ((0..=PLACES).find(is_core), (0..=PLACES).rfind(is_core)) {
             let ends = [first.saturating_sub(1), PLACES.min(last + 1)].map(|i| place(i as f64));
             match &mut passage.core {
                 Some([_, end]) => {
