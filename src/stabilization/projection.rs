@@ -6,8 +6,8 @@
 //! velocity:  S dm = G w + C_t,      w -= M⁻¹ Gᵀ dm     all at the new position and time
 //! ```
 //!
-//! Near singular positions, where constraints were left out of the equations, the impulse Gᵀ dm is the one
-//! these would have given, and what it does on motors is their work; all other energy is the stabilizer's.
+//! The energy put in is the stabilizer's.  Near singular positions, where constraints are left out of the
+//! equations, it stands for what these would have done: where motors leave no freedom, that is their work.
 //!
 //! The shortest way in the metric of the mass matrix; small mechanisms with loops go it in natural
 //! coordinates (module `natural`).  Source: E. Hairer, G. Wanner, *Solving Ordinary Differential Equations
@@ -358,9 +358,8 @@ fn project_sized<const N: usize>(
         }
     }
     is_position_kept(mechanism, kernel, state, tolerance)?;
-    let mut work = 0.0;
-    if let Some([change, of_motors]) = project_rates::<N>(mechanism, kernel, state, tolerance)? {
-        (moved, far, work) = (true, larger(far, change), of_motors);
+    if let Some(change) = project_rates::<N>(mechanism, kernel, state, tolerance)? {
+        (moved, far) = (true, larger(far, change));
     }
     let balance = energy_before - state.y[2 * n] - state.y[2 * n + 1];
     let mut energy_change = 0.0;
@@ -368,10 +367,9 @@ fn project_sized<const N: usize>(
         state.wrap();
         energy_change = mechanism.energy_facing::<f64, N>(kernel, &state.y[..n], &state.y[n..2 * n]).total()
             - energy_before;
-        // Constraints that were left out on the way have their impulse here.
-        let of_motors = if kernel.weakest.is_near { work } else { 0.0 };
-        state.y[2 * n] += of_motors;
-        state.y[2 * n + 1] += energy_change - of_motors;
+        let is_driven = rows == n + mechanism.assembly.redundant.len();
+        let account = if is_driven && kernel.weakest.is_near { 2 * n } else { 2 * n + 1 };
+        state.y[account] += energy_change;
     }
     Ok(Corrected { has_moved: far > ROUNDING, balance, energy_change, is_near: kernel.weakest.is_near })
 }

@@ -8,8 +8,7 @@ use crate::dynamics::schur::DROPPED;
 use crate::dynamics::{Mechanism, State, tree};
 
 /// Takes off the rates of `N` bodies (any number where `N` is 0) what violates a row, by the factors and rows
-/// that `kernel` has; returns by how much they changed, over the largest of them, and the work \[J\] of motors
-/// by the impulses that changed them, where they did.
+/// that `kernel` has; returns by how much they changed, over the largest of them, where they did.
 ///
 /// One solution brings them to rounding where M and S are those of the place.  What these are behind it, up
 /// to the turns that need no new ones, leaves as much of the violation: a second one takes that off.
@@ -21,10 +20,10 @@ pub(super) fn project_rates<const N: usize>(
     kernel: &mut Kernel<f64>,
     state: &mut State,
     tolerance: f64,
-) -> Result<Option<[f64; 2]>, (String, f64)> {
+) -> Result<Option<f64>, (String, f64)> {
     let n = tree::size::<N>(mechanism.coordinates());
     let (mut last, mut enough) = (f64::INFINITY, 2.0 * f64::EPSILON);
-    let mut changed: Option<[f64; 2]> = None;
+    let mut changed = None;
     loop {
         let mut fast = 0.0;
         for r in 0..mechanism.constraints.len() {
@@ -45,10 +44,7 @@ pub(super) fn project_rates<const N: usize>(
         let most = rates.fold(1.0 / mechanism.units.time, |most: f64, (k, omega)| {
             most.max(omega.abs() / size(mechanism, k))
         });
-        let motors = (0..mechanism.constraints.len()).filter(|&r| mechanism.constraints[r].is_motor());
-        let work: f64 = motors.map(|r| kernel.multiplier[r] * kernel.row_speed(r, &state.y[n..2 * n])).sum();
-        let [before, done] = changed.unwrap_or_default();
-        changed = Some([larger(before, change / most), done - work]);
+        changed = Some(larger(changed.unwrap_or(0.0), change / most));
     }
     if changed.is_some() {
         is_rate_kept(mechanism, kernel, state, tolerance)?;
