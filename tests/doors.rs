@@ -500,6 +500,17 @@ fn an_integrator_from_outside_is_driven_like_the_others() {
     }
 }
 
+/// Walls are met where a method locates them, and one from outside that does not is told what it has to do.
+#[test]
+fn an_integrator_from_outside_has_to_locate_impacts() {
+    let scene = driftless::read_scene("examples/scenes/wall.json".as_ref(), &[]).expect("a scene");
+    let simulation = Simulation::new(&scene).expect("equations");
+    let stop = simulation.integrator(Custom::new("rk4", || Rk4::boxed(1e-3))).run().expect("a run").stop;
+    let stop = stop.expect("the ground is passed");
+    assert_eq!(stop.cause, driftless::stepping::Cause::WallPassed);
+    assert!(stop.hint.contains("integrator from outside") && stop.hint.contains("`step`"), "{}", stop.hint);
+}
+
 /// The same, which takes whole steps only and calls the last one before an output time its end.
 struct Early(Rk4);
 

@@ -22,7 +22,7 @@ use super::event::{EventDetector, EventMemory};
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
 use super::impact_monitor;
-use super::methods::Stabilization;
+use super::methods::{MethodId, Stabilization};
 use super::monitor::{Monitor, lent};
 use super::observer::{ObserverAdapter, StepWatcher, Watchers};
 use super::plan::Plan;
@@ -84,7 +84,14 @@ pub(super) const DRIVEN: &str =
 
 /// What is to be done where a method misses what a wall does.
 pub(super) fn tighter(method: &str) -> &'static str {
-    if method == "taylor" { "tighten the tolerance" } else { "tighten the tolerance, or use --method taylor" }
+    match method.parse() {
+        Ok(MethodId::Taylor) => "tighten the tolerance",
+        Ok(MethodId::Custom) | Err(_) => {
+            "an integrator from outside has to locate impacts: its `step` ends where one of `OdeSystem::gaps` \
+                passes zero and returns its number; or take a method of the crate"
+        }
+        Ok(_) => "tighten the tolerance, or use --method taylor",
+    }
 }
 
 /// A contact that is held.

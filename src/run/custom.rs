@@ -13,9 +13,12 @@ type Make = dyn Fn() -> Box<dyn Integrator<dyn Problem> + Send> + Send + Sync;
 
 /// An integrator from outside, as a plan holds it; two are the same where one is a clone of the other.
 ///
-/// It is driven as the crate's own ones: events and impacts, monitors, projection after its steps, the error
-/// estimate, pauses.  One that is [dense](Integrator::is_dense) takes steps as long as it likes; one that is
-/// not is asked for steps that end on output times.
+/// It is driven as the crate's own ones: events, monitors, projection after its steps, the error estimate,
+/// pauses.  Impacts it has to locate itself: its [`step`](Integrator::step) ends where one of the
+/// [gaps](crate::OdeSystem::gaps) passes zero, just before, and returns the number of that gap; the run then
+/// carries out the impact, and stops with [`Cause::WallPassed`] where a wall was passed without.  One that is
+/// [dense](Integrator::is_dense) takes steps as long as it likes; one that is not is asked for steps that end
+/// on output times.
 ///
 /// ```
 /// use driftless::{Custom, Integrator, OdeSystem, Simulation, read_scene};
