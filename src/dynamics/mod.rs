@@ -256,6 +256,12 @@ pub trait OdeSystem {
         1.0
     }
 
+    /// The unknown, where there is one, that is a quadrature whose rate may change fast where no other does:
+    /// the energy lost in dry friction, which goes with the magnitude of a force.
+    fn rough_quadrature(&self) -> Option<usize> {
+        None
+    }
+
     /// Number of event functions; none by default.
     fn events(&self) -> usize {
         0

@@ -122,6 +122,10 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
         self.mechanism.units.time
     }
 
+    fn rough_quadrature(&self) -> Option<usize> {
+        (WORK && self.has_friction()).then(|| 2 * self.mechanism.coordinates() + 2)
+    }
+
     fn events(&self) -> usize {
         self.mechanism.contacts.len()
     }

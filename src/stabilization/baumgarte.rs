@@ -64,6 +64,10 @@ impl<const N: usize> OdeSystem for Baumgarte<N> {
         self.inner.time_unit()
     }
 
+    fn rough_quadrature(&self) -> Option<usize> {
+        self.inner.rough_quadrature()
+    }
+
     fn events(&self) -> usize {
         self.inner.events()
     }

@@ -361,7 +361,7 @@ impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Integrator<F> for Explicit<P> {
             let (h, whole) = super::reach(wanted, left);
             statistics.check(P::NAME, state.time.hi, h)?;
             self.attempt(field, state, h, statistics);
-            let error = P::error(h, &self.k, &self.scale).sqrt();
+            let error = self.error(field, state, h, statistics);
             if !error.is_finite() {
                 cuts += 1;
                 statistics.rejected += 1;

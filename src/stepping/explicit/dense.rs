@@ -2,8 +2,11 @@
 
 use super::super::Statistics;
 use super::super::event::{Dense, SearchScratch, Stride};
-use super::{EmbeddedPair, Explicit};
+use super::{EmbeddedPair, Explicit, NESTED};
 use crate::dynamics::{OdeSystem, State};
+
+/// Shares of a step at which the rate of a quadrature is compared, not near nodes.
+const CHECKED: [f64; 2] = [0.44, 0.72];
 
 /// The largest value of what the last coefficient is that of: a polynomial that is zero, and smallest by far,
 /// at both ends of the step.
@@ -30,6 +33,57 @@ pub(super) fn expand(nested: &[f64], powers: &mut [f64]) {
     }
 }
 
+impl<P: EmbeddedPair> Explicit<P> {
+    /// What the step just tried may be off by, over the tolerance.
+    pub(super) fn error<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        statistics: &mut Statistics,
+    ) -> f64 {
+        let error = P::error(h, &self.k, &self.scale).sqrt();
+        match field.rough_quadrature() {
+            Some(i) if error <= 1.0 => error.max(self.quadrature_error(field, state, (h, i), statistics)),
+            _ => error,
+        }
+    }
+
+    /// What a quadrature may be off by in the step just tried, over its tolerance: its rate inside the step
+    /// less the slope of its interpolation.  The rules of a pair may agree by chance on a rate with a corner.
+    fn quadrature_error<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        (h, i): (f64, usize),
+        statistics: &mut Statistics,
+    ) -> f64 {
+        if !self.has_extra {
+            self.evaluate_extra_stages(field, state, h, statistics);
+        }
+        let n = state.y.len();
+        let nested = |i: usize| {
+            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
+            P::interpolate(h, change, &|stage| self.k[stage * n + i])
+        };
+        let all: Vec<_> = (0..n).map(nested).collect();
+        let mut powers = [0.0; NESTED];
+        expand(&all[i][..P::DEGREE], &mut powers[..P::DEGREE]);
+        let (mut inside, mut rate, mut error) = (vec![0.0; n], vec![0.0; n], 0.0_f64);
+        for share in CHECKED {
+            for ((inside, y), nested) in inside.iter_mut().zip(&state.y).zip(&all) {
+                *inside = y + share * nest(&nested[..P::DEGREE], share);
+            }
+            field.rhs(state.time + share * h, &inside, &mut rate);
+            let slope = powers.iter().enumerate().rev();
+            let slope = slope.fold(0.0, |sum, (m, power)| sum * share + (m + 1) as f64 * power);
+            error = error.max((slope - h * rate[i]).abs() / self.scale[i]);
+        }
+        statistics.evaluations += CHECKED.len() as u64;
+        error
+    }
+}
+
 impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
     fn dense(
         &mut self,
@@ -39,7 +93,9 @@ impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
         dense: &mut Dense,
         statistics: &mut Statistics,
     ) {
-        self.evaluate_extra_stages(field, state, h, statistics);
+        if !self.has_extra {
+            self.evaluate_extra_stages(field, state, h, statistics);
+        }
         let n = state.y.len();
         dense.begin(field.watched(), P::DEGREE + 1, state);
         let most = self.highest;

@@ -11,6 +11,11 @@ use crate::dynamics::{Coordinates, Mechanism, State, Time};
 
 /// The step where every power but the first vanishes, in units of time.
 const LONGEST: f64 = 1e9;
+/// What a step is cut by where the loss in friction converges too slowly, and how many times.
+const CUT: f64 = 0.9;
+const MOST_CUTS: usize = 100;
+/// How many times the largest of so many powers in a row stands for what is left out.
+const SEVERAL: f64 = 10.0;
 
 /// Series and what goes into them.
 #[derive(Clone, Debug)]
@@ -149,7 +154,7 @@ impl<T: Coefficient> Expansion<T> {
             }
         }
         let step = libm::exp2(least + libm::log2(tolerance) / (order + 1) as f64).min(LONGEST * units.time);
-        step_size::falling(tolerance, order, (&last, largest), step)
+        self.loss_converges(tolerance, step_size::falling(tolerance, order, (&last, largest), step))
     }
 
     /// The same of the work over the energy scale: the power of motors, dampers and applied forces may fall
@@ -164,6 +169,28 @@ impl<T: Coefficient> Expansion<T> {
         let lost = self.series.lost();
         let all = allows(&self.series.power);
         if lost.is_empty() { all } else { all.min(allows(lost)) }
+    }
+
+    /// Of a step \[s\] as much as leaves what the powers of the loss in dry friction leave out below the
+    /// tolerance, taken to fall on as they do before.  Next to the branch points of a normal force its last
+    /// powers are small and hardly fall, or rise.
+    fn loss_converges(&self, tolerance: f64, mut step: f64) -> f64 {
+        let (order, lost) = (self.series.order(), self.series.lost());
+        if lost.is_empty() {
+            return step;
+        }
+        for _ in 0..MOST_CUTS {
+            let size = |k: usize| (lost[k - 1].value() * libm::pow(step, k as f64) / k as f64).abs();
+            let most =
+                |to: usize| (to - JUDGES..to).map(size).fold(0.0, larger) / self.mechanism.energy_scale;
+            let (before, last) = (most(order + 1 - JUDGES), most(order + 1));
+            // last (q + q² + …), q = last / before, of all powers and several steps next to one such point.
+            if last.is_nan() || SEVERAL * last * last <= tolerance * (before - last) {
+                break;
+            }
+            step *= CUT;
+        }
+        step
     }
 
     /// The same of the forces on points held at walls, whose zeros let them go: of a mechanism at rest they
