@@ -332,12 +332,14 @@ impl Orthonormal {
     }
 
     /// True where a run of `t` \[s\] is long enough to tell exponential growth from that of a power, and the
-    /// largest exponent is none but by chance.
+    /// largest exponent is none but by chance: it is no more than its scatter, which alone would tell nothing
+    /// of a scatter that is large.
     fn is_a_power(&self, t: f64, exponent: f64, error: f64) -> bool {
         let is_still = self.turned < std::f64::consts::PI;
         let has_grown = || self.logs.iter().any(|log| log.abs() >= POWER);
         let has_shown = self.turned >= SHORT || is_still && has_grown();
-        has_shown && exponent - libm::log1p(t * self.rate.sqrt()) / t <= ABOVE * error
+        let (above, open) = (exponent - libm::log1p(t * self.rate.sqrt()) / t, ABOVE * error);
+        has_shown && above <= open && above * t <= POWER && (above + open) * 0.5 * t <= EXPONENTIAL
     }
 
     /// Standard deviations of the mean exponents, from parts of the run.
