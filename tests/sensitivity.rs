@@ -619,6 +619,39 @@ fn a_spectrum_ends_where_directions_come_or_go() {
     );
 }
 
+/// A double pendulum beside a pendulum of its own that is damped (c/J = 4/3) and pushed at times has the exponents of
+/// both: what rests in one of them leaves the columns of the other as they are.
+#[test]
+fn a_spectrum_is_that_of_its_independent_parts() {
+    let bar = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 1, "centre": [0.5, 0], "inertia": 0.125, "length": 1}}"#)
+    };
+    let hinge = |name: &str, inner: &str, at: [f64; 2], outer: &str| {
+        let inner = format!(r#"{{"body": "{inner}", "point": {at:?}}}"#);
+        format!(r#"{{"name": "{name}", "between": [{inner}, {{"body": "{outer}", "point": [0, 0]}}]}}"#)
+    };
+    let text = format!(
+        r#"{{"name": "parts", "gravity": [0, -9.8125], "bars": [{}, {}, {}], "hinges": [{}, {}, {}],
+        "torsion_springs": [{{"name": "T", "body": "d", "stiffness": 1, "free_angle": 0, "damping": 0.5}}],
+        "torques": [{{"name": "q", "body": "d", "torque": "if(t>0.7,2,-1)"}}],
+        "start": {{"d": {{"phi": -1, "omega": 1}}, "a": {{"phi": 1, "omega": 0}}, "b": {{"phi": 0.5, "omega": 0}}}},
+        "until": 80, "every": 1}}"#,
+        bar("d"),
+        bar("a"),
+        bar("b"),
+        hinge("D", "ground", [-3.0, 0.0], "d"),
+        hinge("A", "ground", [0.0, 0.0], "a"),
+        hinge("B", "a", [1.0, 0.0], "b"),
+    );
+    let found = lyapunov(&template(&text), None, None, &mut || false).expect("a spectrum");
+    println!("{:?} {:e}", found.exponents, found.sum + 4.0 / 3.0);
+    assert!((found.sum + 4.0 / 3.0).abs() < 1e-6, "{:e}", found.sum + 4.0 / 3.0);
+    for exponent in &found.exponents[3..5] {
+        assert!((exponent + 2.0 / 3.0).abs() < 0.08, "{:?}", found.exponents);
+    }
+    assert_eq!(found.regime, Regime::Chaotic);
+}
+
 /// An integral is one unknown, whose exponent is zero where nothing depends on it: angle and rate of the pendulum
 /// keep theirs.
 #[test]

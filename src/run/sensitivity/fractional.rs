@@ -7,7 +7,8 @@
 //!
 //! No polynomial follows x^(p-1).  The motion's own change (w, a) is a solution of the variational equation,
 //! known at both ends; what is left without it meets the zero when the motion does, and its equation has no
-//! pole there.  The steps of the motion end at such zeros, as branches of formulas change there.
+//! pole there.  The steps of the motion end at such zeros, as branches of formulas change there.  Where the
+//! motion hardly moves, s and what (w, a) is off by are larger than the column, and it is not used.
 
 use super::collocation::{ColumnLimits, STAGES, Tails};
 use super::variation::{LIMIT, Variation, plain};
@@ -18,6 +19,8 @@ use crate::run::saltation::Side;
 
 /// What a step may leave, over the rates of a column.
 pub(super) const RESOLVED: f64 = 1e-12;
+/// How exactly the motion's own change is known.
+const EXACT: f64 = 1e-12;
 /// Share of what a step of (dq, dw) leaves that one of ρ may leave to be worth it, where it is not resolved.
 const BETTER: f64 = 0.5;
 /// Such a step is divided as one with a tail of so many times the limit, unless it is below this share of
@@ -63,14 +66,17 @@ impl Variation {
             return None;
         }
         let (mut columns, mut shares, mut sizes) = (self.columns.clone(), Vec::new(), limits.to_vec());
+        // How much larger than a column is what is taken off it.
+        let mut larger = 0.0_f64;
         for (column, whole) in columns.iter_mut().zip(&mut sizes) {
             let share = (0..n).map(|k| row[k] * (column[k] + after * column[n + k])).sum::<f64>() / speed;
             whole.floor += size(&column[n..]).max(size(column) / unit);
+            larger = larger.max((share / whole.floor).abs() * size(&begin[n..]).max(size(begin) / unit));
             column.iter_mut().zip(begin).for_each(|(entry, ahead)| *entry -= share * ahead);
             shares.push(share);
         }
         let found = self.method.solve((h, unit), &self.pull, &columns, (&self.forcing, &sizes));
-        let found = found.filter(|found| found.rough <= BETTER * tails.rough);
+        let found = found.filter(|found| found.rough.max(larger * EXACT) <= BETTER * tails.rough);
         let resolved = found.filter(|found| found.rough <= RESOLVED && found.last <= LIMIT);
         let Some(found) = resolved else {
             // The solution that was tried first.
