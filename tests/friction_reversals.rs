@@ -220,7 +220,7 @@ fn a_piston_whose_rail_is_pressed_from_the_other_side_goes_on_beside_a_rough_hin
         );
         let scene = scene(&text);
         let [series, steps] =
-            [(MethodId::Taylor, 1e-9), (MethodId::Dp8, 1e-11)].map(|(method, tolerance)| {
+            [(MethodId::Taylor, 1e-10), (MethodId::Dp8, 1e-11)].map(|(method, tolerance)| {
                 let outcome = run(&scene, &adaptive(method, tolerance));
                 assert!(outcome.stop.is_none(), "{torque} by {method}: {:?}", outcome.stop);
                 outcome.last

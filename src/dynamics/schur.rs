@@ -127,7 +127,7 @@ impl Mechanism {
     }
 
     /// True after an evaluation at a singular position of the way: what constraints exert there is the limit
-    /// along the motion, which the state alone does not tell.  Of a start there, they are those of least norm.
+    /// along the motion, which the state alone does not tell.  At a start there it is that of least norm.
     pub fn hides_forces(&self, kernel: &Kernel<f64>) -> bool {
         self.assembly.singular.is_empty() && self.standing_share(kernel) < SINGULAR
     }

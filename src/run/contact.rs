@@ -87,8 +87,8 @@ pub(super) fn tighter(method: &str) -> &'static str {
     match method.parse() {
         Ok(MethodId::Taylor) => "tighten the tolerance",
         Ok(MethodId::Custom) | Err(_) => {
-            "an integrator from outside has to locate impacts: its `step` ends where one of `OdeSystem::gaps` \
-                passes zero and returns its number; or take a method of the crate"
+            "an integrator from outside has to locate impacts: its `step` ends where one of \
+             `OdeSystem::gaps` passes zero and returns its number; or take a method of the crate"
         }
         Ok(_) => "tighten the tolerance, or use --method taylor",
     }

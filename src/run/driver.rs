@@ -3,13 +3,15 @@
 //! A step is made, springs and walls are checked, flips are looked for, and monitors are shown the motion.
 //! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) to output times.
 
+mod inside;
+
 use super::flip::{self, FlipDetector};
 use super::monitor::Monitor;
-use super::observer::{Inside, StepWatcher};
+use super::observer::StepWatcher;
 use super::spring_guard::SpringGuard;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
-use crate::dynamics::{BodyAngles, Form, Motion, MotionPowers, State, Time};
+use crate::dynamics::{BodyAngles, Form, Motion, State, Time};
 use crate::stepping::{Integrator, Statistics, StepError, interruption};
 
 /// Turns that a state may have at most: all that doubles count.
@@ -386,45 +388,6 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             }
             monitor.observe(observed, *statistics);
         }
-    }
-}
-
-impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M> {
-    fn span(&self) -> (Time, Time) {
-        (self.from.time, self.state.time)
-    }
-
-    fn at(&mut self, time: Time) -> &Motion {
-        self.observe(time, M::interpolate)
-    }
-
-    fn roughly_at(&mut self, time: Time) -> &Motion {
-        self.observe(time, M::interpolate_roughly)
-    }
-
-    fn coarsely_at(&mut self, time: Time) -> Option<&Motion> {
-        let Self { problem, method, state, from, inside, observed, .. } = self;
-        if time >= state.time || time <= from.time {
-            return Some(self.at(time));
-        }
-        if !method.interpolate_coarsely(from, time, inside) {
-            return None;
-        }
-        problem.read(inside, observed);
-        Some(&self.observed)
-    }
-
-    fn landed(&mut self, time: Time) -> Option<&Motion> {
-        let Self { problem, method, state, from, inside, observed, .. } = self;
-        if time >= state.time || time <= from.time || !method.land(problem, from, time, inside) {
-            return None;
-        }
-        problem.read(inside, observed);
-        Some(&self.observed)
-    }
-
-    fn powers(&self, powers: &mut MotionPowers) -> bool {
-        self.method.powers(powers)
     }
 }
 

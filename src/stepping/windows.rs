@@ -187,7 +187,7 @@ fn part<F: OdeSystem + ?Sized>(
         what,
         hint: hint.into(),
     };
-    let (before, allowed) = (*statistics, statistics.max_evaluations - statistics.evaluations);
+    let (before, allowed) = (*statistics, statistics.max_evaluations.saturating_sub(statistics.evaluations));
     let mut rate = vec![0.0; n];
     field.rhs(state.time, &state.y, &mut rate);
     statistics.evaluations += 1;

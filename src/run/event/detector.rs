@@ -244,16 +244,6 @@ impl EventDetector {
         fits
     }
 
-    /// The name of an event.
-    pub fn name(&self, event: usize) -> &str {
-        match self.owner(event) {
-            Owner::Scene(laws, number) => &laws.formulas.events[number].name,
-            Owner::Condition(laws, number) => &laws.formulas.conditions[number],
-            Owner::Friction(watch, number) => watch.place(number).map_or("friction", |place| &place.name),
-            Owner::Outside(number) => self.events[number].name(),
-        }
-    }
-
     /// Which passages of an event count; of a condition those that leave its present side.
     pub(super) fn counts(&self, event: usize, rises: bool) -> bool {
         let direction = match self.owner(event) {
@@ -405,8 +395,7 @@ impl StepWatcher for EventDetector {
         for passage in passages.iter_mut().filter(|passage| passage.t > begin && !passage.jumps) {
             passage.t = self.polished(inside, passage);
         }
-        self.look_for_return((begin, end), &passages);
-        if self.lost.is_some() {
+        if self.look_for_return((begin, end), &passages) {
             return Some(begin);
         }
         let due = std::mem::take(&mut self.memory.due).into_iter();

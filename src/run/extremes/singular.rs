@@ -9,8 +9,8 @@
 //! ```
 //!
 //! While a singular position is near, the outputs are remembered; once it is passed, those that follow from
-//! the equations count as the polynomials tell, and are not known where two degrees differ.  Where
-//! they do, or an output is without bound, that is so in the core only, where constraints are nearly left out;
+//! the equations count as the polynomials tell, and are not known where two degrees differ.  Where they
+//! do, or an output is without bound, that is so in the core only, where constraints are nearly left out;
 //! around it outputs are searched as everywhere.
 //!
 //! A mechanism that all but reaches a singular position turns back there: rates jump, and forces have peaks

@@ -54,9 +54,6 @@ use std::sync::Arc;
 
 /// Tolerance of the motion \[rad/s\].
 pub const TOLERANCE: f64 = 1e-14;
-/// What the tolerance may have grown to in a measure, over its value or unit: beyond, derivatives are those of
-/// noise.
-const KNOWN: f64 = 1e-3;
 
 /// A measure on its way.
 struct Query {
@@ -360,21 +357,6 @@ impl Study {
         Ok(self.gathered(asked, &seen, (lost, steps), &variation))
     }
 
-    /// Why the derivatives of a measure are those of noise, where they are: a change of a number by the share
-    /// of the tolerance does as much to it as errors of that size.
-    fn doubt(&self, value: f64, slopes: &[f64]) -> Option<String> {
-        let tolerance = self.plan.tolerance.map_or(TOLERANCE, |known| known.relative).max(f64::EPSILON);
-        let size = |input: &InputNumber| if input.value == 0.0 { 1.0 } else { input.value.abs() };
-        let moved = self.inputs.iter().zip(slopes).map(|(input, slope)| slope.abs() * size(input));
-        let share = tolerance * moved.fold(0.0, f64::max) / value.abs().max(1.0);
-        (share > KNOWN).then(|| {
-            format!(
-                "the motion is not known any more: errors of {tolerance:.0e} have grown to {share:.0e} of the value; \
-                 ask for an earlier time, and look at the horizon that `run` tells"
-            )
-        })
-    }
-
     fn gathered(
         self,
         asked: Vec<Query>,
@@ -385,7 +367,8 @@ impl Study {
         let heads = self.mechanism.outputs.iter().flat_map(|outputs| outputs.heads());
         let outputs: Vec<[String; 2]> =
             heads.map(|(name, unit)| [name.to_owned(), unit.to_owned()]).collect();
-        let doubt = |value: f64, slopes: &[f64]| self.doubt(value, slopes);
+        let tolerance = self.plan.tolerance.map_or(TOLERANCE, |known| known.relative);
+        let doubt = |value: f64, slopes: &[f64]| result::doubt(&self.inputs, tolerance, value, slopes);
         let measures = asked.iter().enumerate().map(|(k, asked)| {
             let mut measured = Measured {
                 name: asked.measure.to_string(),

@@ -5,6 +5,10 @@ use crate::dynamics::CompileError;
 use crate::scene::{Scene, SceneError};
 use nalgebra::DMatrix;
 
+/// What errors of the tolerance may have grown to in a measure, over its value or unit: beyond, derivatives
+/// are those of noise.
+const KNOWN: f64 = 1e-3;
+
 /// What is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct SensitivityRequest {
@@ -132,4 +136,19 @@ impl Sensitivity {
         };
         self.rows.iter().map(|row| row.slopes.iter().map(band).collect()).collect()
     }
+}
+
+/// Why the derivatives of a measure are those of noise, where they are: a change of a number by the share of
+/// the tolerance does as much to it as errors of that size.
+pub(super) fn doubt(inputs: &[InputNumber], tolerance: f64, value: f64, slopes: &[f64]) -> Option<String> {
+    let tolerance = tolerance.max(f64::EPSILON);
+    let size = |input: &InputNumber| if input.value == 0.0 { 1.0 } else { input.value.abs() };
+    let moved = inputs.iter().zip(slopes).map(|(input, slope)| slope.abs() * size(input));
+    let share = tolerance * moved.fold(0.0, f64::max) / value.abs().max(1.0);
+    (share > KNOWN).then(|| {
+        format!(
+            "the motion is not known any more: errors of {tolerance:.0e} have grown to {share:.0e} of the \
+             value; ask for an earlier time, and look at the horizon that `run` tells"
+        )
+    })
 }

@@ -4,6 +4,16 @@ use super::{Event, EventDetector, Owner};
 use crate::dynamics::Motion;
 
 impl EventDetector {
+    /// The name of an event.
+    pub fn name(&self, event: usize) -> &str {
+        match self.owner(event) {
+            Owner::Scene(laws, number) => &laws.formulas.events[number].name,
+            Owner::Condition(laws, number) => &laws.formulas.conditions[number],
+            Owner::Friction(watch, number) => watch.place(number).map_or("friction", |place| &place.name),
+            Owner::Outside(number) => self.events[number].name(),
+        }
+    }
+
     /// The events from outside.
     pub fn outside(&self) -> &[Box<dyn Event>] {
         &self.events

@@ -53,9 +53,9 @@ impl EventDetector {
     }
 
     /// Looks whether the return of a function that left zero to a side, and is on the other one after it, is
-    /// among the passages of a step, which are located.
-    pub(super) fn look_for_return(&mut self, (begin, end): (Time, Time), passages: &[Passage]) {
-        let Some((event, side)) = self.returning.take() else { return };
+    /// among the passages of a step, which are located; true where it is lost.
+    pub(super) fn look_for_return(&mut self, (begin, end): (Time, Time), passages: &[Passage]) -> bool {
+        let Some((event, side)) = self.returning.take() else { return false };
         let (rises, same) = (side < 0, SAME * (end - begin).hi);
         let is_the_last =
             |t: Time| self.memory.last.iter().any(|(last, at)| *last == event && (t - *at).hi <= same);
@@ -63,6 +63,7 @@ impl EventDetector {
         if self.counts(event, rises) && returns.all(|passage| is_the_last(passage.t)) {
             self.lost = Some(event);
         }
+        self.lost.is_some()
     }
 
     /// The name of the event that came true again before that could be told.
