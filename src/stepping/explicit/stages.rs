@@ -39,5 +39,7 @@ fn sum_up_sized<const D: usize>(row: Row, k: &[f64], out: &mut [f64]) {
             sums[i] += a * k[i];
         }
     }
-    out.copy_from_slice(&sums);
+    for (out, sum) in out.iter_mut().zip(sums) {
+        *out = sum;
+    }
 }
