@@ -171,7 +171,9 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             if let Some(monitor) = &mut monitor {
                 self.show(*monitor);
             }
-            if let Some(event) = event.filter(|_| self.state.time.hi <= until.hi) {
+            if let Some(event) = event
+                && self.state.time.hi <= until.hi
+            {
                 return Ok(Halt::Contact(event));
             }
             self.ahead = event;

@@ -13,7 +13,7 @@ mod parts;
 mod singular;
 
 use self::found::Found;
-pub(in crate::run) use self::limits::{OutputNear, Point, SideLimit};
+pub(in crate::run) use self::limits::{OutputNear, SideLimit, weighted};
 use self::singular::PassageMemory;
 pub(in crate::run) use self::singular::{SMALL, USELESS};
 use super::drift::Singular;

@@ -217,7 +217,7 @@ impl<P: EmbeddedPair> Explicit<P> {
         if first.is_finite() { first } else { span.min(short) }
     }
 
-    /// The stages an interpolation of the step just made asks for beside its own.
+    /// The stages an interpolation of the step just made asks for beside its own, where they are not known.
     fn evaluate_extra_stages<F: OdeSystem + ?Sized>(
         &mut self,
         field: &mut F,
@@ -225,8 +225,10 @@ impl<P: EmbeddedPair> Explicit<P> {
         h: f64,
         statistics: &mut Statistics,
     ) {
+        if std::mem::replace(&mut self.has_extra, true) {
+            return;
+        }
         let n = state.y.len();
-        self.has_extra = true;
         let (k, stage) = (&mut self.k, &mut self.stage);
         P::extra_stages(&mut |number, c, row| {
             combine(&state.y, h, row, k, stage);
@@ -245,13 +247,10 @@ impl<P: EmbeddedPair> Explicit<P> {
         inside: &mut State,
     ) -> f64 {
         let n = from.y.len();
-        if !self.has_extra {
-            self.evaluate_extra_stages(field, from, self.length, &mut Statistics::default());
-        }
+        self.evaluate_extra_stages(field, from, self.length, &mut Statistics::default());
         if self.nested.is_empty() {
             for i in 0..n {
-                let change = (self.next[i] - from.y[i]) + (self.next_low[i] - from.low[i]);
-                self.nested.push(P::interpolate(self.length, change, &|stage| self.k[stage * n + i]));
+                self.nested.push(self.nested_powers(from, self.length, i));
             }
         }
         inside.clone_from(from);

@@ -3,7 +3,7 @@
 //! where these differ there is one passage.
 
 use super::detector::{EventDetector, SAME};
-use super::search::{CLEAR, NO_VALUE, Passage, StepPart, clear, resolved};
+use super::search::{CLEAR, Passage, StepPart, clear};
 use crate::run::observer::Inside;
 use crate::stepping::search::{Curve, ROUNDING, sign};
 
@@ -11,11 +11,6 @@ use crate::stepping::search::{Curve, ROUNDING, sign};
 const FLAT: f64 = 1e-6;
 
 impl StepPart<'_> {
-    /// What its interpolant may be off by.
-    fn off(&self, tolerance: f64) -> f64 {
-        resolved(tolerance).max(NO_VALUE) * self.curve.most()
-    }
-
     /// True where its function is flat about a share of it, at which it is zero.
     pub fn is_flat(&self, share: f64, tolerance: f64) -> bool {
         let least = CLEAR * self.off(tolerance);

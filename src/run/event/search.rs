@@ -90,6 +90,11 @@ impl StepPart<'_> {
         if most.is_finite() { most } else { finite.fold(0.0, f64::max) }
     }
 
+    /// What its interpolant may be off by, beside a method of this tolerance.
+    pub fn off(&self, tolerance: f64) -> f64 {
+        resolved(tolerance).max(NO_VALUE) * self.curve.most()
+    }
+
     /// The values at the first two nodes.
     fn first(&self) -> [f64; 2] {
         [self.values[self.values.len() - 1], self.values[self.values.len() - 2]]
@@ -122,8 +127,8 @@ fn beyond(curve: &Chebyshev, least: f64) -> Option<f64> {
 }
 
 /// Where a curve that begins near zero has left it: it may be back before the next node.
-fn left(curve: &Chebyshev, first: f64, resolved: f64) -> Option<f64> {
-    clear(curve, 0.0, (resolved.max(NO_VALUE) * curve.most()).max(first.abs()))
+fn left(part: &StepPart, tolerance: f64) -> Option<f64> {
+    clear(part.curve, 0.0, part.off(tolerance).max(part.first()[0].abs()))
 }
 
 impl EventDetector {
@@ -239,7 +244,7 @@ impl EventDetector {
         // impact may have carried it across.
         let other = if mode { -1 } else { 1 };
         let is_there = first.abs() <= NO_VALUE * most || sign(first) == other;
-        let mut left = is_there.then(|| left(curve, first, resolved(self.tolerance))).flatten();
+        let mut left = is_there.then(|| left(part, self.tolerance)).flatten();
         // What slides from rest may begin against its sense, by what the method leaves open: with equal
         // coefficients its velocity grows with the square of time.
         if let Owner::Friction(watch, function) = self.owner(event)
@@ -248,7 +253,7 @@ impl EventDetector {
             && off > 0.0
             && first.abs() <= CLEAR * off
         {
-            let least = CLEAR * off.max(first.abs()).max(resolved(self.tolerance).max(NO_VALUE) * most);
+            let least = CLEAR * off.max(first.abs()).max(part.off(self.tolerance));
             left = beyond(curve, least);
             if left.is_none() {
                 return;
@@ -322,11 +327,7 @@ impl EventDetector {
         }
         // What leaves the zero it begins at, or was kept at, is not sent back by rounding.
         let leaves = is_woken || begins || was_still && is_at_zero;
-        let from = if leaves {
-            left(part.curve, first, resolved(self.tolerance)).unwrap_or(0.0).max(LEAVES)
-        } else {
-            0.0
-        };
+        let from = if leaves { left(part, self.tolerance).unwrap_or(0.0).max(LEAVES) } else { 0.0 };
         if leaves {
             *side = sign(part.curve.at(from)[0]);
         }
@@ -350,7 +351,7 @@ impl EventDetector {
     /// wall: on which side rounding has it there does not matter.
     fn end_at_zero(&mut self, part: &StepPart, event: usize, end: Time, all: &mut Vec<Passage>) {
         let ([value, slope], side) = (part.curve.at(1.0), &mut self.memory.sides[event]);
-        let off = resolved(self.tolerance).max(NO_VALUE) * part.curve.most();
+        let off = part.off(self.tolerance);
         let is_near = value.abs() <= off.min(NEAR * slope.abs());
         if *side != 0 && is_near && sign(slope) == -*side {
             all.push(part.passage(end, event, *side < 0));

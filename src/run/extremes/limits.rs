@@ -27,6 +27,11 @@ const ROUNDS: usize = 32;
 /// Time from the singular position over the longest one, value, and weight.
 pub(in crate::run) type Point = [f64; 3];
 
+/// Such a point, where the weakest constraint has this share.
+pub(in crate::run) fn weighted([at, value]: [f64; 2], share: f64) -> Point {
+    [at, value, share.powf(1.5)]
+}
+
 /// An output beside a singular position.
 pub(in crate::run) struct OutputNear {
     /// The singular position and the time from it to the farther end \[s\].
@@ -229,7 +234,7 @@ fn within(points: &[Point], is_in: impl Fn(f64) -> bool) -> Vec<Point> {
 /// at the points, and at zero where that is asked.
 fn alike(points: &[Point], degree: usize, rounding: f64, is_zero: bool) -> Option<Vec<f64>> {
     let (curve, lower) = (fitted(points, degree)?, fitted(points, degree - LOWER)?);
-    let most = points.iter().fold(0.0, |most: f64, point| most.max(point[1].abs()));
+    let most = most(points);
     let apart = |at: f64| (value(&curve, at)[0] - value(&lower, at)[0]).abs();
     let is_alike = |at: f64| apart(at) <= (ALIKE * most).max(ROUNDING * rounding);
     ((!is_zero || is_alike(0.0)) && points.iter().all(|point| is_alike(point[0]))).then_some(curve)

@@ -16,7 +16,7 @@
 //! A mechanism that all but reaches a singular position turns back there: rates jump, and forces have peaks
 //! that no polynomial tells.
 
-use super::limits::{OutputNear, both_limits};
+use super::limits::{OutputNear, Point, both_limits, weighted};
 use super::{ExtremesDetector, Found};
 use crate::dynamics::schur::{NEAR, SINGULAR};
 use crate::dynamics::{Motion, Time};
@@ -320,9 +320,9 @@ impl PassageMemory {
     }
 
     /// What is remembered, over time and with weights.
-    fn points(&self, of: impl Fn(&NearSample) -> f64) -> Vec<[f64; 3]> {
+    fn points(&self, of: impl Fn(&NearSample) -> f64) -> Vec<Point> {
         let (centre, reach) = (self.least[1], self.reach());
-        let point = |sample: &NearSample| [(sample.t - centre) / reach, of(sample), sample.share.powf(1.5)];
+        let point = |sample: &NearSample| weighted([(sample.t - centre) / reach, of(sample)], sample.share);
         let useful = self.samples.iter().filter(|sample| sample.share >= USELESS);
         useful.map(point).filter(|point| point[1].is_finite()).collect()
     }

@@ -400,21 +400,11 @@ impl DriveWalk {
     }
 
     fn outputs(&self) -> Vec<f64> {
-        let mut values = Vec::new();
-        if let Some(outputs) = &self.mechanism.outputs {
-            let n = self.alpha.len();
-            let winding: Vec<f64> = (0..n).map(|k| self.coordinate(k)).collect();
-            let moment = Moment {
-                mechanism: &self.mechanism,
-                time: self.state.time,
-                phi: &self.state.y[..n],
-                winding: &winding,
-                omega: &self.state.y[n..2 * n],
-                kernel: &self.kernel,
-            };
-            outputs.evaluate(&moment, &mut OutputScratch::default(), &[], &mut values);
-        }
-        values
+        let n = self.alpha.len();
+        let winding: Vec<f64> = (0..n).map(|k| self.coordinate(k)).collect();
+        let (phi, omega) = self.state.y[..2 * n].split_at(n);
+        let (mechanism, time, kernel) = (&*self.mechanism, self.state.time, &self.kernel);
+        outputs_at(&Moment { mechanism, time, phi, winding: &winding, omega, kernel })
     }
 
     /// Drive's force, outputs, transmission angles: one of these.
@@ -447,4 +437,13 @@ impl DriveWalk {
 fn coordinate(state: &State, k: usize) -> f64 {
     let turns = state.turns.get(k).map_or(0.0, |&turns| turns as f64);
     state.unknown(k).hi + std::f64::consts::TAU * turns
+}
+
+/// The values of a mechanism's outputs.
+fn outputs_at(moment: &Moment) -> Vec<f64> {
+    let mut values = Vec::new();
+    if let Some(outputs) = &moment.mechanism.outputs {
+        outputs.evaluate(moment, &mut OutputScratch::default(), &[], &mut values);
+    }
+    values
 }

@@ -34,6 +34,13 @@ pub(super) fn expand(nested: &[f64], powers: &mut [f64]) {
 }
 
 impl<P: EmbeddedPair> Explicit<P> {
+    /// Coefficients of the interpolation of an unknown in the step just made.
+    pub(super) fn nested_powers(&self, from: &State, h: f64, i: usize) -> [f64; NESTED] {
+        let n = from.y.len();
+        let change = (self.next[i] - from.y[i]) + (self.next_low[i] - from.low[i]);
+        P::interpolate(h, change, &|stage| self.k[stage * n + i])
+    }
+
     /// What the step just tried may be off by, over the tolerance.
     pub(super) fn error<F: OdeSystem + ?Sized>(
         &mut self,
@@ -58,15 +65,9 @@ impl<P: EmbeddedPair> Explicit<P> {
         (h, i): (f64, usize),
         statistics: &mut Statistics,
     ) -> f64 {
-        if !self.has_extra {
-            self.evaluate_extra_stages(field, state, h, statistics);
-        }
+        self.evaluate_extra_stages(field, state, h, statistics);
         let n = state.y.len();
-        let nested = |i: usize| {
-            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
-            P::interpolate(h, change, &|stage| self.k[stage * n + i])
-        };
-        let all: Vec<_> = (0..n).map(nested).collect();
+        let all: Vec<_> = (0..n).map(|i| self.nested_powers(state, h, i)).collect();
         let mut powers = [0.0; NESTED];
         expand(&all[i][..P::DEGREE], &mut powers[..P::DEGREE]);
         let (mut inside, mut rate, mut error) = (vec![0.0; n], vec![0.0; n], 0.0_f64);
@@ -93,15 +94,11 @@ impl<P: EmbeddedPair, F: OdeSystem + ?Sized> Stride<F> for Explicit<P> {
         dense: &mut Dense,
         statistics: &mut Statistics,
     ) {
-        if !self.has_extra {
-            self.evaluate_extra_stages(field, state, h, statistics);
-        }
-        let n = state.y.len();
+        self.evaluate_extra_stages(field, state, h, statistics);
         dense.begin(field.watched(), P::DEGREE + 1, state);
         let most = self.highest;
         for (i, (powers, off)) in dense.each().enumerate() {
-            let change = (self.next[i] - state.y[i]) + (self.next_low[i] - state.low[i]);
-            let nested = P::interpolate(h, change, &|stage| self.k[stage * n + i]);
+            let nested = self.nested_powers(state, h, i);
             expand(&nested[..P::DEGREE], &mut powers[1..]);
             *off = most * nested[P::DEGREE - 1].abs();
         }

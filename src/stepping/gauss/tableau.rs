@@ -80,15 +80,12 @@ impl GaussTableau {
         integral(&self.nodes, &self.weights, j, DoubleDouble::ZERO, self.nodes[i]).hi
     }
 
-    /// (1/b_j) ∫_0^share l_j: what increment j has given up to a share of the step.
-    pub fn reached(&self, j: usize, share: f64) -> f64 {
-        let node = |k: usize| self.nodes[k].hi;
-        let others = |x: f64| {
-            let factors = (0..self.nodes.len()).filter(|&k| k != j);
-            factors.fold(1.0, |product, k| product * (x - node(k)) / (node(j) - node(k)))
-        };
-        let weighted = self.weights.iter().enumerate().map(|(k, b)| b.hi * others(share * node(k)));
-        share * weighted.sum::<f64>() / self.weights[j].hi
+    /// (1/b_j) ∫_0^share l_j: what each increment has given up to a share of the step.
+    pub fn reached(&self, share: f64) -> Vec<f64> {
+        let [nodes, weights] =
+            [&self.nodes, &self.weights].map(|all| all.iter().map(|x| x.hi).collect::<Vec<f64>>());
+        let of = |j: usize| integral(&nodes, &weights, j, 0.0, share) / weights[j];
+        (0..nodes.len()).map(of).collect()
     }
 
     /// (b_i/b_j) l_j(1 + c_i): what increment j of one step gives to increment i of the next.
@@ -131,24 +128,15 @@ fn legendre(s: usize, x: DoubleDouble) -> (DoubleDouble, DoubleDouble) {
 }
 
 /// The integral of l_j from `from` to `from + length`.
-fn integral(
-    nodes: &[DoubleDouble],
-    weights: &[DoubleDouble],
-    j: usize,
-    from: DoubleDouble,
-    length: DoubleDouble,
-) -> DoubleDouble {
-    length
-        * nodes
-            .iter()
-            .zip(weights)
-            .fold(DoubleDouble::ZERO, |sum, (&c, &b)| sum + b * lagrange(nodes, j, from + length * c))
+fn integral<T: Scalar>(nodes: &[T], weights: &[T], j: usize, from: T, length: T) -> T {
+    let each = nodes.iter().zip(weights);
+    length * each.fold(T::ZERO, |sum, (&c, &b)| sum + b * lagrange(nodes, j, from + length * c))
 }
 
 /// l_j at `x`.
-fn lagrange(nodes: &[DoubleDouble], j: usize, x: DoubleDouble) -> DoubleDouble {
+fn lagrange<T: Scalar>(nodes: &[T], j: usize, x: T) -> T {
     let others = (0..nodes.len()).filter(|&k| k != j);
-    others.fold(DoubleDouble::ONE, |product, k| product * ((x - nodes[k]) / (nodes[j] - nodes[k])))
+    others.fold(T::ONE, |product, k| product * ((x - nodes[k]) / (nodes[j] - nodes[k])))
 }
 
 #[cfg(test)]

@@ -3,12 +3,12 @@
 //! Forces and accelerations there are limits along the motion, as those of runs are: of polynomials fitted to
 //! either side of the place, see [`OutputNear`].
 
-use super::{DriveWalk, SolvedPosition};
+use super::{DriveWalk, SolvedPosition, outputs_at};
 use crate::dynamics::Motion;
 use crate::dynamics::kernel::Bias;
-use crate::dynamics::output::{Moment, OutputScratch};
+use crate::dynamics::output::Moment;
 use crate::dynamics::schur::{NEAR, SINGULAR};
-use crate::run::extremes::{OutputNear, Point, SMALL, SideLimit, USELESS, rounding_of};
+use crate::run::extremes::{OutputNear, SMALL, SideLimit, USELESS, rounding_of, weighted};
 use crate::run::kinematics::Limit;
 use crate::run::kinematics::extremes::SolvedRange;
 use crate::run::kinematics::independence::determinant;
@@ -161,9 +161,8 @@ impl DriveWalk {
         let limits = std::iter::once(&true).chain(follows).zip(&rounding).enumerate();
         let limits: Vec<_> = limits
             .map(|(column, (follows, &rounding))| {
-                let point =
-                    |(at, share, values): &Sample| -> Point { [*at, values[column], share.powf(1.5)] };
                 let of = |(at, _, values): &Sample| [*at, values[column]];
+                let point = |sample: &Sample| weighted(of(sample), sample.1);
                 let known = |sample: &&Sample| sample.2[column].is_finite();
                 let points = || samples.iter().flatten().filter(known).map(point).collect();
                 // The last one is the nearest.
@@ -188,13 +187,9 @@ impl DriveWalk {
             let ([phi, omega], time) = (motion.rounded(), motion.time);
             kernel.accelerations(mechanism, time, &phi, &omega, Bias::default());
             mechanism.share_multipliers(time, kernel, &phi, &omega);
-            let mut values = vec![-kernel.multiplier[row]];
-            if let Some(outputs) = &mechanism.outputs {
-                let winding: Vec<f64> = (0..phi.len()).map(|k| motion.unwrapped(k)).collect();
-                let moment = Moment { mechanism, time, phi: &phi, winding: &winding, omega: &omega, kernel };
-                outputs.evaluate(&moment, &mut OutputScratch::default(), &[], &mut values);
-            }
-            values
+            let winding: Vec<f64> = (0..phi.len()).map(|k| motion.unwrapped(k)).collect();
+            let moment = Moment { mechanism, time, phi: &phi, winding: &winding, omega: &omega, kernel };
+            [vec![-kernel.multiplier[row]], outputs_at(&moment)].concat()
         };
         rounding_of(&changes(mechanism, &motion, values))
     }

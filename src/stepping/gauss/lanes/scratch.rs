@@ -45,8 +45,7 @@ impl GaussScratch {
     /// Moves a state from the beginning of the step to a share of it, by the collocation polynomial.
     pub fn carry(&self, tableau: &GaussTableau, share: f64, state: &mut State) {
         let s = tableau.nodes.len();
-        for j in 0..s {
-            let reached = tableau.reached(j, share);
+        for (j, reached) in tableau.reached(share).into_iter().enumerate() {
             for (y, increment) in state.y.iter_mut().zip(&self.increment) {
                 *y += reached * increment.0[lane(j, s)];
             }
