@@ -233,6 +233,37 @@ fn surfaces_that_jam_are_told_from_other_steps_that_shrink() {
     }
 }
 
+/// A slider-crank with a rough crank pin, driven towards its singular position, jams 5 ms before it.
+#[test]
+fn surfaces_that_jam_beside_a_singular_position_are_not_gone_through() {
+    let text = r#"{"name": "jam", "gravity": [0, 0],
+        "bars": [{"name": "crank", "mass": 1.669, "centre": [0.3116, 0], "inertia": 0.02322, "length": 0.5},
+            {"name": "rod", "mass": 0.392, "centre": [0.2267, 0], "inertia": 0.0142, "length": 0.5},
+            {"name": "block", "mass": 0.5, "centre": [0, 0], "inertia": 0.01, "length": 0.1}],
+        "hinges": [{"name": "O", "between": [{"body": "ground", "point": [0, 0]}, {"body": "crank", "point": [0, 0]}]},
+            {"name": "A", "between": [{"body": "crank", "point": [0.5, 0]}, {"body": "rod", "point": [0, 0]}],
+             "friction": {"radius": 0.05, "kinetic": 0.2}},
+            {"name": "B", "between": [{"body": "rod", "point": [0.5, 0]}, {"body": "block", "point": [0, 0]}]}],
+        "sliders": [{"name": "S", "point": {"body": "block", "point": [0, 0]}, "angle": "locked",
+            "rail": {"body": "ground", "point": [0, 0], "direction": [1, 0]}}],
+        "motors": [{"name": "M", "body": "crank", "law": {"start": 0.3, "rate": 4.0}}],
+        "start": {"crank": {"phi": 0.3}, "rod": {"phi": -0.3}, "block": {"phi": 0}}, "until": 0.7, "every": 0.7}"#;
+    // About the block the moment of the upright force F at the pin is F (l cos(phi) - mu r), which is given: F grows
+    // beyond all bounds where the bracket is zero.
+    let t = (libm::acos(0.2 * 0.05 / 0.5) - 0.3) / 4.0;
+    for (method, tolerance) in [
+        (MethodId::Taylor, 1e-9),
+        (MethodId::Taylor, 1e-12),
+        (MethodId::Dp8, 1e-9),
+        (MethodId::Radau(5), 1e-9),
+    ] {
+        let outcome = run(&scene(text), &adaptive(method, tolerance));
+        let stop = outcome.stop.unwrap_or_else(|| panic!("{method} {tolerance:e}: no stop"));
+        assert!(stop.cause == Cause::Friction && stop.what.contains("jam"), "{method}: {stop:?}");
+        assert!((stop.t - t).abs() < 1e-5, "{method} {tolerance:e}: {} for {t}", stop.t);
+    }
+}
+
 #[cfg(feature = "digits")]
 #[test]
 fn a_bar_breaks_away_in_many_digits_at_the_same_time_whatever_their_number() {

@@ -17,7 +17,7 @@
 
 use super::expansion::Expansion;
 use crate::arithmetic::DoubleDouble;
-use crate::dynamics::kernel::Kernel;
+use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::schur::NEAR;
 use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Form, Mechanism, State, Time};
@@ -52,6 +52,8 @@ const ROUNDS: usize = 3;
 /// worth more than this.
 const ASTRAY: f64 = 1e3;
 const LIMITS: [f64; 2] = [1e-6, 1e-4];
+/// Parts of a passage at whose ends dry friction has to follow from the motion.
+const WITH_FRICTION: usize = 32;
 
 /// What to try where there is no way through.
 pub const HINT: &str = "try another tolerance, --method dp8, or a start that does not lead through it";
@@ -189,8 +191,11 @@ impl<T: Coefficient> SingularPassage<T> {
         h: f64,
         tolerance: f64,
     ) -> bool {
-        let Self { kernel, back, end, .. } = self;
         let mechanism = problem.mechanism();
+        if !self.friction_follows(mechanism, expansion, state, h) {
+            return false;
+        }
+        let Self { kernel, back, end, .. } = self;
         let n = mechanism.coordinates();
         let limit = (ASTRAY * tolerance).clamp(LIMITS[0], LIMITS[1]);
         end.clone_from(state);
@@ -221,6 +226,33 @@ impl<T: Coefficient> SingularPassage<T> {
             let off =
                 if i < mechanism.bodies.len() { libm::remainder(off, std::f64::consts::TAU) } else { off };
             off.abs() <= limit * size
+        })
+    }
+
+    /// True where no surfaces jam ([`JAMS`](crate::dynamics::friction::paradox::JAMS)) on the way through: the
+    /// determinant of the equations of friction keeps its sign.
+    fn friction_follows(
+        &mut self,
+        mechanism: &Mechanism,
+        expansion: &Expansion<T>,
+        state: &State,
+        h: f64,
+    ) -> bool {
+        if mechanism.sliding().next().is_none() {
+            return true;
+        }
+        let Self { kernel, end, .. } = self;
+        let n = mechanism.coordinates();
+        (0..=WITH_FRICTION).all(|point| {
+            let share = point as f64 / WITH_FRICTION as f64;
+            end.clone_from(state);
+            expansion.go(end, DoubleDouble::from(share * h));
+            end.time = state.time + share * h;
+            end.wrap();
+            let [phi, omega] = [&end.y[..n], &end.y[n..2 * n]];
+            kernel.accelerations(mechanism, end.time, phi, omega, Bias::default());
+            // In the singular position itself there are no equations.
+            kernel.regularity > 0.0 || kernel.weakest.share < CLOSEST
         })
     }
 }
