@@ -2,6 +2,7 @@
 
 use crate::common;
 
+use crate::formulas::{adaptive, scene};
 use common::shipped;
 use driftless::run::{Limits, MethodId, Outcome, Plan, Request, Run, Stabilization, integrate};
 use driftless::stepping::Cause;
@@ -25,6 +26,37 @@ fn request(method: MethodId, stabilize: Stabilization) -> Request {
         until: Some(3.0),
         every: Some(0.1),
         ..Request::default()
+    }
+}
+
+/// The pilot run goes through corners of laws and bounces as the run does: Baumgarte's time constant is five mean
+/// steps of the run without stabilization.
+#[test]
+fn a_pilot_run_makes_the_steps_of_the_run() {
+    let text = |wall: &str| {
+        format!(
+            r#"{{"name": "corners", "gravity": [0, 0],
+        "bars": [{{"name": "a", "mass": 1, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}},
+            {{"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "a", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "a", "point": [0.6, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+        "motors": [{{"name": "M", "body": "a", "law": {{"start": 0, "rate": 0.1}}}}],
+        "torques": [{{"name": "T", "body": "b", "torque": "if(b.phi < 0.5, 2+40*b.phi^3, -3)-0.3*b.omega"}}]{wall},
+        "start": {{"b": {{"phi": 0.3, "omega": 0}}}}, "until": 2, "every": 0.1}}"#
+        )
+    };
+    let wall = r#", "walls": [{"name": "W", "body": "b", "point": [0.6, 0], "restitution": 0.8,
+        "line": {"through": [0, 0.35], "normal": [0, -1]}}]"#;
+    for text in [text(""), text(wall)] {
+        let by = |stabilize| {
+            let request = Request { stabilize: Some(stabilize), ..adaptive(MethodId::Dp8, 1e-9) };
+            crate::formulas::run(&scene(&text), &request)
+        };
+        let (plain, pulled) = (by(Stabilization::None), by(Stabilization::Baumgarte));
+        let mean = 2.0 / plain.statistics.steps as f64;
+        let constant = pulled.plan.time_constant.expect("it was measured");
+        assert!((constant / (5.0 * mean) - 1.0).abs() < 1e-12, "{constant} {mean}");
+        assert!(pulled.statistics.steps < 2 * plain.statistics.steps, "{:?}", pulled.statistics);
     }
 }
 

@@ -1,10 +1,12 @@
 //! From a plan to a driver: the form of the equations a stabilization asks for, the method, and what is
 //! measured before the first step.
 
-use super::driver::{Driver, Halt, StepWatch, driver};
+use super::contact::ContactDriver;
+use super::driver::{Driver, driver};
 use super::impact_monitor::closed;
 use super::methods::{MethodId, Stabilization};
 use super::plan::Plan;
+use super::running::Outcome;
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::shown::about;
 use crate::dynamics::canonical::Canonical;
@@ -215,18 +217,18 @@ fn pilot(mechanism: &Arc<Mechanism>, plan: &Plan, start: &Motion) -> Result<f64,
     let mut plain = Plan { stabilization: Stabilization::None, ..plan.clone() };
     let mut driver = build(mechanism, &mut plain, start)?;
     driver.allow(plan.max_evaluations);
-    let rows = plan.rows.min(20);
-    for row in 1..=rows {
-        match driver.advance(plan.time(row), plan.time(plan.rows), StepWatch::default(), &mut || false) {
-            Ok(Halt::Until | Halt::Pause) => {}
-            // What stops it stops the run itself, which says so.
-            Ok(Halt::Contact(_) | Halt::Cut) | Err(_) => break,
+    let mut outcome = Outcome::begun(mechanism, plain);
+    let mut pilot = ContactDriver::new(Arc::clone(mechanism), driver);
+    // What stops it stops the run itself, which says so.
+    if pilot.meet(&mut outcome).is_ok() {
+        for row in 1..=plan.rows.min(20) {
+            if !pilot.go(plan.time(row), &mut outcome, &mut || false).is_ok_and(|went| went) {
+                break;
+            }
         }
     }
-    let mut motion = Motion::default();
-    driver.read(&mut motion);
-    Ok(match driver.statistics().steps {
+    Ok(match pilot.statistics().steps {
         0 => 5.0 * plan.time(1).hi,
-        steps => 5.0 * motion.time.hi / steps as f64,
+        steps => 5.0 * pilot.motion().time.hi / steps as f64,
     })
 }
