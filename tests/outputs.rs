@@ -1044,3 +1044,31 @@ fn what_has_no_value_at_some_times_has_no_mean() {
     assert!(later.mean.is_nan() && later.rms.is_nan() && later.max[0] > 0.7, "{later:?}");
     assert!([never.min[0], never.max[0], never.mean, never.rms].into_iter().all(f64::is_nan), "{never:?}");
 }
+
+/// A ball dropped by h comes to rest after h, and (1 + e)/(1 - e) times as long, and weighs on its floor from then on.
+#[test]
+fn a_ball_does_not_weigh_on_its_floor_before_its_bounces_end() {
+    for e in [0.5, 0.9, 0.99] {
+        let text = format!(
+            r#"{{"name": "ball", "gravity": [0, -10], "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+            "walls": [{{"name": "W", "body": "b", "point": [0, 0], "restitution": {e},
+                "line": {{"through": [0, 0], "normal": [0, 1]}}}}],
+            "outputs": {{"F": "W.force"}}, "start": {{"b": {{"phi": 0, "origin": [0, 0.00005]}}}}, "until": 0.7, "every": 0.1}}"#
+        );
+        let end = (2.0 * 0.00005 / 10.0_f64).sqrt() * (1.0 + e) / (1.0 - e);
+        for (method, tolerance) in
+            [(MethodId::Taylor, 1e-12), (MethodId::Dp8, 1e-10), (MethodId::Radau(5), 1e-10)]
+        {
+            let outcome = run(&scene(&text), &adaptive(method, tolerance));
+            let [force] = outcome.extremes.as_slice() else { panic!("{:?}", outcome.extremes) };
+            let share = (0.7 - end) / 0.7;
+            assert!(
+                (force.mean - 10.0 * share).abs() < 1e-9,
+                "{method} {e}: {} {}",
+                force.mean,
+                10.0 * share
+            );
+            assert!((force.rms - 10.0 * share.sqrt()).abs() < 1e-9, "{method} {e}: {}", force.rms);
+        }
+    }
+}

@@ -150,6 +150,21 @@ impl ExtremesDetector {
         }
     }
 
+    /// Counts in means, for so long a time \[s\] from a motion on, the outputs of a mechanism in place of those of
+    /// the one that is held.
+    pub fn exchange_for(&mut self, other: &Arc<Mechanism>, motion: &Motion, span: f64) {
+        let held = Arc::clone(&self.mechanism);
+        let [mut counted, mut instead] = [Vec::new(), Vec::new()];
+        self.values(motion, &mut counted);
+        self.hold(other);
+        self.values(motion, &mut instead);
+        self.hold(&held);
+        for (found, (counted, instead)) in self.memory.found.iter_mut().zip(counted.iter().zip(&instead)) {
+            found.integral += DoubleDouble::product(instead - counted, span);
+            found.square += DoubleDouble::product(instead * instead - counted * counted, span);
+        }
+    }
+
     /// Takes what a run before remembered; false where it is of other outputs.
     pub fn restore(&mut self, memory: ExtremesMemory) -> bool {
         let count = self.memory.found.len();

@@ -312,6 +312,7 @@ impl ContactDriver {
             plan.stabilization = Stabilization::Projection;
             self.put_on(&mut motion, &new, &flights, outcome)?;
         }
+        self.fly_in_means(&flights, &motion, outcome.plan.until);
         if let Some(events) = &mut self.events {
             events.watch_friction(&self.mechanism);
         }

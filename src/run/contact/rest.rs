@@ -60,6 +60,16 @@ pub(in crate::run) struct Flight {
     behind: Option<Vec<f64>>,
 }
 
+/// The contacts that a mechanism holds but for one, and the modes of the places with friction without it.
+fn left(held: &Mechanism, contact: usize) -> (Vec<usize>, Vec<FrictionMode>) {
+    let others = held.held.iter().copied().filter(|&other| other != contact).collect();
+    let without = |(friction, mode): (&CompiledFriction, &FrictionMode)| match friction.normal {
+        Normal::Contact(number) if number == contact => FrictionMode::Open,
+        _ => *mode,
+    };
+    (others, held.frictions.iter().zip(&held.modes).map(without).collect())
+}
+
 /// How a motion changes at a time, of coordinates and rates.
 fn motion_rates(mechanism: &Mechanism, t: Time, phi: &[f64], omega: &[f64]) -> MotionRates<f64> {
     let mut kernel = Kernel::<f64>::new(mechanism);
@@ -90,13 +100,7 @@ impl Flight {
         if speed <= NO_SPEED * wall.step_size(&omega) || wall.restitution >= 1.0 {
             return None;
         }
-        let others: Vec<usize> = held.held.iter().copied().filter(|&other| other != contact).collect();
-        let mut modes = held.modes.clone();
-        for (friction, mode) in held.frictions.iter().zip(&mut modes) {
-            if friction.normal == Normal::Contact(contact) {
-                *mode = FrictionMode::Open;
-            }
-        }
+        let (others, modes) = left(held, contact);
         let flying = FlyingPoint { held, contact, t: motion.time, others: &others };
         if let Some(bounced) = flying.bounced([&phi, &omega], &modes) {
             let rates = bounced.mean(&omega);
@@ -296,6 +300,17 @@ impl ContactDriver {
                 (wall.gap_rate(t, &phi, &z, &omega), inward(&rates.accelerations, wall, t, at));
             !still.contains(contact) && wall.rebounds_low([speed, inward], self.rest_height)
         })
+    }
+
+    /// Means are those of the flight until the bounces that are left out end, from a motion on.
+    pub(super) fn fly_in_means(&mut self, flights: &[Flight], motion: &Motion, until: f64) {
+        let Some(extremes) = &mut self.extremes else { return };
+        extremes.hold(&self.mechanism);
+        for flight in flights {
+            let (others, modes) = left(&self.mechanism, flight.contact);
+            let span = flight.last.min(until - motion.time.hi);
+            extremes.exchange_for(&in_modes(&self.free, &others, &modes), motion, span);
+        }
     }
 
     /// Counts a hold from the end of the bounces before it on, so much later \[s\].
