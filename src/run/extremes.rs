@@ -150,8 +150,8 @@ impl ExtremesDetector {
         }
     }
 
-    /// Counts in means, for so long a time \[s\] from a motion on, the outputs of another mechanism in place of
-    /// those of the present one.
+    /// Counts in means, for so long a time \[s\] from a motion on, the outputs of another mechanism in place
+    /// of those of the present one.
     pub fn exchange_for(&mut self, other: &Arc<Mechanism>, motion: &Motion, span: f64) {
         let held = Arc::clone(&self.mechanism);
         let [mut counted, mut instead] = [Vec::new(), Vec::new()];

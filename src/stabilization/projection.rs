@@ -90,12 +90,14 @@ impl<M> Projected<M> {
         let lost = last.map_or(0.0, |last| (landing.balance - last).abs()) + landing.energy_change.abs();
         let lost = lost / mechanism.energy_scale;
         if (was_near || self.near) && (lost > LOST || lost.is_nan()) {
-            let row = mechanism.constraints[projector.kernel.weakest.row].name();
+            let row = &mechanism.constraints[projector.kernel.weakest.row];
             let what = format!(
-                "energy changed by {lost:.1e} of its scale where constraint {row} becomes dependent: the \
-                    motion left its branch"
+                "energy changed by {lost:.1e} of its scale where constraint {} becomes dependent: the motion \
+                    left its branch",
+                row.name()
             );
-            return Err(stop(Cause::BranchLost, state, what, past_singular(name)));
+            let hint = if row.is_motor() { AT_LIMIT } else { past_singular(name) };
+            return Err(stop(Cause::BranchLost, state, what, hint));
         }
         Ok(landing.has_moved)
     }
@@ -207,6 +209,10 @@ fn hint(mechanism: &Mechanism, kernel: &Kernel<f64>, method: &str) -> &'static s
         "tighten the tolerance, and look for masses or lengths far out of proportion"
     }
 }
+
+/// The same where the constraint that becomes dependent is a motor's.
+const AT_LIMIT: &str = "this position is singular: the motor may be at the end of what the mechanism can \
+    reach (`driftless kinematics` tells its limits where motors drive all of it), or try another tolerance";
 
 /// What to try where a singular position has not been passed.
 fn past_singular(method: &str) -> &'static str {
