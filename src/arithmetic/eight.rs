@@ -73,6 +73,20 @@ impl<L: Lanes> Eight<L> {
             self.0[1].neg_mul_add(factor.0[1], addend.0[1]),
         ])
     }
+
+    /// The sum and its error, exactly.
+    #[inline(always)]
+    pub fn two_sum(self, other: Self) -> (Self, Self) {
+        let (first, second) = (self.0[0].two_sum(other.0[0]), self.0[1].two_sum(other.0[1]));
+        (Self([first.0, second.0]), Self([first.1, second.1]))
+    }
+
+    /// The same where `|self| >= |other|`.
+    #[inline(always)]
+    pub fn fast_two_sum(self, other: Self) -> (Self, Self) {
+        let (first, second) = (self.0[0].fast_two_sum(other.0[0]), self.0[1].fast_two_sum(other.0[1]));
+        (Self([first.0, second.0]), Self([first.1, second.1]))
+    }
 }
 
 impl<L: Lanes> Default for Eight<L> {

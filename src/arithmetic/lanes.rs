@@ -151,6 +151,20 @@ impl Arithmetic for Portable {
     fn neg_mul_add(self, factor: Self, addend: Self) -> Self {
         self.neg().mul_add(factor, addend)
     }
+
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn two_sum(self, other: Self) -> (Self, Self) {
+        let both: [_; 4] = std::array::from_fn(|lane| sum::two_sum(self.0[lane], other.0[lane]));
+        (Self(both.map(|(sum, _)| sum)), Self(both.map(|(_, error)| error)))
+    }
+
+    #[cfg_attr(target_arch = "x86_64", inline(never))]
+    #[cfg_attr(not(target_arch = "x86_64"), inline(always))]
+    fn fast_two_sum(self, other: Self) -> (Self, Self) {
+        let both: [_; 4] = std::array::from_fn(|lane| sum::fast_two_sum(self.0[lane], other.0[lane]));
+        (Self(both.map(|(sum, _)| sum)), Self(both.map(|(_, error)| error)))
+    }
 }
 
 impl Signed for Portable {

@@ -26,8 +26,8 @@ impl<L: Lanes> Pairs<L> {
     /// `high + low` where `|high| >= |low|`, normalized.
     #[inline(always)]
     fn quick(high: Eight<L>, low: Eight<L>) -> Self {
-        let sum = high + low;
-        Self { high: sum, low: low - (sum - high) }
+        let (high, low) = high.fast_two_sum(low);
+        Self { high, low }
     }
 
     /// A function of every lane and that of another number by itself.
@@ -119,9 +119,7 @@ impl<L: Lanes> Add for Pairs<L> {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        let sum = self.high + other.high;
-        let part = sum - self.high;
-        let error = (self.high - (sum - part)) + (other.high - part);
+        let (sum, error) = self.high.two_sum(other.high);
         Self::quick(sum, error + (self.low + other.low))
     }
 }
