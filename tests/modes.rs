@@ -311,6 +311,61 @@ fn what_has_no_equilibrium_says_why() {
     assert!(cart.equilibria.iter().all(|one| one.is_family));
 }
 
+/// Time in a law or a formula is told by what is written, on whichever branch: a torque of 50 Hz, one that begins
+/// at 5 s, one that is zero where the scene starts.  One whose amplitude is zero is none.
+#[test]
+fn laws_that_time_is_in_leave_no_equilibrium_whenever_they_act() {
+    let of = |parts: &str| {
+        let driven = if parts.contains("motors") { "" } else { r#""b": {"phi": 0, "omega": 0}, "# };
+        let scene = parsed(&format!(
+            r#"{{"name": "timed", "gravity": [0, -9.81], "parameters": {{"none": 0}}, {parts},
+            "bars": [{{"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}},
+                     {{"name": "c", "mass": 1, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}},
+                       {{"name": "B", "between": [{{"body": "b", "point": [0.6, 0]}}, {{"body": "c", "point": [0, 0]}}]}}],
+            "start": {{{driven}"c": {{"phi": 0, "omega": 0}}}}, "until": 20, "every": 0.1}}"#
+        ));
+        let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+        modes(&scene, &mechanism, 4)
+    };
+    let torque = |torque: &str| format!(r#""torques": [{{"name": "t", "body": "b", "torque": "{torque}"}}]"#);
+    let sine = |amplitude: f64, more: &str| {
+        let sine = format!(r#"{{"amplitude": {amplitude}, "frequency": "100*pi"}}"#);
+        format!(r#"{{"name": "t", "body": "b", {more} "law": {{"start": 0.2, "sines": [{sine}]}}}}"#)
+    };
+    let [table, signal] = [
+        (torque("gust(t)"), r#""tables": {"gust": [[0, 1], [10, 1], [20, 5]]}"#),
+        (torque("1*on"), r#""signals": {"late": "t - 5", "on": "if(late < 0, 0, 1)"}"#),
+    ]
+    .map(|(torque, more)| format!("{torque}, {more}"));
+    for parts in [
+        torque("-(3 + 2.5*cos(9.6*t))*b.sin"),
+        torque("-(0.2 + 2*sin(9.6*t))*b.omega"),
+        torque("0.5*sin(2*pi*50*t)"),
+        torque("1*if(t < 5, 1, 0)"),
+        torque("max(0 s, t - 5)*1 N*m/s"),
+        torque("if(b.phi < 1, 0, 1*cos(1*t))"),
+        format!(r#""torques": [{}]"#, sine(1.0, r#""torque": 1,"#)),
+        table,
+        signal,
+    ] {
+        assert!(matches!(of(&parts), Err(ModesError::Forced)), "{parts}");
+    }
+    let late = r#""motors": [{"name": "m", "body": "b", "law": "if(t < 5, 0.5, 0.5 + 0.1*(t - 5)^2)"}]"#;
+    let fast = format!(r#""motors": [{}]"#, sine(1e-3, ""));
+    for parts in [late, &fast] {
+        assert!(matches!(of(parts), Err(ModesError::Moving(_))), "{parts}");
+    }
+    for parts in [
+        torque("none*cos(1*t)"),
+        torque("1*abs(b.sin)"),
+        format!(r#""torques": [{}]"#, sine(0.0, r#""torque": 1,"#)),
+        format!(r#""motors": [{}]"#, sine(0.0, "")),
+    ] {
+        assert!(of(&parts).is_ok_and(|found| !found.equilibria.is_empty()), "{parts}");
+    }
+}
+
 /// A flywheel on a pendulum, hinged at its own centre of mass: nothing brings it back, and its angle counts in
 /// the torque on the pendulum.  J φ'' = -W cos φ + a cos φ sin ψ - d φ', whatever ψ is and whatever the units.
 #[test]

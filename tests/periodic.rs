@@ -385,3 +385,109 @@ fn a_motion_on_a_corner_has_no_multipliers() {
         assert!(!one.is_on_corner && off(&one, &expected) < 1e-8, "{law}: {one:?}");
     }
 }
+
+/// A bar on a hinge, J = 0.12 kg m^2, with a torque.
+fn turned_by(torque: &str) -> Scene {
+    parsed(&format!(
+        r#"{{"name": "turned", "gravity": [0, 0],
+        "bars": [{{"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+        "torques": [{{"name": "t", "body": "b", "torque": "{torque}"}}],
+        "start": {{"b": {{"phi": 0, "omega": 0}}}}, "until": 20, "every": 0.1}}"#
+    ))
+}
+
+/// Mathieu's equation x'' + (25 + 125/6 cos 9.6 t) x = 0, driven at nearly twice its frequency: rest is unstable,
+/// with r + 1/r the trace of the two solutions after a period.  Times that are no period are refused, although
+/// nothing acts where the bar starts.
+#[test]
+fn a_stiffness_that_swings_has_the_multipliers_of_mathieus_equation() {
+    let scene = turned_by("-(3 + 2.5*cos(9.6*t))*b.sin");
+    let period = TAU / 9.6;
+    let slope = |t: f64, [x, v]: [f64; 2]| [v, -(25.0 + 125.0 / 6.0 * (9.6 * t).cos()) * x];
+    let steps = 4000;
+    let h = period / f64::from(steps);
+    let end = |begin: [f64; 2]| {
+        (0..steps).fold(begin, |y, k| {
+            let at = |share: f64, a: [f64; 2]| {
+                slope((f64::from(k) + share) * h, [y[0] + share * h * a[0], y[1] + share * h * a[1]])
+            };
+            let a = at(0.0, [0.0; 2]);
+            let b = at(0.5, a);
+            let c = at(0.5, b);
+            let d = at(1.0, c);
+            [0, 1].map(|i| y[i] + h / 6.0 * (a[i] + 2.0 * (b[i] + c[i]) + d[i]))
+        })
+    };
+    let trace = end([1.0, 0.0])[0] + end([0.0, 1.0])[1];
+    let root = (trace * trace / 4.0 - 1.0).sqrt();
+    let expected = [[trace / 2.0 + root, 0.0], [trace / 2.0 - root, 0.0]];
+    let found = found(&scene, 0, Some(period)).expect("a search");
+    let rest = found.motions.iter().find(|one| one.from_start).expect("rest");
+    println!("{rest:?}, expected {expected:?}");
+    assert!(rest.stability == Stability::Unstable && off(rest, &expected) < 1e-8, "{rest:?}");
+    assert_eq!(found.at_rest, None);
+    for period in [0.8, 0.5, 0.9 * period] {
+        let refused = self::found(&scene, 0, Some(period));
+        assert!(matches!(refused, Err(ModesError::NotPeriodic { .. })), "{period}: {refused:?}");
+    }
+}
+
+/// What acts with rates only, what begins later, and a pulse between the times that are looked at: no motion
+/// closes with them.
+#[test]
+fn drives_that_do_not_repeat_themselves_have_no_period() {
+    for torque in [
+        "-(0.2 + 2*sin(9.6*t))*b.omega",
+        "1*if(t < 5, 1, 0)",
+        "max(0 s, t - 5)*1 N*m/s",
+        "1*exp(-1*t)",
+        "0.5*sin(9.6*t) + 0.5*sin(7.3*t)",
+    ] {
+        for period in [0.3, 0.8, 1.0] {
+            let refused = found(&turned_by(torque), 0, Some(period));
+            assert!(matches!(refused, Err(ModesError::NotPeriodic { .. })), "{torque}: {refused:?}");
+        }
+    }
+    let pulse = turned_by("0.1 - 3*b.sin - 0.1*b.omega + if(t < 0.47, 0, 1)*if(t < 0.475, 5, 0)");
+    assert_eq!(found(&pulse, 0, Some(0.35)).expect("a search").motions.len(), 0);
+}
+
+/// A body on a vertical rail over a table that swings at 20 rad/s.  One impact a period: the product of the
+/// multipliers is e^2.  Other periods are refused, and so is a drive beside that has none with the table.
+#[test]
+fn moving_walls_are_drives() {
+    let table = |law: &str, more: &str| {
+        parsed(&format!(
+            r#"{{"name": "table", "gravity": [0, -9.81],
+            "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.01, "length": 0.1}}],
+            "sliders": [{{"name": "r", "point": {{"body": "b", "point": [0, 0]}}, "angle": "locked",
+                "rail": {{"body": "ground", "point": [0, 0], "direction": [0, 1]}}}}],
+            "walls": [{{"name": "w", "body": "b", "point": [0, 0], "restitution": 0.8, "law": {law},
+                "line": {{"through": [0, 0], "normal": [0, 1]}}}}], {more}
+            "start": {{"b": {{"phi": 0, "omega": 0, "origin": [0, 0.0435], "velocity": [0, -1.2745]}}}},
+            "until": 60, "every": 0.1}}"#
+        ))
+    };
+    let sines = r#"{"start": 0, "sines": [{"amplitude": 0.01, "frequency": 20}]}"#;
+    let one = found(&table(sines, ""), 0, Some(TAU / 20.0)).expect("a search");
+    let motion = one.motions.first().expect("a motion");
+    let [[a, b], [c, d]] = motion.multipliers[..] else { panic!("{motion:?}") };
+    assert!((a * c - b * d - 0.64).abs() < 1e-7, "{motion:?}");
+    for law in [sines, r#""0.01*sin(20*t)""#, r#""max(0.01*sin(20*t), -1)""#] {
+        for period in [0.25, 0.2, 0.4, 0.5, 0.0123] {
+            let refused = found(&table(law, ""), 0, Some(period));
+            assert!(matches!(refused, Err(ModesError::NotPeriodic { .. })), "{law}: {period}: {refused:?}");
+        }
+    }
+    let force = r#""forces": [{"name": "f", "body": "b", "point": [0, 0], "force": [0, 10],
+        "law": {"start": 0, "sines": [{"amplitude": 1, "frequency": 7.3}]}}],"#;
+    let refused = found(&table(sines, force), 0, None);
+    assert!(matches!(refused, Err(ModesError::PeriodUnknown(_))), "{refused:?}");
+    let refused = found(&table(sines, force), 0, Some(TAU / 7.3));
+    assert!(matches!(refused, Err(ModesError::NotPeriodic { .. })), "{refused:?}");
+    // With half the frequency they have.
+    let force = force.replace("7.3", "10");
+    let shared = found(&table(sines, &force), 0, None).expect("a search");
+    assert!((shared.period - TAU / 10.0).abs() < 1e-12);
+}

@@ -22,11 +22,11 @@ mod search;
 pub use self::periodic::{PeriodicMotion, PeriodicMotions, periodic};
 
 pub(super) use self::local::Local;
+use self::period::{is_forced, moving};
 use self::search::EquilibriumSearch;
 use super::kinematics::left_out;
-use crate::arithmetic::Scalar;
-use crate::dynamics::{Mechanism, Time};
-use crate::scene::{Law, Scene};
+use crate::dynamics::Mechanism;
+use crate::scene::Scene;
 use serde::Serialize;
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -191,12 +191,6 @@ pub enum ModesError {
     Rigid,
 }
 
-/// A motor whose law changes with time, if there is one.
-fn moving(mechanism: &Mechanism) -> Option<&str> {
-    let moves = |law: &Law| [0.0, 0.37, 1.9].iter().any(|&t| law.rates::<f64>(Time::of(t)).0 != 0.0);
-    mechanism.constraints.iter().find(|row| row.law.as_ref().is_some_and(moves)).map(|row| row.name())
-}
-
 /// The starts once more, with whole turns of the bodies that torsion springs turn and no constraint holds, up
 /// to so many to either side of the scene's start.
 fn wound(mechanism: &Mechanism, first: &[f64], others: &[Vec<f64>]) -> Vec<Vec<f64>> {
@@ -232,6 +226,9 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     if let Some(name) = moving(mechanism) {
         return Err(ModesError::Moving(name.to_owned()));
     }
+    if is_forced(mechanism) {
+        return Err(ModesError::Forced);
+    }
     let start = mechanism.start(scene);
     let [first, _] = start.rounded();
     // Wheels come to all their positions beside one another after some turns only.
@@ -239,9 +236,6 @@ pub fn modes(scene: &Scene, mechanism: &Arc<Mechanism>, starts: usize) -> Result
     let (others, asked) = mechanism.other_assemblies(scene, starts, turns);
     let more = if starts < FEWEST { mechanism.other_assemblies(scene, FEWEST, turns).0 } else { Vec::new() };
     let mut search = EquilibriumSearch::new(mechanism, [&first].into_iter().chain(&others).chain(&more));
-    if search.local.depends_on_time(&first) {
-        return Err(ModesError::Forced);
-    }
     let freedom = search.local.tangent(&first).ncols();
     if freedom == 0 {
         return Err(ModesError::Rigid);

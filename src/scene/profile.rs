@@ -88,6 +88,11 @@ impl<C> Profile<C> {
         }
     }
 
+    /// True where time is in it, on its branches.
+    pub fn depends_on_time(&self) -> bool {
+        self.tape.inputs().any(|input| input == 0)
+    }
+
     /// Its formula.
     pub fn text(&self) -> &str {
         &self.text

@@ -59,22 +59,6 @@ impl<'a> Local<'a> {
         DVector::from_iterator(phi.len(), self.kernel.load.iter().zip(&self.unit).map(|(a, unit)| a / unit))
     }
 
-    /// The same with the laws on their branches at that time.
-    pub(super) fn pull_on_branches(&mut self, phi: &[f64], t: f64) -> DVector<f64> {
-        match self.mechanism.on_branches_of(&at_rest(phi, t)) {
-            Ok(Some(mechanism)) => Local::new(&mechanism).pull(phi, t),
-            _ => self.pull(phi, t),
-        }
-    }
-
-    pub(in crate::run) fn depends_on_time(&mut self, phi: &[f64]) -> bool {
-        let now = self.pull_on_branches(phi, 0.0);
-        [0.37, 1.9].iter().any(|&t| {
-            let then = self.pull_on_branches(phi, t);
-            (&then - &now).amax() > 1e-9 * now.amax().max(then.amax())
-        })
-    }
-
     /// Directions that the constraints leave, orthonormal, one a column.
     pub(in crate::run) fn tangent(&mut self, phi: &[f64]) -> DMatrix<f64> {
         let n = phi.len();

@@ -10,8 +10,8 @@
 //! (1995), sections 3.2 and 6.4 (shooting); G. Floquet, Ann. Sci. Éc. Norm. Sup. 12 (1883).
 
 use super::local::Local;
-use super::period::{check_period, common_period};
-use super::{DISTINCT, ModesError, Stability, moving};
+use super::period::{check_period, common_period, is_driven};
+use super::{DISTINCT, ModesError, Stability};
 use crate::arithmetic::sum::larger;
 use crate::dynamics::{Mechanism, Motion, Time};
 use crate::run::build::build;
@@ -48,7 +48,7 @@ const ROUNDING: f64 = 1e-4;
 /// motion, all beside a corner.
 const BENT: f64 = 1e-5;
 const KEPT: f64 = 0.6;
-/// Most steps of a run, which near a collision would take them without end.
+/// Most steps of a run to one time, which near a collision would take them without end.
 const STEPS_MOST: usize = 20_000;
 /// Periods that the scene's start is left to settle for.
 const SETTLING: usize = 50;
@@ -139,7 +139,7 @@ pub fn periodic(
         Some(period) => period,
         None => common_period(mechanism)?,
     };
-    check_period(mechanism, &mut local, &first[0], period)?;
+    check_period(mechanism, &local, &first[0], period, scene.until)?;
     let freedom = local.tangent(&first[0]).ncols();
     if freedom == 0 {
         return Err(ModesError::Driven(period));
@@ -149,8 +149,7 @@ pub fn periodic(
         Shooting { local, whole: mechanism, plan, period, unit_rate: TAU / period, unstable: 0 };
     let mut found: Vec<PeriodicMotion> = Vec::new();
     let mut count = [0, 0];
-    let is_driven = moving(mechanism).is_some() || shooting.local.depends_on_time(&first[0]);
-    let mut at_rest = (!is_driven).then_some(0);
+    let mut at_rest = (!is_driven(mechanism)).then_some(0);
     let settled = shooting.settled(&first);
     let near = [Some(first.clone()), settled];
     let (others, asked) = shooting.others(scene, starts);
@@ -217,13 +216,14 @@ fn course(
     times: &[f64],
 ) -> Result<Vec<[Vec<f64>; 2]>, String> {
     let mut plan = plan.clone();
+    plan.until = times.iter().copied().fold(plan.until, f64::max);
     let mut outcome = Outcome::begun(mechanism, plan.clone());
     let start = Motion::of_doubles(0.0, begin.each_ref().map(Vec::as_slice));
     let driver = build(mechanism, &mut plan, &start).map_err(|stop| stop.what)?;
     let mut driver = ContactDriver::new(Arc::clone(mechanism), driver);
     driver.meet(&mut outcome).map_err(|stop| stop.what)?;
-    let mut steps = 0..STEPS_MOST;
     let mut at = |time: f64| -> Result<[Vec<f64>; 2], String> {
+        let mut steps = 0..STEPS_MOST;
         let is_over = &mut || steps.next().is_none();
         let is_there = driver.go(Time::from(time), &mut outcome, is_over).map_err(|stop| stop.what)?;
         is_there.then_some(()).ok_or("it takes too many steps")?;
@@ -265,9 +265,10 @@ impl Shooting<'_> {
         self.local.beside(&base.state, &base.tangent, [&y, &v])
     }
 
-    /// Where a state is after a period.
-    fn after(&self, state: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
-        let end = course(self.whole, &self.plan, state, &[self.period]).ok()?.pop()?;
+    /// Where a state is after so many periods, in which the drives go on.
+    fn after(&self, state: &[Vec<f64>; 2], periods: u32) -> Option<[Vec<f64>; 2]> {
+        let times: Vec<f64> = (1..=periods).map(|k| f64::from(k) * self.period).collect();
+        let end = course(self.whole, &self.plan, state, &times).ok()?.pop()?;
         end.iter().flatten().all(|x| x.is_finite()).then_some(end)
     }
 
@@ -284,7 +285,7 @@ impl Shooting<'_> {
     /// P(x) less the base, in local coordinates.
     fn image(&mut self, base: &Base, x: &DVector<f64>) -> Option<DVector<f64>> {
         let begin = self.beside(base, x)?;
-        let end = self.after(&begin)?;
+        let end = self.after(&begin, 1)?;
         let f = base.tangent.ncols();
         let [phi, omega] = self.apart(&base.state, &end).map(|part| base.tangent.transpose() * part);
         Some(DVector::from_fn(2 * f, |k, _| if k < f { phi[k] } else { omega[k - f] }))
@@ -358,11 +359,11 @@ impl Shooting<'_> {
         let (narrow, left) = self.derivative(base, 0.5 * length)?;
         let is_on_corner = left > BENT * rough && left > KEPT * bend;
         let derivative = (narrow * 4.0 - wide) / 3.0;
-        let end = self.after(&base.state)?;
+        let end = self.after(&base.state, 1)?;
         let off =
             |to: &[Vec<f64>; 2]| self.apart(&base.state, to).iter().map(DVector::amax).fold(0.0, f64::max);
         let residual = off(&end);
-        if off(&self.after(&end)?) > CLOSED_AGAIN * rough {
+        if off(&self.after(&base.state, 2)?) > CLOSED_AGAIN * rough {
             return None;
         }
         let mut multipliers: Vec<[f64; 2]> = match is_on_corner {
@@ -401,7 +402,7 @@ impl Shooting<'_> {
 
     /// Where a state has come to after many periods, where it comes to something.
     fn settled(&self, begin: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
-        (0..SETTLING).try_fold(begin.clone(), |state, _| self.after(&state))
+        (0..SETTLING).try_fold(begin.clone(), |state, _| self.after(&state, 1))
     }
 
     /// Other states to begin with, at rest and turning with the drives, and what became of the positions

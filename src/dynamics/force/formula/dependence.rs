@@ -1,10 +1,41 @@
 //! What formulas depend on, on whichever branches and with whatever parameters.
 
-use super::{FormulaEvent, Formulas};
+use super::{Expression, FormulaEvent, Formulas};
 use crate::dynamics::constraint::Site;
 use crate::scene::Meaning;
 
+impl Expression {
+    /// True where time is in it, and true where conditions choose its branches, itself or by the signals it
+    /// asks for, of which `signals` tell the same.
+    fn depends_on_time_and_conditions(&self, signals: &[[bool; 2]]) -> [bool; 2] {
+        let own = [self.meanings.contains(&Meaning::Time), self.formula.conditions() > 0];
+        self.meanings.iter().fold(own, |[time, conditions], meaning| match meaning {
+            Meaning::Signal(number) => [time || signals[*number][0], conditions || signals[*number][1]],
+            _ => [time, conditions],
+        })
+    }
+}
+
 impl Formulas {
+    /// The formulas of forces, torques, springs, motors and walls, with the names of their parts.
+    pub(super) fn by_part(&self) -> impl Iterator<Item = (&str, &Expression)> {
+        let laws = self.laws.iter().flat_map(|law| law.expressions().map(|one| (law.name.as_str(), one)));
+        let profiles = self.profiles.iter().map(|(part, law)| (part.name.as_str(), law));
+        let aims = self.aims.iter().map(|(part, _, aim)| (part.name.as_str(), aim));
+        laws.chain(profiles).chain(aims)
+    }
+
+    /// The names of parts that may depend on time on other branches than those that hold.
+    pub fn timed_on_branches(&self) -> Vec<&str> {
+        let mut signals = Vec::with_capacity(self.signals.len());
+        for signal in &self.signals {
+            signals.push(signal.depends_on_time_and_conditions(&signals));
+        }
+        let is_timed =
+            |(_, one): &(&str, &Expression)| one.depends_on_time_and_conditions(&signals) == [true; 2];
+        self.by_part().filter(is_timed).map(|(name, _)| name).collect()
+    }
+
     /// True where a law applies forces beside potentials, on whatever branch.
     pub fn applies(&self) -> bool {
         self.laws.iter().any(|law| law.place.applies())

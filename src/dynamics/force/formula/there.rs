@@ -54,12 +54,9 @@ impl Formulas {
 
     /// The value of every formula of a force, torque, spring, motor or wall, with the name of its part.
     pub fn values_by_part(&self, at: &Configuration<f64>, parameters: &[f64]) -> Vec<(&str, f64)> {
-        let laws = self.laws.iter().flat_map(|law| law.expressions().map(|one| (law.name.as_str(), one)));
-        let profiles = self.profiles.iter().map(|(part, law)| (part.name.as_str(), law));
-        let aims = self.aims.iter().map(|(part, _, aim)| (part.name.as_str(), aim));
         self.with_signals_there(at, parameters, |signals| {
             let value = |(name, one): (_, &Expression)| (name, one.there(at, parameters, signals));
-            laws.chain(profiles).chain(aims).map(value).collect()
+            self.by_part().map(value).collect()
         })
     }
 
