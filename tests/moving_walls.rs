@@ -134,6 +134,30 @@ fn a_ball_rides_on_a_table_until_that_falls_faster() {
     }
 }
 
+/// A ball at rest that the table is switched on below at 1e5 s, where a plain double tells the time to 7e-12 s
+/// and the velocity of the table with it to 3e-8 m/s.
+#[test]
+fn a_table_that_shakes_for_ever_meets_a_ball_at_its_own_place_and_velocity() {
+    let (a, w, y, e, on) = (0.01, 600.0_f64, 0.005, 0.5, 1e5);
+    let switched = format!(
+        r#", "inactive": ["table"], "events": [{{"name": "switch", "when": "t - {on}", "on": ["table"]}}]"#
+    );
+    let law = format!(r#"{{"start": 0, "sines": [{{"amplitude": {a}, "frequency": {w}}}]}}"#);
+    let text = serde_json::to_string(&ball(&law, e, [y, 0.0], on + 0.012, &switched).to_input());
+    let still = scene(&text.expect("JSON").replace("-9.81", "0"));
+    // a sin(w t) = y, going up, after a whole number of turns.
+    let rises = (y / a).asin();
+    let turns = ((w * on - rises) / std::f64::consts::TAU).ceil();
+    let (t, approach) = ((rises + turns * std::f64::consts::TAU) / w, -a * w * rises.cos());
+    for request in methods() {
+        let outcome = finished(&still, &request);
+        near(outcome.impacts[0].t, t, 1e-10, "time of the impact");
+        near(outcome.impacts[0].approach, approach, 1e-8, "approach");
+        near(outcome.impacts[0].energy_lost, 0.5 * (1.0 - e * e) * approach * approach, 1e-7, "energy lost");
+        near(outcome.last.omega[2], -(1.0 + e) * approach, 1e-8, "velocity");
+    }
+}
+
 /// A ball on a line through the origin that a driven bar carries, and one that hangs on nothing.
 const TURNING: &str = r#"{"name": "turning", "gravity": [0, -9.81],
     "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1},

@@ -301,7 +301,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         }
         if let Some(guard) = guard {
             let body_angles = seen(&mut **problem, state);
-            guard.begin(problem.mechanism(), state.time.hi, &body_angles);
+            guard.begin(problem.mechanism(), state.time, &body_angles);
         }
         Ok(())
     }
@@ -352,13 +352,13 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         };
         let (name, body_angles) = (Integrator::<P>::name(method), seen(&mut **problem, state));
         let candidate = guard
-            .step(problem.mechanism(), state.time.hi, &body_angles)
+            .step(problem.mechanism(), state.time, &body_angles)
             .map_err(|passed| passed.stop(name))?;
         let Some(contact) = candidate.filter(|_| self.is_dense) else { return Ok(()) };
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {
             method.interpolate(problem, from, from.time + span.scale(share), inside);
-            (inside.time.hi, seen(&mut **problem, inside))
+            (inside.time, seen(&mut **problem, inside))
         };
         guard.search(&mechanism, contact, &mut at).map_err(|passed| passed.stop(name))
     }

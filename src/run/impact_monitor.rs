@@ -52,12 +52,12 @@ pub(super) fn closed(tolerance: f64) -> f64 {
 }
 
 /// The gap of a wall over the length of its contact, and its rounding, in doubles.
-pub(super) fn gap(contact: &Contact, angles: usize, t: f64, phi: &[f64]) -> (f64, f64) {
+pub(super) fn gap(contact: &Contact, angles: usize, t: Time, phi: &[f64]) -> (f64, f64) {
     if contact.is_off {
         return (AWAY, 0.0);
     }
     let z = elements(angles, phi);
-    let moved = contact.travel(Time::of(t), phi, &z).unwrap_or(0.0);
+    let moved = contact.travel(t, phi, &z).unwrap_or(0.0);
     let rounding = 16.0 * f64::EPSILON * (magnitudes(&contact.row, &z) + moved.abs()) / contact.length;
     let reach = contact.facing(contact.normal, &z).dot(contact.point.position(&z));
     let offset = if contact.on.is_some() { 0.0 } else { offset(contact) };
@@ -65,12 +65,12 @@ pub(super) fn gap(contact: &Contact, angles: usize, t: f64, phi: &[f64]) -> (f64
 }
 
 /// The rate of that gap \[1/s\].
-pub(super) fn gap_rate(contact: &Contact, angles: usize, t: f64, phi: &[f64], omega: &[f64]) -> f64 {
+pub(super) fn gap_rate(contact: &Contact, angles: usize, t: Time, phi: &[f64], omega: &[f64]) -> f64 {
     if contact.is_off {
         return 0.0;
     }
     let z = elements(angles, phi);
-    let own = contact.travel_rate(Time::of(t), phi, &z, omega).unwrap_or(0.0);
+    let own = contact.travel_rate(t, phi, &z, omega).unwrap_or(0.0);
     (contact.velocity(contact.normal, &z, omega) - own) / contact.length
 }
 
@@ -93,13 +93,13 @@ pub(super) fn check(
     unmoved(mechanism, UNMOVED, before, after)?;
     let contact = &mechanism.contacts[claim.contact];
     let [phi, _] = before.rounded();
-    let (gap, rounding) = gap(contact, mechanism.bodies.len(), before.time.hi, &phi);
+    let (gap, rounding) = gap(contact, mechanism.bodies.len(), before.time, &phi);
     if beyond(gap.abs(), closed(tolerance) + rounding) {
         return Err(format!("the point is {:.2e} m from the wall at the impact", gap * contact.length));
     }
     let (here, slips) = (Sides::new(mechanism, before, after), slips(mechanism, before, after));
     let [(approach, own), (departure, _)] =
-        [before, after].map(|motion| contact.normal_velocity(before.time.hi, &here.z, motion));
+        [before, after].map(|motion| contact.normal_velocity(before.time, &here.z, motion));
     let step_size =
         own.abs() + contact.step_size(&before.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
     let friction = mechanism.friction_at(claim.contact);
@@ -222,10 +222,10 @@ fn elements<T: Scalar>(angles: usize, phi: &[T]) -> Vec<Complex<T>> {
 
 impl Contact {
     /// Velocity of the point along the normal, seen from the wall, and that of the wall \[m/s\].
-    fn normal_velocity(&self, t: f64, z: &[Complex<DoubleDouble>], motion: &Motion) -> (f64, f64) {
+    fn normal_velocity(&self, t: Time, z: &[Complex<DoubleDouble>], motion: &Motion) -> (f64, f64) {
         let [phi, omega] = motion.rounded();
         let plain = elements(self.angles(), &phi);
-        let own = self.travel_rate(Time::of(t), &phi, &plain, &omega).unwrap_or(0.0);
+        let own = self.travel_rate(t, &phi, &plain, &omega).unwrap_or(0.0);
         (self.velocity(self.normal, z, &motion.omega).hi - own, own)
     }
 

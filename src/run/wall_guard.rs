@@ -8,7 +8,7 @@
 use super::contact::tighter;
 use super::impact_monitor::{gap, gap_rate};
 use crate::arithmetic::shown::about;
-use crate::dynamics::{BodyAngles, Mechanism};
+use crate::dynamics::{BodyAngles, Mechanism, Time};
 use crate::stepping::search::golden_sections;
 use crate::stepping::{Cause, StepError};
 
@@ -24,7 +24,7 @@ const NEAR: f64 = 0.2;
 pub(super) struct WallGuard {
     /// A gap below minus this is behind the wall.
     closed: f64,
-    t: f64,
+    t: Time,
     gaps: Vec<[f64; 2]>,
 }
 
@@ -35,7 +35,7 @@ impl WallGuard {
     }
 
     /// Begins at a moment.
-    pub fn begin(&mut self, mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) {
+    pub fn begin(&mut self, mechanism: &Mechanism, t: Time, body_angles: &BodyAngles) {
         self.t = t;
         self.gaps = gaps(mechanism, t, body_angles);
     }
@@ -47,11 +47,11 @@ impl WallGuard {
     pub fn step(
         &mut self,
         mechanism: &Mechanism,
-        t: f64,
+        t: Time,
         body_angles: &BodyAngles,
     ) -> Result<Option<usize>, Box<PassedWall>> {
         self.look(mechanism, t, body_angles)?;
-        let (h, now) = (t - self.t, gaps(mechanism, t, body_angles));
+        let (h, now) = ((t - self.t).hi, gaps(mechanism, t, body_angles));
         let candidate =
             (0..now.len()).find(|&c| !mechanism.held.contains(&c) && dips(&self.gaps[c], &now[c], h));
         (self.t, self.gaps) = (t, now);
@@ -66,7 +66,7 @@ impl WallGuard {
         &self,
         mechanism: &Mechanism,
         contact: usize,
-        mut at: impl FnMut(f64) -> (f64, BodyAngles),
+        mut at: impl FnMut(f64) -> (Time, BodyAngles),
     ) -> Result<(), Box<PassedWall>> {
         let mut gap_at = |share: f64| -> Result<f64, Box<PassedWall>> {
             let (t, body_angles) = at(share);
@@ -90,7 +90,7 @@ impl WallGuard {
     pub fn look(
         &self,
         mechanism: &Mechanism,
-        t: f64,
+        t: Time,
         body_angles: &BodyAngles,
     ) -> Result<(), Box<PassedWall>> {
         for (c, contact) in mechanism.contacts.iter().enumerate() {
@@ -99,7 +99,7 @@ impl WallGuard {
             let off = if is_held { gap.abs() } else { -gap };
             if off.is_nan() || off > self.closed + rounding {
                 return Err(Box::new(PassedWall {
-                    t,
+                    t: t.hi,
                     wall: contact.row.name.clone(),
                     gap: gap * contact.length,
                     is_held,
@@ -110,7 +110,7 @@ impl WallGuard {
     }
 }
 
-fn gaps(mechanism: &Mechanism, t: f64, body_angles: &BodyAngles) -> Vec<[f64; 2]> {
+fn gaps(mechanism: &Mechanism, t: Time, body_angles: &BodyAngles) -> Vec<[f64; 2]> {
     let angles = mechanism.bodies.len();
     (mechanism.contacts.iter())
         .map(|contact| {
@@ -191,14 +191,14 @@ mod tests {
     fn what_is_behind_a_wall_or_left_it_is_told() {
         let (mechanism, mut body_angles) = ball();
         let (guard, held) = (WallGuard::new(1e-9), mechanism.holding(&[0]));
-        assert!(guard.look(&mechanism, 0.0, &body_angles).is_ok());
-        let stop = guard.look(&held, 0.5, &body_angles).expect_err("it is above").stop("dp8");
+        assert!(guard.look(&mechanism, Time::ZERO, &body_angles).is_ok());
+        let stop = guard.look(&held, Time::of(0.5), &body_angles).expect_err("it is above").stop("dp8");
         assert!(
             stop.what.contains("held at wall floor") && stop.t == 0.5 && stop.cause == Cause::WallPassed,
             "{stop}"
         );
         body_angles.phi[2] = -1e-6;
-        let stop = guard.look(&mechanism, 0.5, &body_angles).expect_err("it is below").stop("dp8");
+        let stop = guard.look(&mechanism, Time::of(0.5), &body_angles).expect_err("it is below").stop("dp8");
         assert!(stop.what.contains("is 1e-6 m behind wall floor"), "{stop}");
     }
 
@@ -213,9 +213,9 @@ mod tests {
                 ..body_angles.clone()
             };
             let mut guard = WallGuard::new(1e-9);
-            guard.begin(&mechanism, 0.0, &at(0.0));
-            assert_eq!(guard.step(&mechanism, 1.0, &at(1.0)), Ok(Some(0)));
-            let found = guard.search(&mechanism, 0, |share| (share, at(share)));
+            guard.begin(&mechanism, Time::ZERO, &at(0.0));
+            assert_eq!(guard.step(&mechanism, Time::of(1.0), &at(1.0)), Ok(Some(0)));
+            let found = guard.search(&mechanism, 0, |share| (Time::of(share), at(share)));
             assert_eq!(found.is_err(), is_behind, "{depth:e}");
         }
     }

@@ -33,12 +33,12 @@ pub(in crate::run) fn check_several(
     for blow in blows {
         let contact = &mechanism.contacts[blow.contact];
         let name = contact.row.name();
-        let (gap, rounding) = gap(contact, mechanism.bodies.len(), before.time.hi, &phi);
+        let (gap, rounding) = gap(contact, mechanism.bodies.len(), before.time, &phi);
         if beyond(gap.abs(), closed(tolerance) + rounding) {
             return Err(format!("the point is {:.2e} m from wall {name}", gap * contact.length));
         }
         let [(approach, _), (departure, _)] =
-            [before, after].map(|motion| contact.normal_velocity(before.time.hi, &here.z, motion));
+            [before, after].map(|motion| contact.normal_velocity(before.time, &here.z, motion));
         let [slid, slides] =
             [before, after].map(|motion| contact.tangential_velocity(&here.z, &motion.omega));
         let step_size = contact.step_size(&after.omega.iter().map(|omega| omega.hi).collect::<Vec<_>>());
