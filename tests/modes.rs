@@ -761,6 +761,38 @@ fn an_equilibrium_beside_a_corner_has_its_modes() {
     assert!(free.is_family && !free.is_on_corner && free.stability == Stability::Stable, "{free:?}");
 }
 
+/// m r'' = -k r - c (r' r) r / r^2: linear on a line, m s^2 + c s + k = 0, and of no derivative in the plane, where
+/// the damper acts along the way the ends part.  Without a damper the spring is as smooth in the plane.
+#[test]
+fn a_damper_whose_ends_meet_is_on_a_corner_in_the_plane() {
+    let of = |rail: &str, damping: f64| {
+        let scene = parsed(&format!(
+            r#"{{"name": "meeting", "gravity": [0, 0], {rail}
+            "bars": [{{"name": "b", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.2}}],
+            "springs": [{{"name": "s", "stiffness": 50, "free_length": 0, "damping": {damping},
+                "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "torsion_springs": [{{"name": "t", "body": "b", "stiffness": 2, "free_angle": 0}}],
+            "start": {{"b": {{"phi": 0, "omega": 0, "origin": [0, -0.2], "velocity": [0, 0]}}}},
+            "until": 20, "every": 0.1}}"#
+        ));
+        let all = found(&scene, 8).equilibria;
+        assert_eq!(all.len(), 1, "{all:?}");
+        all.into_iter().next().expect("one")
+    };
+    let rail = r#""sliders": [{"name": "r", "point": {"body": "b", "point": [0, 0]}, "angle": "locked",
+        "rail": {"body": "ground", "point": [0, 0], "direction": [0, 1]}}],"#;
+    let one = of("", 1.0);
+    assert!(one.is_on_corner && one.modes.is_empty() && one.stability == Stability::Undecided, "{one:?}");
+    let one = of("", 0.0);
+    let frequencies: Vec<f64> = one.modes.iter().map(|mode| mode.frequency).collect();
+    let expected = [20.0_f64.sqrt(), 5.0, 5.0];
+    let is_near = |(have, want): (&f64, &f64)| (have - want).abs() < 1e-9;
+    assert!(frequencies.len() == 3 && frequencies.iter().zip(&expected).all(is_near), "{one:?}");
+    let one = of(rail, 1.0);
+    let [re, im] = one.modes[0].eigenvalue;
+    assert!((re + 0.25).abs() < 1e-9 && (im - (25.0 - 0.0625_f64).sqrt()).abs() < 1e-9, "{one:?}");
+}
+
 /// A closed loop with a torque of the angle of its follower.
 #[test]
 fn corners_are_found_along_constraints() {

@@ -9,7 +9,7 @@
 //! The accelerations themselves are asked, on both sides of the equilibrium, in every coordinate and rate
 //! that the constraints leave, and in mixed directions: a corner is found whatever function has it.
 
-use super::local::moving;
+use super::local::{Local, moving};
 use super::search::EquilibriumSearch;
 use nalgebra::{DMatrix, DVector};
 
@@ -39,8 +39,8 @@ impl EquilibriumSearch<'_> {
             return true;
         }
         let mechanism = self.local.mechanism;
-        // What has no formula is smooth.
-        if mechanism.laws.is_none() && mechanism.forces.is_empty() {
+        // What has no formula is smooth, but dampers where their ends meet: their line has no direction there.
+        if mechanism.laws.is_none() && mechanism.forces.is_empty() && !self.has_meeting_ends(phi) {
             return false;
         }
         let f = tangent.ncols();
@@ -55,6 +55,15 @@ impl EquilibriumSearch<'_> {
             let [Some(wide), Some(narrow)] = DISTANCES.map(|h| left(direction, h)) else { return false };
             !narrow.is_finite() || (narrow > least && narrow > KEPT * wide)
         })
+    }
+
+    /// True where the ends of a damper are nearer to each other than the first distance.
+    fn has_meeting_ends(&mut self, phi: &[f64]) -> bool {
+        let Local { mechanism, kernel, .. } = &mut self.local;
+        kernel.unit_vectors::<0>(mechanism, phi);
+        let near = (DISTANCES[0] * mechanism.units.length).powi(2);
+        let mut dampers = mechanism.springs.iter().filter(|spring| spring.damping != 0.0);
+        dampers.any(|spring| spring.span.position(&kernel.z).norm_squared() < near)
     }
 
     /// Accelerations along the directions of `tangent` at local coordinates and rates, with the laws on their
