@@ -491,3 +491,31 @@ fn moving_walls_are_drives() {
     let shared = found(&table(sines, &force), 0, None).expect("a search");
     assert!((shared.period - TAU / 10.0).abs() < 1e-12);
 }
+
+/// 0.5 w' + 20 w + 0.5 x = sin 3t: multipliers of exp(-39.975 T) and exp(-0.025 T).  The first one is far below what
+/// the differences leave, and no digits of its growth are told.
+#[test]
+fn multipliers_of_rounding_have_no_growth() {
+    let scene = parsed(
+        r#"{"name": "overdamped", "gravity": [0, 0],
+            "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.5, "length": 0.6}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "torsion_springs": [{"name": "s", "body": "b", "stiffness": 0.5, "free_angle": 0, "damping": 20}],
+            "torques": [{"name": "t", "body": "b", "torque": 1,
+                         "law": {"start": 0, "sines": [{"amplitude": 1, "frequency": 3}]}}],
+            "start": {"b": {"phi": 0, "omega": 0}}, "until": 20, "every": 0.1}"#,
+    );
+    let found = found(&scene, 0, None).expect("a search");
+    let one = &found.motions[0];
+    let slow = 20.0 - (400.0_f64 - 1.0).sqrt();
+    let [largest, least] = [0, 1].map(|k| one.multipliers[k][0].hypot(one.multipliers[k][1]));
+    assert!((largest - (-slow * TAU / 3.0).exp()).abs() < 1e-9, "{one:?}");
+    assert!(least < one.multiplier_rounding && one.multiplier_rounding < 1e-8, "{one:?}");
+    let page = driftless::report::periodic::text(&found);
+    println!("{page}");
+    // Upper bounds of its magnitude and of its growth.
+    let bounds = page.split("< ").skip(1).map(|rest| rest.split_whitespace().next().expect("a number"));
+    let bounds: Vec<f64> = bounds.map(|bound| bound.parse().expect("a number")).collect();
+    assert!(matches!(bounds[..], [1e-9..1e-8, -10.0..-9.0]), "{page}");
+    assert!(page.contains("-0.0250156"), "{page}");
+}

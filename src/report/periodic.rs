@@ -36,6 +36,7 @@ pub fn object(found: &PeriodicMotions) -> Value {
             "is_family": one.is_family,
             "is_on_corner": one.is_on_corner,
             "multipliers": one.multipliers,
+            "multiplier_rounding": one.multiplier_rounding,
         })
     };
     let mut starts = starts(found.starts, found.asked);
@@ -63,6 +64,21 @@ fn words(one: &PeriodicMotion) -> String {
     format!("{stability}{family}")
 }
 
+/// A row of the table of multipliers: of one that is rounding its bound alone, of others the digits they have.
+fn multiplier(k: usize, [re, im]: [f64; 2], rounding: f64, period: f64) -> Vec<String> {
+    let size = re.hypot(im);
+    if size < rounding {
+        let [bound, growth] = [rounding, libm::log(rounding) / period].map(|x| format!("< {}", figure(x)));
+        let [number, unknown] = [(k + 1).to_string(), "-".to_owned()];
+        return vec![number, unknown.clone(), unknown.clone(), bound, growth, unknown];
+    }
+    // Beyond nine digits there is nothing but rounding, and sooner where it is small.
+    let nine = |x: f64| (x * 1e9).round() / 1e9;
+    let least = libm::exp10((libm::log10(rounding / size) - 0.01).ceil()).max(1e-9);
+    let growth = (libm::log(size) / least).round() * least / period;
+    row(k, &[re, im, nine(size), growth, libm::atan2(im, re) / TAU])
+}
+
 /// The page.
 pub fn text(found: &PeriodicMotions) -> String {
     let mut page = Page::new(&found.scene.name, &found.scene.description);
@@ -85,13 +101,7 @@ pub fn text(found: &PeriodicMotions) -> String {
         page.entry("", &format!("begins at {}", places.join(", ")));
         page.entry("", &format!("closes to {:.1e}", one.residual));
         let rows: Vec<Vec<String>> = (one.multipliers.iter().take(LISTED).enumerate())
-            .map(|(k, [re, im])| {
-                let size = re.hypot(*im);
-                // Beyond nine digits there is nothing but rounding.
-                let nine = |x: f64| (x * 1e9).round() / 1e9;
-                let growth = nine(libm::log(size)) / found.period;
-                row(k, &[*re, *im, nine(size), growth, libm::atan2(*im, *re) / TAU])
-            })
+            .map(|(k, value)| multiplier(k, *value, one.multiplier_rounding, found.period))
             .collect();
         if !rows.is_empty() {
             page.table(&["multiplier", "Re", "Im", "magnitude", "growth [1/s]", "turns a period"], &rows);

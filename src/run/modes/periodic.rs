@@ -43,6 +43,8 @@ const CLOSED_AGAIN: f64 = 1e-8;
 /// Multipliers that differ from magnitude 1 by less, times the root of the largest entry of DP, do so by
 /// rounding: a double root is known to half the digits.
 const ROUNDING: f64 = 1e-4;
+/// What runs leave of the multipliers that are none, for each unit of the largest entry of DP.
+const RESOLVED: f64 = 1e-9;
 /// What both sides of a motion differ by over the length of a difference where it may be a corner, for each
 /// unit of the largest entry of DP, and how much of it is left at half the length: half beside a smooth
 /// motion, all beside a corner.
@@ -67,6 +69,8 @@ pub struct PeriodicMotion {
     /// Real and imaginary parts of its Floquet multipliers, the largest first; of a pair both.  None where it
     /// stays on a corner.
     pub multipliers: Vec<[f64; 2]>,
+    /// Multipliers of a smaller magnitude are rounding.
+    pub multiplier_rounding: f64,
     /// What a small disturbance does.
     pub stability: Stability,
     /// True where it was found from the scene's start.
@@ -394,6 +398,7 @@ impl Shooting<'_> {
             residual,
             is_family: multipliers.iter().any(|[re, im]| (re - 1.0).hypot(*im) < rounding),
             multipliers,
+            multiplier_rounding: RESOLVED * rough,
             stability,
             from_start,
             is_on_corner,
