@@ -64,7 +64,8 @@ fn words(one: &PeriodicMotion) -> String {
     format!("{stability}{family}")
 }
 
-/// A row of the table of multipliers: of one that is rounding its bound alone, of others the digits they have.
+/// A row of the table of multipliers: of one that is rounding its bounds alone, of others what digits they
+/// have.
 fn multiplier(k: usize, [re, im]: [f64; 2], rounding: f64, period: f64) -> Vec<String> {
     let size = re.hypot(im);
     if size < rounding {

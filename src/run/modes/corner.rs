@@ -39,7 +39,7 @@ impl EquilibriumSearch<'_> {
             return true;
         }
         let mechanism = self.local.mechanism;
-        // What has no formula is smooth, but dampers where their ends meet: their line has no direction there.
+        // What has no formula is smooth, but for dampers whose ends meet: their line has no direction there.
         if mechanism.laws.is_none() && mechanism.forces.is_empty() && !self.has_meeting_ends(phi) {
             return false;
         }

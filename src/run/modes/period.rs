@@ -114,12 +114,12 @@ pub(super) fn common_period(mechanism: &Mechanism) -> Result<f64, ModesError> {
 }
 
 /// A mechanism at a time, with its laws on their branches in a state there.
-struct Moment<'a> {
+struct MechanismAtTime<'a> {
     mechanism: Cow<'a, Mechanism>,
     time: Time,
 }
 
-impl<'a> Moment<'a> {
+impl<'a> MechanismAtTime<'a> {
     fn new(mechanism: &'a Mechanism, state: &[Vec<f64>; 2], t: f64) -> Self {
         let there = mechanism.on_branches_of(&moving_at(state, t)).ok().flatten();
         Self { mechanism: there.map_or(Cow::Borrowed(mechanism), Cow::Owned), time: Time::of(t) }
@@ -204,10 +204,10 @@ pub(super) fn check_period(
     for state in states(local, phi) {
         let (mut largest, mut apart) = (0.0_f64, 0.0_f64);
         for share in LOOKED_AT {
-            let now = Moment::new(mechanism, &state, share * period);
+            let now = MechanismAtTime::new(mechanism, &state, share * period);
             let pull = now.pull(&state);
             for &later in &laters {
-                let then = Moment::new(mechanism, &state, (share + later) * period);
+                let then = MechanismAtTime::new(mechanism, &state, (share + later) * period);
                 let times = [now.time, then.time];
                 for (row, after) in now.rows().zip(then.rows()) {
                     if !is_same(local, [row, after], times, &state, [period, later]) {
