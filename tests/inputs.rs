@@ -479,3 +479,31 @@ mod command {
         assert_eq!(table(&program), table(&whole));
     }
 }
+
+#[test]
+fn numbers_with_units_are_as_uncertain_as_the_same_numbers_without() {
+    let scene = |[mass, inertia, length, angle, rate, gravity]: [&str; 6]| {
+        template(&format!(
+            r#"{{"name": "u", "gravity": [0, {gravity}], "parameters": {{"l": {length}, "a": {angle}}},
+            "bars": [{{"name": "b", "mass": {mass}, "centre": ["l/2", 0], "inertia": {inertia}, "length": "l"}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}},
+                {{"body": "b", "point": [0, 0]}}]}}],
+            "start": {{"b": {{"phi": "a", "omega": {rate}}}}}, "until": "1 s", "every": "100 ms"}}"#
+        ))
+    };
+    let quoted =
+        [r#""1200 g""#, r#""0500 kg*cm^2""#, r#""60 cm""#, r#""0.5 rad""#, r#""2.0 Hz""#, r#""-9.8 m/s^2""#];
+    let templates = [scene(quoted), scene(["1.200", "0.0500", "0.60", "0.5", "2.0", "-9.8"])];
+    let [with, without] = templates.each_ref().map(|text| text.written_numbers(&[]).expect("a scene"));
+    assert_eq!(with.len(), 6, "{with:?}");
+    for (one, other) in with.iter().zip(&without) {
+        assert_eq!(one.path, other.path);
+        let differs = |a: f64, b: f64| (a - b).abs() > 1e-14 * b.abs();
+        assert!(!differs(one.value, other.value), "{one:?} {other:?}");
+        assert!(!differs(one.uncertainty, other.uncertainty), "{one:?} {other:?}");
+    }
+    let [with, without] =
+        [0, 1].map(|k| effects(&templates[k], &[with.clone(), without.clone()][k][..], 0.5));
+    let [one, other] = [&with, &without].map(|inputs| inputs.total.expect("effects"));
+    assert!(with.unknown() == 0 && (one / other - 1.0).abs() < 1e-6, "{one} {other}");
+}

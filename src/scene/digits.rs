@@ -1,10 +1,11 @@
 //! How exactly a scene states its numbers: by the digits it is written with.
 //!
 //! A number is uncertain by half a unit of its last digit as written: 0.25 by 0.005, 0.250 by 0.0005, 670 by
-//! 0.5, 1.5e3 by 50.  Exact are 0, however it is written (at rest, on an axis, without damping), values such
-//! as `pi/2` that a command line may state, defaults, and the times of the output, `until` and `every`.
+//! 0.5, 1.5e3 by 50, "60 cm" by 0.005 m.  Exact are 0, however it is written (at rest, on an axis, without
+//! damping), formulas such as `pi/2` and `0.1*l`, defaults, and the times of the output, `until` and `every`.
 
 use super::error::SceneError;
+use super::formula::Formula;
 use super::locate::{Located, Texts, Value, push_index, push_key};
 use super::read::put_together;
 use super::set::name;
@@ -69,14 +70,22 @@ impl DigitSearch<'_> {
                     self.visit(node, &inner);
                 }
             }
-            Value::Number(value) if !OF_THE_RUN.contains(&path) => {
-                let Ok(unit) = FormatWalk { tree: self.tree }.unit(path) else { return };
-                let Some(uncertainty) = half_unit(self.digits(node)).filter(|half| half.is_finite()) else {
-                    return;
-                };
-                self.found.push(WrittenNumber { path: path.to_owned(), unit, value: *value, uncertainty });
+            Value::Number(value) => self.take(path, *value, half_unit(self.digits(node))),
+            Value::Text(text) => {
+                if let Some((value, half)) = with_unit(text) {
+                    self.take(path, value, Some(half));
+                }
             }
             _ => {}
+        }
+    }
+
+    /// Takes a number that is uncertain by this, where it is an input of the motion.
+    fn take(&mut self, path: &str, value: f64, uncertainty: Option<f64>) {
+        let Some(uncertainty) = uncertainty.filter(|half| half.is_finite()) else { return };
+        let Ok(unit) = FormatWalk { tree: self.tree }.unit(path) else { return };
+        if !OF_THE_RUN.contains(&path) {
+            self.found.push(WrittenNumber { path: path.to_owned(), unit, value, uncertainty });
         }
     }
 
@@ -89,6 +98,17 @@ impl DigitSearch<'_> {
             .and_then(|typed| typed.split_once('='));
         typed.filter(|_| is_all).map_or(digits, |(_, value)| value.trim())
     }
+}
+
+/// A number in a text, as "60 cm", with half a unit of its last digit, both in units of the SI; `None` for
+/// what is exact, or more than one number.
+fn with_unit(text: &str) -> Option<(f64, f64)> {
+    let formula = Formula::parse(text).ok()?;
+    let (digits, _) = formula.number_alone()?;
+    // The decimals of a formula may begin with their point.
+    let (half, value) = (half_unit(&format!("0{digits}"))?, formula.value(&[]));
+    let scale = (value / digits.parse::<f64>().ok()?).abs();
+    scale.is_finite().then_some((value, half * scale))
 }
 
 /// Half a unit of the last digit of a decimal number; `None` for 0, and for what is no decimal number.
@@ -131,6 +151,32 @@ mod tests {
         }
         for exact in ["0", "0.00", "-0", "0e5", "pi/2", "1/3", "inf", "", "-", "."] {
             assert_eq!(half_unit(exact), None, "{exact}");
+        }
+    }
+
+    #[test]
+    fn a_number_with_a_unit_is_as_uncertain_as_in_units_of_the_si() {
+        for (text, plain) in [
+            ("60 cm", "0.60"),
+            ("600 mm", "0.600"),
+            ("-9.8 m/s^2", "-9.8"),
+            ("500 kg*cm^2", "0.0500"),
+            ("1.50e3 g", "1.500"),
+            ("2.5", "2.5"),
+            (".5 m", "0.5"),
+        ] {
+            let (value, half) = with_unit(text).expect(text);
+            let expected: f64 = plain.parse().expect("a number");
+            let most = half_unit(plain).expect("a half");
+            // The gram's 1.50e3 has its last digit at 10 g.
+            let most = if text.ends_with(" g") { 10.0 * most } else { most };
+            assert!((value - expected).abs() <= 1e-15 * expected.abs(), "{text}: {value}");
+            assert!((half - most).abs() <= 1e-15 * most, "{text}: {half} and not {most}");
+        }
+        let (value, half) = with_unit("30 deg").expect("a number");
+        assert!((value - std::f64::consts::FRAC_PI_6).abs() < 1e-15 && (half - value / 60.0).abs() < 1e-15);
+        for exact in ["0 cm", "pi", "pi/2", "2*l", "l", "0.1*l", "1 m + 2 m", "bar1", "", "1e-400 m"] {
+            assert_eq!(with_unit(exact), None, "{exact}");
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::parse::Parser;
 use super::table::Spline;
-use super::unit::Unit;
+use super::unit::{Dimension, Unit};
 use super::{Formula, Node, Origin};
 use crate::scene::PointTable;
 use crate::scene::number::Decimal;
@@ -43,6 +43,18 @@ impl<C: Decimal> Numbers<C> {
             Origin::Knot { table, point } => self.splines[table].knot(point),
             Origin::Coefficient { table, piece, power } => self.splines[table].coefficients(piece)[power],
         }
+    }
+}
+
+impl Formula {
+    /// The digits of the number that it is, where it is nothing but one with its sign and unit, and the
+    /// dimension of that unit.
+    pub(crate) fn number_alone(&self) -> Option<(&str, Option<Dimension>)> {
+        let ([Node::Number(_)] | [Node::Number(_), Node::Negative(0)]) = self.nodes[..] else { return None };
+        let (start, end) = self.places[0];
+        let digits = Parser::new(&self.text[start as usize..end as usize], &[]).digits();
+        let unit = self.units.iter().find(|unit| unit.0 == 0).map(|unit| unit.1);
+        (!digits.is_empty()).then_some((digits, unit))
     }
 }
 
