@@ -554,6 +554,31 @@ fn spectra_add_up_to_what_the_dissipation_says() {
     assert!(found.expected_sum < -1e-3 && found.defect() < 1e-8, "{} {}", found.sum, found.expected_sum);
 }
 
+/// Of phi'' = a sin(phi) at rest upright the exponents are √a and -√a, of phi'' = c phi' they are c and 0: both
+/// grow for ever, and neither is chaos.
+#[test]
+fn a_single_degree_of_freedom_that_nothing_drives_is_not_chaotic() {
+    let scene = |gravity: &str, more: &str, omega: f64| {
+        template(&format!(
+            r#"{{"name": "one", "gravity": {gravity}, {more}
+            "bars": [{{"name": "b", "mass": 1, "centre": [0.3, 0], "inertia": 0.03, "length": 0.6}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "start": {{"b": {{"phi": 0, "omega": {omega}}}}}, "until": 12, "every": 12}}"#
+        ))
+    };
+    let upright = scene("[-9.81, 0]", "", 0.0);
+    let spun = scene("[0, 0]", r#""torques": [{"name": "t", "body": "b", "torque": "0.24*b.omega"}],"#, 1.0);
+    for (scene, largest) in [(&upright, (9.81_f64 * 0.3 / 0.12).sqrt()), (&spun, 2.0)] {
+        let found = lyapunov(scene, None, None, &mut || false).expect("a spectrum");
+        assert_near(found.exponents[0], largest, 0.1 * largest, "largest exponent");
+        assert_eq!(found.regime, Regime::Undecided);
+        assert!(found.why.is_some_and(|why| why.contains("not chaotic")), "{:?}", found.why);
+    }
+    // 2⁵³ turns at about 19.6 s.
+    let stop = lyapunov(&spun, Some(25.0), None, &mut || false).expect_err("too many turns").to_string();
+    assert!(stop.contains("a body has turned more often than doubles can count"), "{stop}");
+}
+
 /// A force that jumps where a rate passes a value spreads or draws together what comes there.
 #[test]
 fn spectra_add_up_where_forces_jump_with_rates() {

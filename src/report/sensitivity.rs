@@ -257,6 +257,7 @@ pub fn spectrum_object(found: &Spectrum) -> Value {
         "expected_sum": found.expected_sum,
         "defect": found.defect(),
         "regime": found.regime,
+        "why": found.why,
         "lost": found.lost,
     })
 }
@@ -270,7 +271,7 @@ pub fn spectrum_text(found: &Spectrum) -> String {
             format!("chaotic: small differences grow tenfold every {} s", rough(10.0_f64.ln() / largest))
         }
         Regime::Regular => "regular: small differences grow no faster than a power of the time".into(),
-        Regime::Undecided => "undecided: the run is too short to tell".into(),
+        Regime::Undecided => format!("undecided: {}", found.why.unwrap_or_default()),
     };
     page.entry("motion", &regime);
     page.entry("integrated", &format!("{} s", figure(found.until)));

@@ -12,10 +12,26 @@ use super::spring_guard::SpringGuard;
 use super::wall_guard::WallGuard;
 use crate::arithmetic::Scalar;
 use crate::dynamics::{BodyAngles, Form, Motion, State, Time};
-use crate::stepping::{Integrator, Statistics, StepError, interruption};
+use crate::stepping::{Cause, Integrator, Statistics, StepError, interruption};
 
 /// Turns that a state may have at most: all that doubles count.
 pub(super) const MOST_TURNS: u64 = 1 << 53;
+
+/// Why a run ends at more turns than [`MOST_TURNS`], and what to do about it.
+pub(super) const TOO_OFTEN: [&str; 2] = [
+    "a body has turned more often than doubles can count",
+    "look for rates far out of proportion, or shorten the horizon",
+];
+
+/// The stop of a method, with its cause where a number is not finite at angles that doubles do not count.
+fn turned_too_often(stop: StepError, state: &State) -> StepError {
+    let is_counted = state.turns.iter().all(|turns| turns.unsigned_abs() <= MOST_TURNS);
+    if stop.cause != Cause::NotFinite || is_counted {
+        return stop;
+    }
+    let [what, hint] = TOO_OFTEN.map(str::to_owned);
+    StepError { what, hint, ..stop }
+}
 
 /// Where a driver halts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,8 +163,8 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             }
             self.method.save(&mut self.state);
             self.from.clone_from(&self.state);
-            let mut event =
-                self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics)?;
+            let step = self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics);
+            let mut event = step.map_err(|stop| turned_too_often(stop, &self.state))?;
             if event.is_none() && self.state.time <= self.from.time {
                 // Interrupted: nothing was done.
                 if pause() {
@@ -351,9 +367,8 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             return Ok(());
         };
         let (name, body_angles) = (Integrator::<P>::name(method), seen(&mut **problem, state));
-        let candidate = guard
-            .step(problem.mechanism(), state.time, &body_angles)
-            .map_err(|passed| passed.stop(name))?;
+        let candidate =
+            guard.step(problem.mechanism(), state.time, &body_angles).map_err(|passed| passed.stop(name))?;
         let Some(contact) = candidate.filter(|_| self.is_dense) else { return Ok(()) };
         let (span, mechanism) = (state.time - from.time, problem.mechanism().clone());
         let mut at = |share: f64| {

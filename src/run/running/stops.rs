@@ -2,7 +2,7 @@
 
 use super::super::contact::ContactDriver;
 use super::super::drift::Drift;
-use super::super::driver::MOST_TURNS;
+use super::super::driver::{MOST_TURNS, TOO_OFTEN};
 use super::super::event::EventMark;
 use super::super::methods::{MethodId, Stabilization};
 use super::super::plan::Plan;
@@ -169,8 +169,8 @@ pub(super) fn uncounted(plan: &Plan, sample: &Sample) -> Option<StepError> {
         method: plan.method.to_string(),
         t: sample.t,
         step: plan.step.unwrap_or(0.0),
-        what: "a body has turned more often than doubles can count".into(),
-        hint: "look for rates far out of proportion, or shorten the horizon".into(),
+        what: TOO_OFTEN[0].into(),
+        hint: TOO_OFTEN[1].into(),
     })
 }
 

@@ -23,6 +23,7 @@ use crate::dynamics::{Mechanism, Motion};
 use crate::run::driver::Pause;
 use crate::run::observer::Step;
 use crate::run::running::Outcome;
+use crate::run::trust::cannot_be_chaotic;
 use crate::scene::{Scene, Template};
 use serde::Serialize;
 
@@ -44,6 +45,10 @@ const ABOVE: f64 = 2.0;
 /// like; where nothing turns, growth or decay by a power does.
 const SHORT: f64 = 47.0;
 
+const TOO_SHORT: &str = "the run is too short to tell";
+const NEAR_UNSTABLE: &str = "small differences grow exponentially, as beside an unstable equilibrium, and a \
+    single degree of freedom that nothing drives is not chaotic";
+
 /// What the spectrum tells of a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -52,7 +57,7 @@ pub enum Regime {
     Chaotic,
     /// They grow no faster than a power of the time.
     Regular,
-    /// The run is too short to tell.
+    /// Neither, as the run is too short, or since what grows exponentially cannot be chaotic.
     Undecided,
 }
 
@@ -71,6 +76,8 @@ pub struct Spectrum {
     pub expected_sum: f64,
     /// What they tell.
     pub regime: Regime,
+    /// Why that is neither chaotic nor regular.
+    pub why: Option<&'static str>,
     /// Times \[s\] and the exponents up to then, for charts.
     pub rows: Vec<(f64, Vec<f64>)>,
     /// How far it was integrated \[s\].
@@ -121,6 +128,7 @@ pub fn lyapunov(
         variation.expanded = study.expanded(count, &mut []);
     }
     let mut orthonormal = Orthonormal::new(&mechanism, study.plan.until, count);
+    orthonormal.is_planar = cannot_be_chaotic(&mechanism, freedom);
     orthonormal.renew(&mut variation, &motion);
     orthonormal.logs.fill(0.0);
     let until = study.plan.until;
@@ -204,6 +212,8 @@ struct Orthonormal {
     /// ν² \[1/s²\].
     rate: f64,
     count: usize,
+    /// True where no motion of the mechanism is chaotic.
+    is_planar: bool,
     until: f64,
     logs: Vec<f64>,
     /// The first column and the angles at the last time \[rad\], and what they have turned by.
@@ -224,6 +234,7 @@ impl Orthonormal {
             kept: in_force(mechanism).cloned().collect(),
             rate: mechanism.units.time.powi(-2),
             count,
+            is_planar: false,
             until,
             logs: vec![0.0; count],
             last: Default::default(),
@@ -308,12 +319,15 @@ impl Orthonormal {
         let middle = rows.iter().find(|(time, _)| *time >= 0.5 * t);
         let first = order.first().copied().unwrap_or_default();
         let growth = middle.map(|(_, logs)| self.logs[first] - logs[first]);
-        let regime = match growth {
-            Some(growth) if growth >= EXPONENTIAL => Regime::Chaotic,
-            Some(growth) if growth <= POWER && self.is_a_power(t, mean[first], errors[first]) => {
-                Regime::Regular
+        let (regime, why) = match growth {
+            Some(growth) if growth >= EXPONENTIAL && self.is_planar => {
+                (Regime::Undecided, Some(NEAR_UNSTABLE))
             }
-            _ => Regime::Undecided,
+            Some(growth) if growth >= EXPONENTIAL => (Regime::Chaotic, None),
+            Some(growth) if growth <= POWER && self.is_a_power(t, mean[first], errors[first]) => {
+                (Regime::Regular, None)
+            }
+            _ => (Regime::Undecided, Some(TOO_SHORT)),
         };
         let sorted = |values: &[f64]| order.iter().map(|&k| values[k]).collect::<Vec<f64>>();
         Spectrum {
@@ -323,6 +337,7 @@ impl Orthonormal {
             sum: mean.iter().sum(),
             expected_sum: self.dissipated / t,
             regime,
+            why,
             rows: (rows.iter())
                 .map(|(time, logs)| (*time, sorted(logs).iter().map(|log| log / time).collect()))
                 .collect(),

@@ -8,7 +8,7 @@ use crate::dynamics::constraint::ConstraintArguments;
 use crate::dynamics::kernel::Kernel;
 use crate::dynamics::{BodyAngles, Mechanism, Motion};
 use crate::run::allowance::{Allowance, AllowanceMoment, EnergyLimit};
-use crate::run::driver::MOST_TURNS;
+use crate::run::driver::{MOST_TURNS, TOO_OFTEN};
 use crate::run::flip;
 use crate::run::plan::Plan;
 use crate::run::running::without_value;
@@ -126,8 +126,8 @@ impl Lane {
                 "look for rates far out of proportion",
             )),
             None if state.turns.iter().any(|turns| turns.unsigned_abs() > MOST_TURNS) => {
-                let what = "a body has turned more often than doubles can count".into();
-                Some(stop(Cause::NotFinite, what, "look for rates far out of proportion"))
+                let [what, hint] = TOO_OFTEN;
+                Some(stop(Cause::NotFinite, what.into(), hint))
             }
             None if point.energy > limit => {
                 let what = format!(

@@ -55,13 +55,7 @@ const NEAR_UNSTABLE: &str = "it does not follow a power of time in this run, and
 impl Nature {
     /// Of a mechanism whose flow has begun.
     pub fn new(mechanism: &Mechanism, tangent: &TangentFlow) -> Self {
-        let walls = mechanism.contacts.iter().map(|contact| &contact.row);
-        let moves = mechanism.constraints.iter().chain(walls).any(ConstraintEquation::is_motor);
-        let pushes = mechanism.actions.iter().any(|action| action.law.is_some())
-            || mechanism.forces.iter().any(UserForce::depends_on_time);
-        // Branches that laws stay on are states as well.
-        let remembers = mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.switches());
-        Self { is_planar: tangent.freedom() <= 1 && !moves && !pushes && !remembers, rate: tangent.rate() }
+        Self { is_planar: cannot_be_chaotic(mechanism, tangent.freedom()), rate: tangent.rate() }
     }
 
     /// True where a motion has shown what it is like by this time \[s\].
@@ -106,6 +100,17 @@ impl Nature {
         }
         growth
     }
+}
+
+/// True where so many degrees of freedom are one that nothing drives, and no motion is chaotic.
+pub(in crate::run) fn cannot_be_chaotic(mechanism: &Mechanism, freedom: usize) -> bool {
+    let walls = mechanism.contacts.iter().map(|contact| &contact.row);
+    let moves = mechanism.constraints.iter().chain(walls).any(ConstraintEquation::is_motor);
+    let pushes = mechanism.actions.iter().any(|action| action.law.is_some())
+        || mechanism.forces.iter().any(UserForce::depends_on_time);
+    // Branches that laws stay on are states as well.
+    let remembers = mechanism.laws.as_ref().is_some_and(|laws| laws.formulas.switches());
+    freedom <= 1 && !moves && !pushes && !remembers
 }
 
 /// A straight line through points, by least squares.
