@@ -373,6 +373,17 @@ fn numbers_with_units_are_numbers() {
     for (slope, expected) in found.measures[0].slopes.iter().zip(expected) {
         assert_near(*slope, expected, 1e-10, "number with a unit");
     }
+    let units: Vec<&str> = found.inputs.iter().map(|input| input.unit.as_str()).collect();
+    assert_eq!(units, ["J", "rad"]);
+    for (written, unit) in [("60 cm", "m"), ("30 deg", "rad"), ("-10 rpm", "1/s"), ("2 N*s/m", "kg/s")] {
+        let parts = format!(
+            r#"{{"name": "p", "gravity": [0, 0], "parameters": {{"k": "{written}"}},
+            "bars": [{{"name": "bar", "mass": 2, "centre": [0, 0], "inertia": 0.64}}],
+            "start": {{"bar": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [0, 0]}}}},
+            "until": 5, "every": 0.1}}"#
+        );
+        assert_eq!(template(&parts).unit("k").expect("a unit"), unit, "{written}");
+    }
     let request = SensitivityRequest {
         of: vec!["bar.phi".parse().expect("a measure")],
         to: vec!["soft".into()],

@@ -12,6 +12,7 @@ pub(super) use walk::FormatWalk;
 use super::error::SceneError;
 use super::format::{FieldShape, KeyTable, LAW, SCENE, START, TRAVEL_LAW, kind};
 use super::formula::Formula;
+use super::formula::unit::Dimension;
 use super::locate::{Located, Value};
 use super::read::{listed, nearest, parse_scene, put_together, read_text, source_name};
 use super::set::{Override, hint, name};
@@ -167,6 +168,28 @@ impl Template {
             .map_err(|(problem, hint)| refused(problem, allowed, hint))?;
         let start = self.start_of(&path)?;
         Ok(Variable { path, unit, start })
+    }
+
+    /// The unit of the number at a path, in the SI; of a parameter or signal that of the number it is written
+    /// as: `m` of `"60 cm"`.  Empty for a pure number.
+    ///
+    /// # Errors
+    /// As [`variable`](Self::variable).
+    pub fn unit(&self, path: &str) -> Result<String, SceneError> {
+        let variable = self.variable(path)?;
+        let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
+        let formula = match tree.at(&variable.path).map(|node| &node.value) {
+            Some(Value::Text(text)) if variable.unit.is_empty() => Formula::parse(text).ok(),
+            _ => None,
+        };
+        let own = formula.as_ref().and_then(Formula::number_alone).and_then(|(_, unit)| unit);
+        Ok(own.map_or_else(
+            || variable.unit.to_owned(),
+            |unit| match unit.is(Dimension::NONE) {
+                true => "rad".to_owned(),
+                false => unit.unit(),
+            },
+        ))
     }
 
     /// The value of a number as it is written in the scene, or given by an override, with or without a unit;

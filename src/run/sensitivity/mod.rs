@@ -194,8 +194,8 @@ impl Study {
             Neighbours::new(template, (&variable, value), base, self.plan.until).map_err(|why| {
                 SensitivityError::Unsuited(format!("no derivative by {}: {why}", variable.path))
             })?;
-        let error = neighbours.error;
-        self.inputs.push(InputNumber { path: variable.path, unit: variable.unit.into(), value, error });
+        let (unit, error) = (template.unit(&variable.path)?, neighbours.error);
+        self.inputs.push(InputNumber { path: variable.path, unit, value, error });
         self.neighbours.push(neighbours);
         Ok(())
     }

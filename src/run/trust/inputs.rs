@@ -273,13 +273,9 @@ impl<'a, 'b> NeighbourRuns<'a, 'b> {
 
     fn input(&mut self, number: &WrittenNumber) -> Input {
         let WrittenNumber { path, unit, value, uncertainty } = number;
-        let mut input = Input {
-            path: path.clone(),
-            unit: (*unit).into(),
-            value: *value,
-            uncertainty: *uncertainty,
-            ..Input::default()
-        };
+        let unit = self.template.unit(path).unwrap_or_else(|_| (*unit).into());
+        let mut input =
+            Input { path: path.clone(), unit, value: *value, uncertainty: *uncertainty, ..Input::default() };
         match self.slope(number) {
             Ok((slope, is_upper_bound)) => {
                 (input.effect, input.is_upper_bound) = (Some(slope * uncertainty), is_upper_bound)
