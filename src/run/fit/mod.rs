@@ -387,14 +387,16 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
             Err(_) => ignored.push(name.clone()),
         }
     }
-    match outputs.is_empty() {
-        true => Err(FitError::Data(format!(
-            "{}: no column is named after a quantity of the scene\nhint: name them as in trajectory.csv, as \
-                bar1.phi [rad]",
+    if outputs.is_empty() {
+        let bar = scene.bars.first().map_or("bar1", |bar| &bar.name);
+        return Err(FitError::Data(format!(
+            "{}: no column is named after an output or a quantity of the scene\nhint: quantities are angles, \
+                rates, points and forces, as {bar}.phi [rad]; for another one, as an energy, add an output by \
+                a formula (--output) and name the column after it",
             data.source
-        ))),
-        false => Ok((outputs, ignored)),
+        )));
     }
+    Ok((outputs, ignored))
 }
 
 /// A column's unit, where it has one, is of the dimension of the scene's quantity, where that is known.
