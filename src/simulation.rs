@@ -112,7 +112,7 @@ impl Simulation {
     /// part of the scene has.
     pub fn force(mut self, force: &impl Force) -> Result<Self, Error> {
         self.forces.push(UserForce::record(force)?);
-        self.mechanism = Arc::new(Mechanism::with_forces(&self.scene, self.forces.clone())?);
+        self.mechanism = Arc::new(Mechanism::of_sound(&self.scene, self.forces.clone())?);
         Ok(self)
     }
 

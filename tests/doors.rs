@@ -1,7 +1,9 @@
 //! Events and observers from outside the crate.
 
+use super::common::shipped;
 use driftless::dynamics::OdeSystem;
 use driftless::run::{Action, Change, Direction, Event, EventRecord, Observer, Step};
+use driftless::scene::{Given, Load, Lock, Output, Parameter, Place, Spring, TorsionSpring};
 use driftless::stepping::composition::Composition;
 use driftless::{
     Configuration, Custom, Integrator, Level, Limits, Mechanism, MethodId, Motion, Outcome, Plan, Problem,
@@ -939,5 +941,76 @@ fn no_two_constraints_have_one_name() {
         };
         let refused = guided().part(part, part_named).build().expect_err("a name that is taken").to_string();
         assert!(refused.contains("the name of another constraint"), "{refused}");
+    }
+}
+
+/// What no scene can be is refused whatever field says it: bodies that are not there, what acts on a body
+/// from itself, numbers that no file may have, names twice, and integrals whose formula is not what is
+/// integrated.
+#[test]
+fn no_field_of_a_scene_changed_by_hand_is_taken_unseen() {
+    type Change = fn(&mut Scene);
+    fn torque(scene: &mut Scene, bar: usize, relative_to: Option<usize>) {
+        scene.laws[0].load = Load::Torque { bar, relative_to, torque: "kp*error".into() };
+    }
+    fn parameter(scene: &mut Scene, name: &str, value: f64) {
+        scene.parameters.push(Parameter { name: name.into(), value });
+    }
+    fn spring(scene: &mut Scene, bar: Option<usize>) {
+        let between = [Place { bar, point: [0.0; 2] }, Place { bar, point: [0.1, 0.0] }];
+        let numbers = Spring { stiffness: 1.0, free_length: 0.0, damping: 0.1, ..scene.springs[0].clone() };
+        scene.springs[0] = Spring { between, ..numbers };
+    }
+    fn coil(scene: &mut Scene, relative_to: Option<usize>, free_angle: f64) {
+        let (name, stiffness, damping) = ("coil".into(), 1.0, 0.1);
+        let coil = TorsionSpring { name, bar: 0, relative_to, stiffness, free_angle, damping };
+        scene.torsion_springs.push(coil);
+    }
+    fn lock(scene: &mut Scene, angle: f64) {
+        scene.locks.push(Lock { name: "lock".into(), bar: 0, relative_to: None, angle: Some(angle) });
+    }
+    fn given(scene: &mut Scene, origin: [f64; 2]) {
+        scene.given = vec![Given { origin: Some(origin), ..Given::ANGLE_AND_RATE }];
+    }
+    fn output(scene: &mut Scene) {
+        scene.outputs.push(Output { name: "o".into(), formula: "t".into() });
+    }
+    let cases: [(&str, &str, Change); 29] = [
+        ("trebuchet", "points[0]: bar number 99", |scene| scene.points[0].place.bar = Some(99)),
+        ("trebuchet", "points[0].point[0] is not finite", |scene| scene.points[0].place.point[0] = f64::NAN),
+        ("pid", "laws[0]: bar number 99", |scene| torque(scene, 99, None)),
+        ("pid", "laws[0]: bar number 99", |scene| torque(scene, 0, Some(99))),
+        ("pid", "torques[0].relative_to", |scene| torque(scene, 0, Some(0))),
+        ("pid", "integrals[0].bar = 99", |scene| scene.integrals[0].bar = 99),
+        ("pid", "integrals", |scene| scene.integrals[0].formula = "100*t".into()),
+        ("pid", "integrals", |scene| scene.integrals[0].formula = "((".into()),
+        ("pid", "integrals", |scene| scene.bars[1].mass *= 2.0),
+        ("pid", "tables.gust[1]", |scene| scene.tables[0].points.reverse()),
+        ("pid", "tables.gust has 0 points", |scene| scene.tables[0].points.clear()),
+        ("pid", "tables.gust has 1 point", |scene| scene.tables[0].points.truncate(1)),
+        ("pid", "tables.gust[0]", |scene| scene.tables[0].points[0][1] = f64::NAN),
+        ("pid", "parameters.t has a meaning", |scene| parameter(scene, "t", 1.0)),
+        ("pid", "parameters: `kp` is there twice", |scene| parameter(scene, "kp", 2.0)),
+        ("pid", "parameters.x", |scene| parameter(scene, "x", f64::NAN)),
+        ("spring", "springs[0].between joins `bar1`", |scene| spring(scene, Some(0))),
+        ("spring", "springs[0].between joins the ground", |scene| spring(scene, None)),
+        ("free", "torsion_springs[0].free_angle = 1e+300", |scene| coil(scene, None, 1e300)),
+        ("free", "torsion_springs[0].relative_to", |scene| coil(scene, Some(0), 0.0)),
+        ("free", "locks[0].angle is not finite", |scene| lock(scene, f64::NAN)),
+        ("free", "locks[0].angle = 1e+300", |scene| lock(scene, 1e300)),
+        ("free", "bars[0].mass = 1e+300", |scene| scene.bars[0].mass = 1e300),
+        ("free", "given[0]", |scene| given(scene, [f64::NAN, 0.0])),
+        ("free", "every = 20", |scene| scene.every = 2.0 * scene.until),
+        ("free", "until = 1e+300", |scene| (scene.until, scene.every) = (1e300, 1e299)),
+        ("free", "outputs: `o` is there twice", |scene| (output(scene), output(scene)).0),
+        ("wall", "walls[0].line.body", |scene| scene.walls[0].on = Some(scene.walls[0].bar)),
+        ("wall", "walls[0].restitution", |scene| scene.walls[0].restitution = f64::NAN),
+    ];
+    for (name, told, change) in cases {
+        let mut scene = shipped(name, &[]);
+        assert_eq!(scene.fault(), None, "{name}");
+        change(&mut scene);
+        let refused = Simulation::new(&scene).err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(refused.contains(told), "{name}, {told}: {refused}");
     }
 }

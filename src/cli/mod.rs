@@ -102,7 +102,8 @@ fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Fa
     for set in &flags.set {
         flags.remark(&format!("set {} to {}", set.path, set.value));
     }
-    let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| placed(flags, text, &error))?);
+    let mechanism =
+        Arc::new(Mechanism::of_sound(&scene, Vec::new()).map_err(|error| placed(flags, text, &error))?);
     settle(flags, &mechanism)?;
     if !flags.tell.quiet {
         let doubts = scene.doubts().into_iter();

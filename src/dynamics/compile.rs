@@ -175,6 +175,11 @@ impl Mechanism {
     /// Those of [`Mechanism::new`], forces on bodies that are not there, and forces that share a name with
     /// one another or with a part of the scene.
     pub fn with_forces(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
+        scene.fault().map_or_else(|| Self::of_sound(scene, forces), |fault| Err(CompileError::Unsound(fault)))
+    }
+
+    /// The same of a scene that was judged before, as one that was read.
+    pub(crate) fn of_sound(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
         let unassembled = Self::unassembled(scene, forces)?;
         unassembled.check_names()?;
         let mut acting = unassembled.clone();
@@ -213,8 +218,8 @@ impl Mechanism {
 
     /// A scene's bodies and joints without a start: all that drawing it in a given position takes.
     pub(crate) fn unassembled(scene: &Scene, forces: Vec<UserForce>) -> Result<Self, CompileError> {
-        if let Some(fault) = scene.fault() {
-            return Err(CompileError::Unsound(fault));
+        if let Some(broken) = scene.broken_reference() {
+            return Err(CompileError::Unsound(broken));
         }
         if let Some(foreign) = forces.iter().find(|force| force.last_body() >= Some(scene.bars.len())) {
             return Err(CompileError::ForeignForce(foreign.name.clone()));

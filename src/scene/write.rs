@@ -14,6 +14,11 @@ impl Scene {
     /// The scene in the input format, every bar by its mass and every default written out; it reads back to
     /// the same scene, bit for bit.
     pub fn to_input(&self) -> Value {
+        self.with_start(self.start_as_given())
+    }
+
+    /// The same with this start.
+    pub(super) fn with_start(&self, start: Map<String, Value>) -> Value {
         let body = |bar: Option<usize>| bar.map_or(GROUND, |bar| self.bars[bar].name.as_str());
         let place = |place: &Place| json!({"body": body(place.bar), "point": place.point});
         let bars: Vec<_> = (self.bars[..self.own_bars()].iter())
@@ -142,7 +147,7 @@ impl Scene {
             "torques": torques,
             "motors": motors,
             "walls": walls,
-            "start": self.start_as_given(),
+            "start": start,
             "until": self.until,
             "every": self.every,
         });

@@ -176,7 +176,8 @@ impl Viewed {
             record.get("resolved_scene").ok_or_else(|| damaged("no entry `resolved_scene`".into()))?;
         let scene = parse_scene(&scene.to_string(), &quoted(&file), &[])
             .map_err(|error| damaged(error.to_string()))?;
-        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| damaged(error.to_string()))?);
+        let mechanism =
+            Arc::new(Mechanism::of_sound(&scene, Vec::new()).map_err(|error| damaged(error.to_string()))?);
         let until = record["result"]["final"]["t"].as_f64().unwrap_or(scene.until);
         let columns = columns(&mechanism);
         let kept = match gathered {

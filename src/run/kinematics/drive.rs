@@ -150,6 +150,11 @@ enum Slot {
 impl DrivenScene {
     /// The scene with the law of its drive at a constant rate.
     pub fn new(given: &Scene, drive: &KinematicDrive) -> Result<Self, KinematicsError> {
+        if let Some(fault) = given.fault() {
+            let name = drive.name.clone().unwrap_or_default();
+            let error = Box::new(CompileError::Unsound(fault));
+            return Err(KinematicsError::Compile { motor: name.clone(), name, error });
+        }
         let mut scene = given.clone();
         let (slot, start, own_rate) = find(&mut scene, drive)?;
         // A motor that stands at the start has no rate of its own.
@@ -198,7 +203,7 @@ impl DrivenScene {
 }
 
 fn compile(scene: &Scene, [name, motor]: [&str; 2]) -> Result<Mechanism, KinematicsError> {
-    Mechanism::new(scene).map_err(|error| KinematicsError::Compile {
+    Mechanism::of_sound(scene, Vec::new()).map_err(|error| KinematicsError::Compile {
         name: name.to_owned(),
         motor: motor.to_owned(),
         error: Box::new(error),

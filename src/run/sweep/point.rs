@@ -106,7 +106,7 @@ impl Sweep {
     pub fn run_of(&self, index: u64, rows: f64) -> Result<(Scene, Arc<Mechanism>, Plan), String> {
         let values = self.grid.values(index);
         let scene = self.template.filled(&self.variables, &values).map_err(|error| error.to_string())?;
-        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
+        let mechanism = Arc::new(Mechanism::of_sound(&scene, Vec::new()).map_err(|error| error.to_string())?);
         let planned = |request: &Request| self.planned(&scene, &mechanism, request);
         let plan = planned(&timed(&self.request, &scene))?;
         let (every, method) = (Some(plan.until / rows), Some(plan.method));
@@ -239,7 +239,7 @@ impl Sweep {
             return Ok((Arc::clone(&self.mechanism), plan, start, scale));
         }
         let scene = self.template.filled(&self.variables, values).map_err(|error| error.to_string())?;
-        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| error.to_string())?);
+        let mechanism = Arc::new(Mechanism::of_sound(&scene, Vec::new()).map_err(|error| error.to_string())?);
         if let (true, Some(change)) = (self.is_strict, mechanism.assembly.changes.first()) {
             return Err(change.to_string());
         }

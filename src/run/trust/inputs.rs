@@ -184,7 +184,8 @@ impl<'a, 'b> NeighbourRuns<'a, 'b> {
             return Err("the run ended at its start".into());
         }
         let scene = template.scene().map_err(|error| first_line(&error))?;
-        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| first_line(&error))?);
+        let mechanism =
+            Arc::new(Mechanism::of_sound(&scene, Vec::new()).map_err(|error| first_line(&error))?);
         let times = (0..=LOOKS).map(|k| Time::from(until * f64::from(k) / f64::from(LOOKS))).collect();
         let mut neighbours = Self {
             template,
@@ -373,7 +374,8 @@ impl<'a, 'b> NeighbourRuns<'a, 'b> {
             let refusal = error.refusal();
             format!("it cannot be changed alone: {} {}", refusal.path, refusal.allowed)
         })?;
-        let mechanism = Arc::new(Mechanism::new(&scene).map_err(|error| first_line(&error))?);
+        let mechanism =
+            Arc::new(Mechanism::of_sound(&scene, Vec::new()).map_err(|error| first_line(&error))?);
         if mechanism.coordinates() != self.coordinates {
             return Err("with it changed the mechanism has other coordinates".into());
         }

@@ -26,7 +26,6 @@ use super::locate::{Located, Text, Texts};
 use super::set::{Override, put};
 use super::{Coupling, Drive, Motor, Scene};
 use crate::arithmetic::shown::plain;
-pub(super) use at::is_name;
 use laws::Either;
 use loads::AnyMotor;
 use names::{BarNames, check_constraint_names, named};
@@ -91,7 +90,15 @@ pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<S
     }
     let (source, mut tree) = put_together(text, source, overrides)?;
     let resolved = resolve::resolve(&source, &mut tree)?;
-    scene(&At { source: &source, node: &tree, path: String::new() }, resolved)
+    scene(&At { source: &source, node: &tree, path: String::new() }, resolved, fit::fitted)
+}
+
+/// Judges a written scene as one that is read, but for its start.
+pub(super) fn judge_parts(written: &str) -> Result<(), SceneError> {
+    let (source, mut tree) = put_together(written, "", &[])?;
+    let resolved = resolve::resolve(&source, &mut tree)?;
+    let root = At { source: &source, node: &tree, path: String::new() };
+    scene(&root, resolved, |scene, _, _| Ok(scene)).map(|_| ())
 }
 
 /// The tree of a scene's text with overrides put in, not judged yet.
@@ -115,7 +122,12 @@ fn without_mark(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text)
 }
 
-fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, SceneError> {
+/// The scene with its start, which `fitted` gives it.
+fn scene(
+    root: &At,
+    Resolved { parameters, tables }: Resolved,
+    fitted: impl FnOnce(Scene, &fit::Places, &[Option<GivenStart>]) -> Result<Scene, SceneError>,
+) -> Result<Scene, SceneError> {
     let fields = root.object(&SCENE)?;
     let name = fields.name("name")?;
     let description = fields.text_or_empty("description")?;
@@ -197,7 +209,7 @@ fn scene(root: &At, Resolved { parameters, tables }: Resolved) -> Result<Scene, 
     let scene = Scene { bars, ..scene };
     laws::check(root, &scene, &parameters)?;
     outputs::check(root, &scene)?;
-    fit::fitted(scene, &places, &given).map(Scene::with_rotors)
+    fitted(scene, &places, &given).map(Scene::with_rotors)
 }
 
 /// The motors on angles with their places, those on sliders, and those whose aims depend on the mechanism.

@@ -175,7 +175,8 @@ impl DistanceSearch<'_> {
             .template
             .filled(std::slice::from_ref(variable), &[value + change])
             .map_err(|error| first_line(error.to_string()))?;
-        let mechanism = Mechanism::new(&scene).map_err(|error| first_line(error.to_string()))?;
+        let mechanism =
+            Mechanism::of_sound(&scene, Vec::new()).map_err(|error| first_line(error.to_string()))?;
         let shape = |mechanism: &Mechanism| {
             (mechanism.coordinates(), mechanism.constraints.len(), mechanism.contacts.len())
         };
