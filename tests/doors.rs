@@ -1014,3 +1014,24 @@ fn no_field_of_a_scene_changed_by_hand_is_taken_unseen() {
         assert!(refused.contains(told), "{name}, {told}: {refused}");
     }
 }
+
+/// A clone of a sample is the sample, also near singular positions, which linkages of equal bars pass; and the
+/// last sample of the outcome is the one that was seen last.
+#[test]
+fn a_clone_of_a_sample_is_the_sample() {
+    for (name, is_near) in [("four_bars", true), ("free", false)] {
+        let (mut singular, mut last) = (0, Sample::default());
+        let outcome = Simulation::new(&shipped(name, &["until=3"]))
+            .expect("equations")
+            .run_with(|sample| {
+                assert_eq!(&sample.clone(), sample);
+                singular +=
+                    usize::from(sample.singular.is_some_and(|smallest| (0.0..0.1).contains(&smallest)));
+                last = sample.clone();
+                Ok(())
+            })
+            .expect("a run");
+        assert_eq!((outcome.stop, singular > 0), (None, is_near), "{name}");
+        assert_eq!(outcome.last, last, "{name}");
+    }
+}

@@ -315,10 +315,11 @@ impl Drift {
                 monitor.see(sample.t, value);
             }
         }
-        if self.singular.as_ref().map_or(f64::INFINITY, |singular| singular.smallest) > sample.singular {
+        let known = self.singular.as_ref().map_or(f64::INFINITY, |singular| singular.smallest);
+        if let Some(smallest) = sample.singular.filter(|&smallest| smallest < known) {
             let constraint =
                 self.constraints.get(sample.weakest).map_or_else(String::new, |(name, _)| name.clone());
-            self.singular = Some(Singular { smallest: sample.singular, t: sample.t, constraint });
+            self.singular = Some(Singular { smallest, t: sample.t, constraint });
         }
         let names = self.constraints.iter().zip(&self.units);
         let constraints =

@@ -41,10 +41,9 @@ pub struct Sample {
     pub imbalance: f64,
     /// Violation of each row, C and C'.
     pub constraints: Vec<[f64; 2]>,
-    /// The least singular value of the rows' Jacobian over the largest where it is small, else not a number;
-    /// and the row that loses its hold there.
-    pub singular: f64,
-    /// See [`Sample::singular`].
+    /// The least singular value of the rows' Jacobian over the largest, where it is small.
+    pub singular: Option<f64>,
+    /// The row that loses its hold there.
     pub weakest: usize,
     /// Torque \[N·m\] on the driven body, or force \[N\] along the rail on the point that slides, and power
     /// \[W\] of each row that a motor, lock or weld keeps at a law; zeros for others.
@@ -72,6 +71,7 @@ impl Sample {
     /// Copies all but positions and velocities of the centres, which follow from the angles.
     pub(super) fn thin_from(&mut self, other: &Self) {
         let Self { t, kinetic, potential, work, stabilizer, friction, imbalance, .. } = *other;
+        (self.singular, self.weakest) = (other.singular, other.weakest);
         self.friction = friction;
         (self.t, self.kinetic, self.potential) = (t, kinetic, potential);
         (self.work, self.stabilizer, self.imbalance) = (work, stabilizer, imbalance);
@@ -202,7 +202,7 @@ impl Sampler {
         let is_standing = weakest.row < self.holding.standing_rows();
         let is_watched = weakest.share < WATCHED && is_standing && self.holding.has_closed_loops();
         let sample = &mut self.sample;
-        sample.singular = if is_watched { self.holding.conditioning(&self.plain) } else { f64::NAN };
+        sample.singular = is_watched.then(|| self.holding.conditioning(&self.plain));
         sample.weakest = weakest.row;
         sample.t = motion.time.hi;
         let of_integrals = mechanism.energy_of_integrals(&motion.omega);
