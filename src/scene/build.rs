@@ -1,7 +1,7 @@
 //! Scenes made in Rust, without a file: the same keys, the same checks and the same messages as for scenes in
 //! JSON.
 
-use super::{Scene, SceneError, parse_scene};
+use super::{Refusal, Scene, SceneError, parse_scene};
 use serde_json::{Map, Value, json};
 
 /// A point of the ground \[m\], for [`SceneBuilder`].
@@ -51,6 +51,8 @@ pub struct SceneBuilder {
     scene: Map<String, Value>,
     /// The list or table that the last part went into, and its key where that is a table.
     last: Option<(&'static str, Option<String>)>,
+    /// The first part or key that has no place in the scene: where, and what is there.
+    misplaced: Option<(String, &'static str)>,
 }
 
 impl SceneBuilder {
@@ -59,7 +61,7 @@ impl SceneBuilder {
         let mut scene = Map::new();
         scene.insert("name".into(), name.into());
         scene.insert("gravity".into(), json!([0.0, 0.0]));
-        Self { scene, last: None }
+        Self { scene, last: None, misplaced: None }
     }
 
     /// Gravitational acceleration (x, y) \[m/s²\].
@@ -110,7 +112,10 @@ impl SceneBuilder {
     #[must_use]
     pub fn slider(self, name: &str, point: Value, rail: Value, direction: [f64; 2]) -> Self {
         let mut rail = rail;
-        rail["direction"] = json!(direction);
+        // What is no object is refused for what it is.
+        if let Some(rail) = rail.as_object_mut() {
+            rail.insert("direction".into(), json!(direction));
+        }
         self.add("sliders", json!({"name": name, "point": point, "rail": rail}))
     }
 
@@ -158,8 +163,10 @@ impl SceneBuilder {
     /// Angle \[rad\] and rate \[rad/s\] of a bar at t = 0.
     #[must_use]
     pub fn start(mut self, bar: &str, phi: f64, omega: f64) -> Self {
-        let start = self.scene.entry("start").or_insert_with(|| json!({}));
-        start[bar] = json!({"phi": phi, "omega": omega});
+        match self.scene.entry("start").or_insert_with(|| json!({})).as_object_mut() {
+            Some(start) => drop(start.insert(bar.into(), json!({"phi": phi, "omega": omega}))),
+            None => self.misplace(format!("start.{bar}"), "start is no object"),
+        }
         self.last = Some(("start", Some(bar.into())));
         self
     }
@@ -175,11 +182,14 @@ impl SceneBuilder {
     pub fn with(mut self, key: &str, value: impl Into<Value>) -> Self {
         let part = match &self.last {
             None => return self.set(key, value.into()),
-            Some((table, Some(name))) => self.scene.get_mut(*table).map(|table| &mut table[name.as_str()]),
+            Some((table, Some(name))) => {
+                self.scene.get_mut(*table).and_then(|table| table.get_mut(name.as_str()))
+            }
             Some((list, None)) => self.scene.get_mut(*list).and_then(|list| list.as_array_mut()?.last_mut()),
         };
-        if let Some(part) = part.and_then(Value::as_object_mut) {
-            part.insert(key.into(), value.into());
+        match part.and_then(Value::as_object_mut) {
+            Some(part) => drop(part.insert(key.into(), value.into())),
+            None => self.misplace(key.into(), "the part before it is no object"),
         }
         self
     }
@@ -191,7 +201,20 @@ impl SceneBuilder {
     /// it.
     pub fn build(&self) -> Result<Scene, SceneError> {
         let name = self.scene.get("name").and_then(Value::as_str).unwrap_or_default();
-        parse_scene(&self.text(), &format!("scene {name} as built"), &[])
+        let source = format!("scene {name} as built");
+        if let Some((path, problem)) = &self.misplaced {
+            return Err(SceneError::from(Refusal {
+                file: source,
+                path: path.clone(),
+                problem: format!("has no place: {problem}"),
+                allowed: "must be a part of a list, or a key of an object".into(),
+                hint:
+                    "what is no list, as `parameters`, is one value: set it whole by `with` before any part"
+                        .into(),
+                ..Refusal::default()
+            }));
+        }
+        parse_scene(&self.text(), &source, &[])
     }
 
     /// The scene as the text of a scene file.
@@ -206,11 +229,16 @@ impl SceneBuilder {
     }
 
     fn add(mut self, list: &'static str, part: Value) -> Self {
-        if let Some(list) = self.scene.entry(list).or_insert_with(|| json!([])).as_array_mut() {
-            list.push(part);
+        match self.scene.entry(list).or_insert_with(|| json!([])).as_array_mut() {
+            Some(parts) => parts.push(part),
+            None => self.misplace(list.into(), "it is there and is no list"),
         }
         self.last = Some((list, None));
         self
+    }
+
+    fn misplace(&mut self, path: String, problem: &'static str) {
+        self.misplaced.get_or_insert((path, problem));
     }
 }
 
@@ -252,5 +280,25 @@ mod tests {
         assert_eq!((scene.springs[0].damping, scene.sliders[0].locked, scene.until), (0.3, true, 1.0));
         let inertia = scene.bars[0].inertia - 0.3 * 0.2 * 0.2 / 12.0;
         assert!(inertia.abs() < 1e-18 && scene.fault().is_none());
+    }
+
+    /// What has no place in a scene is refused by the path it would have, and nothing of it is lost.
+    #[test]
+    fn what_has_no_place_is_refused_at_the_end() {
+        let new = || SceneBuilder::new("odd").bar("a", 0.6, 0.5).until(1.0, 0.1);
+        let empty = || SceneBuilder::new("odd");
+        let one = json!({"k": 1});
+        let cases = [
+            (new().slider("s", on("a", [0.0; 2]), json!([0, 0]), [1.0, 0.0]), "sliders[0].rail"),
+            (empty().with("start", 3).start("a", 0.0, 0.0), "start.a"),
+            (empty().with("parameters", one.clone()).part("parameters", json!({"m": 2})), "parameters"),
+            (new().part("springs", json!(3)).with("damping", 0.1), "damping"),
+        ];
+        for (builder, path) in cases {
+            let refused = builder.build().expect_err(path);
+            assert_eq!(refused.refusal().path, path, "{refused}");
+        }
+        let set = empty().with("parameters", one).bar("a", 0.6, 0.5).until(1.0, 0.1);
+        assert_eq!(set.start("a", 0.0, 0.0).build().expect("a scene").parameters.len(), 1);
     }
 }
