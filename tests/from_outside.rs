@@ -8,8 +8,8 @@ use driftless::run::digits::{Precision, long_run};
 use driftless::run::{Action, Direction, Event, ResumeError};
 use driftless::stepping::Cause;
 use driftless::{
-    Configuration, Custom, Force, Integrator, Loads, MethodId, Motion, Running, Scene, Simulation, Site,
-    Snapshot, State, Statistics, StepError, Time,
+    Configuration, Custom, Force, Integrator, Loads, MethodId, Motion, Running, Scene, Simulation,
+    Site, Snapshot, State, Statistics, StepError, Time,
 };
 use std::sync::Arc;
 
@@ -188,6 +188,40 @@ fn an_event_of_another_mechanism_is_refused() {
     let mut running = Running::new(run);
     assert!(running.go(&mut |_| Ok(()), &mut || false).expect("samples"));
     assert!(running.finish().stop.expect("a stop").what.contains("event `rate` is one of another mechanism"));
+}
+
+/// An event may ask for a body that is not there later than at the start, where it is looked at first, or in its
+/// action: the run stops by its name.
+#[test]
+fn an_event_that_asks_later_for_a_body_that_is_not_there_stops_the_run_by_its_name() {
+    struct Late;
+    impl Event for Late {
+        fn name(&self) -> &str {
+            "acts"
+        }
+
+        fn value(&self, at: &Configuration<f64>) -> f64 {
+            at.time() - 0.35
+        }
+
+        fn action(&mut self, at: &Configuration<f64>, _motion: &Motion) -> Action {
+            if at.angle(9) > 0.0 { Action::Stop } else { Action::Record }
+        }
+    }
+    let later = |at: &Configuration<f64>| if at.time() < 0.3 { -1.0 } else { at.rate(2).max(1.0) };
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        let free = || Simulation::new(&scene("free")).expect("equations").until(1.0).method(method);
+        let asked = free().event(Passes("asks", later)).run().expect("a run");
+        let acted = free().event(Late).run().expect("a run");
+        for (outcome, told) in
+            [(asked, "event `asks` is not a number"), (acted, "the action of event `acts`")]
+        {
+            let stop = outcome.stop.expect("a stop");
+            assert_eq!(stop.cause, Cause::NotFinite, "{stop}");
+            assert!(stop.what.contains(told), "{told}: {stop}");
+            assert!((0.2..1.0).contains(&outcome.last.t), "{method}: {}", outcome.last.t);
+        }
+    }
 }
 
 /// Makes steps of no length.

@@ -127,7 +127,10 @@ impl<S: Scalar + Over<C>, C: Real> ConfigurationSource<S, C> for Values<'_, S> {
     }
 }
 
-/// A configuration that notes where a body is asked for that is not there.
+/// What a vector of a body that is not there is.
+const NOWHERE: Complex<f64> = Complex { re: f64::NAN, im: f64::NAN };
+
+/// A configuration that notes where a body is asked for that is not there, and has no number of it.
 struct Checked<'a> {
     at: &'a Configuration<'a, f64>,
     bodies: usize,
@@ -155,23 +158,23 @@ impl ConfigurationSource<f64> for Checked<'_> {
     }
 
     fn angle(&self, body: usize) -> f64 {
-        self.of(body < self.bodies, |at| at.angle(body), 0.0)
+        self.of(body < self.bodies, |at| at.angle(body), f64::NAN)
     }
 
     fn rate(&self, body: usize) -> f64 {
-        self.of(body < self.bodies, |at| at.rate(body), 0.0)
+        self.of(body < self.bodies, |at| at.rate(body), f64::NAN)
     }
 
     fn direction(&self, body: usize) -> Complex<f64> {
-        self.of(body < self.bodies, |at| at.direction(body), Complex::ZERO)
+        self.of(body < self.bodies, |at| at.direction(body), NOWHERE)
     }
 
     fn position(&self, site: &Site) -> Complex<f64> {
-        self.of(self.has(site), |at| at.position(site), Complex::ZERO)
+        self.of(self.has(site), |at| at.position(site), NOWHERE)
     }
 
     fn velocity(&self, site: &Site) -> Complex<f64> {
-        self.of(self.has(site), |at| at.velocity(site), Complex::ZERO)
+        self.of(self.has(site), |at| at.velocity(site), NOWHERE)
     }
 
     fn constant(&self, value: f64) -> f64 {
@@ -180,14 +183,17 @@ impl ConfigurationSource<f64> for Checked<'_> {
 }
 
 impl Mechanism {
-    /// True where a function asks at a motion for a body that is not there.
-    pub(crate) fn is_foreign(&self, motion: &Motion, value: impl FnOnce(&Configuration<f64>) -> f64) -> bool {
-        self.seen(motion, |at| {
-            let (bodies, coordinates) = (self.bodies.len(), self.coordinates());
-            let checked = Checked { at, bodies, coordinates, is_foreign: Cell::new(false) };
-            value(&Configuration::new(&checked));
-            checked.is_foreign.get()
-        })
+    /// Calls `then`, which is from outside, with a configuration that has no number of bodies that are not
+    /// there; true where it asks for such a body.
+    pub(crate) fn checked<R>(
+        &self,
+        at: &Configuration<f64>,
+        then: impl FnOnce(&Configuration<f64>) -> R,
+    ) -> (R, bool) {
+        let (bodies, coordinates) = (self.bodies.len(), self.coordinates());
+        let checked = Checked { at, bodies, coordinates, is_foreign: Cell::new(false) };
+        let found = then(&Configuration::new(&checked));
+        (found, checked.is_foreign.get())
     }
 
     /// Calls `then` with the configuration of a motion.

@@ -104,14 +104,15 @@ impl ContactDriver {
             });
         }
         let Some(events) = &mut self.events else { return Ok(()) };
-        if let Some(name) = events.take_undefined() {
+        if let Some(what) = events.take_undefined() {
             return Err(StepError {
                 cause: Cause::NotFinite,
                 method: plan.method.to_string(),
                 t: self.motion().time.hi,
                 step: 0.0,
-                what: format!("the function of event `{name}` is not a number in the step that ends here"),
-                hint: "let its value be a number wherever the motion may come to".into(),
+                what,
+                hint: "let its value be a number wherever the motion may come to, of bodies that are there"
+                    .into(),
             });
         }
         if let Some(name) = events.take_lost() {

@@ -61,7 +61,8 @@ pub trait Event: Send + Sync {
     fn name(&self) -> &str;
 
     /// The event function: a smooth function of time, positions and rates, whose zero is the event; so is its
-    /// way past zero where an impact, or a joint that closes, makes the rates jump.
+    /// way past zero where an impact, or a joint that closes, makes the rates jump.  Where it is not a number,
+    /// as of a body that is not there, the run stops.
     fn value(&self, at: &Configuration<f64>) -> f64;
 
     /// Which passages count; both unless said otherwise.
@@ -146,7 +147,7 @@ pub(super) fn marks(mechanism: &Mechanism, motion: &Motion, events: &[Box<dyn Ev
     let marks = events.iter().map(|event| EventMark {
         name: event.name().into(),
         direction: event.direction() as u8,
-        value: mechanism.seen(motion, |at| event.value(at)).to_bits(),
+        value: mechanism.seen(motion, |at| value(mechanism, event.as_ref(), at)).to_bits(),
     });
     marks.collect()
 }
@@ -157,6 +158,13 @@ pub(crate) fn foreign_event<'a>(
     motion: &Motion,
     events: &'a [Box<dyn Event>],
 ) -> Option<&'a str> {
-    let mut events = events.iter();
-    events.find(|event| mechanism.is_foreign(motion, |at| event.value(at))).map(|event| event.name())
+    let is_foreign =
+        |event: &dyn Event| mechanism.seen(motion, |at| mechanism.checked(at, |at| event.value(at)).1);
+    events.iter().map(Box::as_ref).find(|event| is_foreign(*event)).map(Event::name)
+}
+
+/// The function of an event from outside, not a number where it asks for a body that is not there.
+fn value(mechanism: &Mechanism, event: &dyn Event, at: &Configuration<f64>) -> f64 {
+    let (value, is_foreign) = mechanism.checked(at, |at| event.value(at));
+    if is_foreign { f64::NAN } else { value }
 }

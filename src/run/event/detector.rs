@@ -5,7 +5,7 @@ mod returns;
 mod shortened;
 
 use super::search::{NO_VALUE, Passage};
-use super::{Action, Change, Direction, Event, EventRecord};
+use super::{Action, Change, Direction, Event, EventRecord, value};
 use crate::dynamics::compile::Laws;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::{Mechanism, Motion, Time};
@@ -75,6 +75,8 @@ pub(in crate::run) struct EventDetector {
     pub(super) tolerance: f64,
     /// The event from outside whose function was not a number in the last step.
     pub(super) undefined: Option<usize>,
+    /// The event from outside whose action asked for a body that is not there.
+    foreign: Option<usize>,
     /// The event from outside whose function left zero to a side, and is on the other one soon in this step.
     pub(super) returning: Option<(usize, i8)>,
     /// The event from outside that came true again before that could be told.
@@ -120,6 +122,7 @@ impl EventDetector {
             closers,
             tolerance: 0.0,
             undefined: None,
+            foreign: None,
             returning: None,
             lost: None,
             halvings: Halvings::default(),
@@ -284,7 +287,13 @@ impl EventDetector {
             Owner::Friction(..) => Action::Record,
             Owner::Outside(number) => {
                 let Self { events, mechanism, .. } = self;
-                mechanism.seen(motion, |at| events[number].action(at, motion))
+                let act = |at: &Configuration<f64>| events[number].action(at, motion);
+                let (action, is_foreign) = mechanism.seen(motion, |at| mechanism.checked(at, act));
+                if !is_foreign {
+                    return action;
+                }
+                self.foreign = Some(number);
+                Action::Stop
             }
         }
     }
@@ -313,7 +322,7 @@ impl EventDetector {
         if let Some(Laws { formulas, parameters, .. }) = &self.laws {
             formulas.append_event_values(at, parameters, all);
         }
-        all.extend(self.events.iter().map(|event| event.value(at)));
+        all.extend(self.events.iter().map(|event| value(&self.mechanism, event.as_ref(), at)));
     }
 
     /// Remembers the events whose functions a jump of the rates has carried across zero: they happen where

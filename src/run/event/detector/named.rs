@@ -24,9 +24,17 @@ impl EventDetector {
         matches!(self.owner(event), Owner::Outside(_))
     }
 
-    /// The name of the event from outside whose function was not a number in the last step.
+    /// What cannot be of an event from outside whose function was not a number in the last step, or whose
+    /// action asked for a body that is not there.
     pub fn take_undefined(&mut self) -> Option<String> {
-        self.undefined.take().map(|number| self.events[number].name().into())
+        let name = |number: usize| self.events[number].name();
+        let undefined = self.undefined.take().map(|number| {
+            format!("the function of event `{}` is not a number in the step that ends here", name(number))
+        });
+        let foreign = self.foreign.take();
+        undefined.or_else(|| {
+            Some(format!("the action of event `{}` asks for a body that is not there", name(foreign?)))
+        })
     }
 
     /// True where an event is known to do more than to be recorded.

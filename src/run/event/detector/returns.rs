@@ -5,6 +5,7 @@ use super::{EventDetector, Owner, SAME};
 use crate::arithmetic::Scalar;
 use crate::dynamics::{Motion, Time};
 use crate::run::event::search::Passage;
+use crate::run::event::value;
 use crate::run::rounding::last_digits;
 use crate::stepping::search::sign;
 
@@ -34,7 +35,8 @@ impl EventDetector {
             .map(|(k, omega)| omega.hi.abs() / if k < angles { 1.0 } else { units.length })
             .fold(1.0 / units.time, f64::max);
         let span = BESIDE / fastest;
-        let value = |motion: &Motion| self.mechanism.seen(motion, |at| self.events[number].value(at));
+        let outside = self.events[number].as_ref();
+        let value = |motion: &Motion| self.mechanism.seen(motion, |at| value(&self.mechanism, outside, at));
         let ahead = |ahead: f64| {
             let mut there = motion.clone();
             there.time = motion.time + ahead;
