@@ -223,6 +223,36 @@ fn check_says_what_is_active_and_what_is_left_out() {
     program.run("check motor.json --stabilize baumgarte").exits(0).shows(&["five mean steps"]);
 }
 
+/// Every kind of part a scene has is told in the text and the JSON, and none of them is among what is left out.
+#[test]
+fn check_tells_every_kind_of_part() {
+    let program = Program::with_scenes(&["slider_crank_torque", "slider_crank_driven", "latch"]);
+    let coil = r#"{"name": "tors", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.3, 0], "inertia": 0.02, "length": 0.6}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "a", "point": [0, 0]}]}],
+        "torsion_springs": [{"name": "coil", "body": "a", "stiffness": 3, "free_angle": 0, "damping": 0.1}],
+        "torques": [{"name": "drive", "body": "a", "torque": 0.5}],
+        "forces": [{"name": "push", "body": "a", "point": [0.6, 0], "force": [0.2, 0]}],
+        "start": {"a": {"phi": 0.5, "omega": 1}}, "until": 1, "every": 0.1}"#;
+    program.write("coil.json", coil);
+    let check = |scene: &str| program.run(&format!("check {scene} --json")).exits(0).object();
+    let found = check("coil.json");
+    for (key, name) in
+        [("torsion_springs", "coil"), ("torques", "drive"), ("forces", "push"), ("dampers", "coil")]
+    {
+        assert_eq!(found[key], serde_json::json!([name]), "{key}");
+    }
+    assert!(!found["left_out"].to_string().contains("springs"), "{}", found["left_out"]);
+    assert_eq!(found["sliders"], serde_json::json!([]));
+    program.run("check coil.json").exits(0).shows(&["torsion", "1 (coil)", "1 (push)", "1 (drive)"]);
+    let torque = check("slider_crank_torque.json");
+    assert!(torque["left_out"].to_string().contains("motors") && torque["torques"].to_string().len() > 4);
+    let driven = check("slider_crank_driven.json");
+    assert!(driven["motors"].to_string().len() > 4 && !driven["left_out"].to_string().contains("motors"));
+    assert!(driven["sliders"].to_string().len() > 4, "{driven}");
+    program.run("check latch.json").exits(0).shows(&["steps", "where events switch parts"]);
+}
+
 // inspect: the published numbers.
 
 #[test]

@@ -21,17 +21,17 @@ pub fn form(mechanism: &Mechanism, plan: &Plan) -> &'static str {
 
 /// What the scene does not need and the equations do not contain.
 fn left_out(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Vec<&'static str> {
-    let is_spring = |law: &LoadLaw| matches!(law.load, Load::Spring { .. });
-    let has_spring_law = scene.laws.iter().any(is_spring);
+    let is_spring = |law: &LoadLaw| matches!(law.load, Load::Spring { .. } | Load::TorsionSpring { .. });
+    let has_springs = !scene.springs.is_empty() || !scene.torsion_springs.is_empty();
     let multipliers = !mechanism.constraints.is_empty()
         && (matches!(plan.method, MethodId::Rattle(_))
             || !matches!(plan.stabilization, Stabilization::Elimination));
     let mut left_out = Vec::new();
     for (needed, what) in [
-        (!mechanism.constraints.is_empty(), "motors"),
+        (!motors(scene).is_empty() || !scene.couplings.is_empty(), "motors"),
         (multipliers, "the solve for multipliers"),
         (plan.stabilization == Stabilization::Projection, "projection"),
-        (!mechanism.springs.is_empty() || has_spring_law, "springs"),
+        (has_springs || scene.laws.iter().any(is_spring), "springs"),
         (mechanism.is_damped(), "dampers"),
         (!mechanism.contacts.is_empty(), "impacts"),
         (mechanism.tree.off_axis, "off-axis couplings"),
@@ -44,10 +44,31 @@ fn left_out(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Vec<&'static s
     left_out
 }
 
+/// The motors on angles, then those on sliders.
+fn motors(scene: &Scene) -> Vec<&String> {
+    let on_angles = scene.motors.iter().map(|motor| &motor.name);
+    on_angles.chain(scene.drives.iter().map(|drive| &drive.name)).collect()
+}
+
+/// Kinds of parts that a scene may have, with the names of those it has: a key and words for each.
+fn parts(scene: &Scene) -> [([&'static str; 2], Vec<&String>); 7] {
+    [
+        (["sliders", "sliders"], scene.sliders.iter().map(|part| &part.name).collect()),
+        (["welds", "welds"], scene.welds.iter().map(|part| &part.name).collect()),
+        (["locks", "locks"], scene.locks.iter().map(|part| &part.name).collect()),
+        (["motors", "motors"], motors(scene)),
+        (["torsion_springs", "torsion"], scene.torsion_springs.iter().map(|part| &part.name).collect()),
+        (["forces", "forces"], scene.forces.iter().map(|part| &part.name).collect()),
+        (["torques", "torques"], scene.torques.iter().map(|part| &part.name).collect()),
+    ]
+}
+
 /// The report as one JSON object.
 pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
     let names = |names: Vec<&str>| json!(names);
-    let dampers = scene.springs.iter().filter(|spring| spring.damping != 0.0);
+    let springs = scene.springs.iter().map(|spring| (&spring.name, spring.damping));
+    let coils = scene.torsion_springs.iter().map(|coil| (&coil.name, coil.damping));
+    let dampers = springs.chain(coils).filter(|spring| spring.1 != 0.0);
     let mut object = json!({
         "scene": scene.name,
         "description": scene.description,
@@ -56,9 +77,8 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "constraints": names(mechanism.constraints.iter().map(|row| row.name()).collect()),
         "assembly": assembly(mechanism),
         "hinges": names(scene.hinges[..scene.own_hinges()].iter().map(|hinge| hinge.name.as_str()).collect()),
-        "motors": names(scene.motors.iter().map(|motor| motor.name.as_str()).collect()),
         "springs": names(scene.springs.iter().map(|spring| spring.name.as_str()).collect()),
-        "dampers": names(dampers.map(|spring| spring.name.as_str()).collect()),
+        "dampers": names(dampers.map(|spring| spring.0.as_str()).collect()),
         "walls": names(scene.walls.iter().map(|wall| wall.name.as_str()).collect()),
         "off_axis": mechanism.tree.off_axis,
         "left_out": left_out(scene, mechanism, plan),
@@ -72,6 +92,9 @@ pub fn object(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> Value {
         "stiffness": plan.stiffness,
         "notes": plan.notes,
     });
+    for ([key, _], found) in parts(scene) {
+        object[key] = json!(found);
+    }
     if !(scene.laws.is_empty() && scene.events.is_empty()) {
         object["formulas"] = names(scene.acting_laws().map(|law| law.name.as_str()).collect());
         object["events"] = names(scene.events.iter().map(|event| event.name.as_str()).collect());
@@ -134,8 +157,8 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
     page.entry("bodies", &list(&scene.bars[..scene.own_bars()], |bar| &bar.name));
     freedom(&mut page, mechanism);
     page.entry("hinges", &list(&scene.hinges[..scene.own_hinges()], |hinge| &hinge.name));
-    if !scene.motors.is_empty() {
-        page.entry("motors", &list(&scene.motors, |motor| &motor.name));
+    for ([_, kind], found) in parts(scene).into_iter().filter(|(_, found)| !found.is_empty()) {
+        page.entry(kind, &list(&found, |name| name));
     }
     if !scene.couplings.is_empty() {
         page.entry("gears, cams", &list(&scene.couplings, |coupling| &coupling.name));
@@ -161,7 +184,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, plan: &Plan) -> String {
         page.entry("integrals", &list(&scene.integrals, |integral| &integral.name));
     }
     if mechanism.is_switched() && mechanism.frictions.is_empty() {
-        page.entry("", "with corners or parts that switch: steps end at every switch");
+        page.entry("steps", "end at corners of formulas and where events switch parts or set parameters");
     }
     if !scene.events.is_empty() {
         page.entry("events", &list(&scene.events, |event| &event.name));
