@@ -8,7 +8,7 @@ use driftless::run::digits::{Precision, long_run};
 use driftless::run::{Action, Direction, Event, ResumeError};
 use driftless::stepping::Cause;
 use driftless::{
-    Configuration, Custom, Force, Integrator, Loads, MethodId, Motion, Running, Scene, Simulation,
+    Configuration, Custom, Force, Integrator, Loads, MethodId, Motion, Request, Running, Scene, Simulation,
     Site, Snapshot, State, Statistics, StepError, Time,
 };
 use std::sync::Arc;
@@ -220,6 +220,33 @@ fn an_event_that_asks_later_for_a_body_that_is_not_there_stops_the_run_by_its_na
             assert_eq!(stop.cause, Cause::NotFinite, "{stop}");
             assert!(stop.what.contains(told), "{told}: {stop}");
             assert!((0.2..1.0).contains(&outcome.last.t), "{method}: {}", outcome.last.t);
+        }
+    }
+}
+
+/// Names of forces are such as those of parts, and no part, body or ground has them.
+#[test]
+fn a_force_without_a_name_of_its_own_is_refused() {
+    for (name, told) in
+        [("bar1", "has the name"), ("ground", "has the name"), ("", "has no name"), ("q\n", "has no name")]
+    {
+        let simulation = Simulation::new(&scene("free")).expect("equations");
+        let at = simulation.site("bar2", [0.6, 0.0]).expect("a bar");
+        let refused = simulation.force(&Drag(name, at, 0.02)).err().expect(name).to_string();
+        assert!(refused.contains(told), "{name:?}: {refused}");
+    }
+}
+
+/// Collocation with another number of stages than there is says so, with a step and without.
+#[test]
+fn a_method_that_is_not_there_is_refused_by_its_own_name() {
+    let unknown = [MethodId::Gauss(0), MethodId::Gauss(1), MethodId::Gauss(9), MethodId::Radau(4)];
+    for method in unknown {
+        for step in [None, Some(0.01)] {
+            let request = Request { method: Some(method), step, ..Request::default() };
+            let simulation = Simulation::new(&scene("free")).expect("equations").options(request);
+            let refused = simulation.until(1.0).run().err().expect("a refusal").to_string();
+            assert!(refused.contains(&format!("{method:?}")) && refused.contains("Gauss(8)"), "{refused}");
         }
     }
 }

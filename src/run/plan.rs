@@ -10,7 +10,7 @@ mod rates;
 pub(super) use self::pairing::check_forces_of_joints;
 pub(super) use self::pairing::usual;
 
-use self::pairing::{check_vibration, pair};
+use self::pairing::{check_method, check_vibration, pair};
 use self::rates::{fastest_rate, fixed_step, model_error, rate_about_rods};
 use super::choice::{Choice, Prefer, choose, least_tolerance, usual_tolerance};
 use super::custom::Custom;
@@ -19,7 +19,7 @@ use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
 use crate::arithmetic::shown::{self, count, figure, order, plain};
 use crate::dynamics::{Mechanism, Stiffness, Time};
-use crate::scene::Scene;
+use crate::scene::{LONGEST_TIME, Scene};
 use crate::stepping::{Taylor, Tolerance};
 
 /// What the user asked for; `None` leaves it to the plan.
@@ -111,8 +111,6 @@ const MAX_EVALUATIONS: (f64, f64) = (1e8, 1e7);
 /// The most of them, whatever the horizon, and the most expansions of a series, each of which takes about as
 /// long as ten: some minutes to an hour of computing.
 const MOST_EVALUATIONS: [f64; 2] = [1e10, 1e9];
-/// The longest time a run may take \[s\].
-pub(super) const LONGEST: f64 = 1e12;
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
 /// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
@@ -137,6 +135,7 @@ impl Plan {
     /// # Errors
     /// Options out of range, or a pairing of scene, method and stabilization that makes no sense.
     pub fn new(scene: &Scene, mechanism: &Mechanism, request: &Request) -> Result<Self, RequestRefusal> {
+        check_method(request)?;
         check_numbers(request)?;
         let until = request.until.unwrap_or(scene.until);
         let mut every = request.every.unwrap_or(scene.every).min(until);
@@ -368,10 +367,10 @@ fn rows(until: f64, every: f64) -> f64 {
 /// Every number asked for must be positive and finite; steps and tolerances must suit one another.
 fn check_numbers(request: &Request) -> Result<(), RequestRefusal> {
     let positive = [
-        ("--step", request.step, LONGEST),
-        ("--until", request.until, LONGEST),
-        ("--every", request.every, LONGEST),
-        ("--time-constant", request.time_constant, LONGEST),
+        ("--step", request.step, LONGEST_TIME),
+        ("--until", request.until, LONGEST_TIME),
+        ("--every", request.every, LONGEST_TIME),
+        ("--time-constant", request.time_constant, LONGEST_TIME),
     ];
     for (option, value, most) in positive {
         if let Some(value) = value.filter(|&value| !(value > 0.0 && value <= most)) {

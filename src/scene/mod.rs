@@ -32,6 +32,7 @@ pub use build::{SceneBuilder, ground, on};
 pub(crate) use digits::OF_THE_RUN;
 pub use digits::WrittenNumber;
 pub use error::{Refusal, SceneError};
+pub(crate) use format::LONGEST_TIME;
 pub use friction::{Friction, FrictionPlace};
 pub use law::{Direction, Integral, Load, LoadLaw, NamedPoint, Parameter, PointTable, SceneEvent, Signal};
 pub use names::{Bound, Meaning, Names, Scope};

@@ -135,6 +135,9 @@ pub enum CompileError {
             own; events switch parts by name"
     )]
     NameTaken(String),
+    /// What a force is called is no name.
+    #[error("force {0:?} has no name: 1 to 64 letters a to z or A to Z, digits, - or _")]
+    NoName(String),
     /// An event asks for a body the mechanism does not have.
     #[error("event `{0}` is one of another mechanism: it names a body that is not there")]
     ForeignEvent(String),

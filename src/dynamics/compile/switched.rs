@@ -5,6 +5,7 @@ use crate::dynamics::Motion;
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::kernel::{Bias, Kernel};
 use crate::scene::Scene;
+use crate::scene::read::is_name;
 use std::sync::Arc;
 
 /// Branches of laws that are tried at the start.
@@ -83,14 +84,19 @@ impl Mechanism {
             .chain(self.contacts.iter().map(|contact| &contact.row.name))
     }
 
-    /// Parts are switched by name: a force from outside that shares one is refused.
+    /// Parts are switched by name: a force from outside that shares one, or that of a body, is refused.
     pub(super) fn check_names(&self) -> Result<(), CompileError> {
         let joints = self.joints.iter().map(|joint| &joint.name);
         let rows = self.constraints.iter().map(|row| &row.name);
         let held: Vec<&String> = joints.chain(rows).collect();
         let is_taken = |name: &String| {
-            held.contains(&name) || self.acting_names().filter(|other| *other == name).count() > 1
+            held.contains(&name)
+                || self.site(name, [0.0; 2]).is_ok()
+                || self.acting_names().filter(|other| *other == name).count() > 1
         };
+        if let Some(force) = self.forces_from_outside().iter().find(|force| !is_name(&force.name)) {
+            return Err(CompileError::NoName(force.name.clone()));
+        }
         let taken = self.forces_from_outside().iter().find(|force| is_taken(&force.name));
         taken.map_or(Ok(()), |force| Err(CompileError::NameTaken(force.name.clone())))
     }

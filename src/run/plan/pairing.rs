@@ -1,12 +1,12 @@
 //! Which methods go with which scenes and stabilizations, and why the others do not.
 
-use super::{MANY_COORDINATES, Request, RequestRefusal, mismatch};
+use super::{MANY_COORDINATES, Request, RequestRefusal, mismatch, usage};
 use crate::arithmetic::shown::{about, estimate};
 use crate::dynamics::Mechanism;
 use crate::dynamics::compile::DENSE_LIMIT;
 use crate::dynamics::force::Vibration;
 use crate::dynamics::natural::{Natural, NaturalError};
-use crate::run::methods::{MethodId, Stabilization};
+use crate::run::methods::{METHODS, MethodId, Stabilization};
 
 /// How much faster than all else a vibration must be to be taken for its mean force: a turn of it within a
 /// hundredth of theirs.
@@ -239,6 +239,16 @@ pub(in crate::run) fn check_forces_of_joints(mechanism: &Mechanism) -> Result<()
     let reason = "constraints are redundant, so that the forces in the joints, and friction with them, are \
         not determined";
     Err(mismatch(what, reason, "leave out a constraint that others imply already"))
+}
+
+/// Collocation is there with some numbers of stages only.
+pub(super) fn check_method(request: &Request) -> Result<(), RequestRefusal> {
+    let is_there =
+        |method: MethodId| method == MethodId::Custom || METHODS.iter().any(|known| known.id == method);
+    let Some(method) = request.method.filter(|&method| !is_there(method)) else { return Ok(()) };
+    let known: Vec<String> = METHODS.iter().map(|known| format!("{:?}", known.id)).collect();
+    let alternative = "radau with 3 or 5 stages, or gauss with 2 to 8";
+    Err(usage(&format!("{method:?}"), format!("the methods are {}", known.join(", ")), alternative))
 }
 
 /// Dry friction takes methods that end their steps at its transitions and keep by projection what sticks.

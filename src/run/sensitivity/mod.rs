@@ -45,10 +45,10 @@ use super::contact::{ContactDriver, JumpLog};
 use super::driver::Pause;
 use super::extremes::ExtremesDetector;
 use super::flip::FlipDetector;
-use super::plan::{LONGEST, Plan};
+use super::plan::Plan;
 use super::running::Outcome;
 use crate::dynamics::{Mechanism, Motion, Time};
-use crate::scene::{OF_THE_RUN, Output, OutputNames, Scene, Template};
+use crate::scene::{LONGEST_TIME, OF_THE_RUN, Output, OutputNames, Scene, Template};
 use crate::stepping::Tolerance;
 use std::sync::Arc;
 
@@ -158,8 +158,8 @@ impl Study {
             return Err(SensitivityError::Unsuited(what.into()));
         }
         let until = request.at.unwrap_or(scene.until);
-        if !(until > 0.0 && until <= LONGEST) {
-            let hint = format!("a time in seconds above 0 and up to {LONGEST:e}, as --at 2");
+        if !(until > 0.0 && until <= LONGEST_TIME) {
+            let hint = format!("a time in seconds above 0 and up to {LONGEST_TIME:e}, as --at 2");
             return Err(refused(format!("the time is {until:e} s"), &hint));
         }
         let tolerance = request.tolerance.unwrap_or(TOLERANCE);

@@ -117,6 +117,12 @@ const fn signed(unit: &'static str) -> QuantityRange {
     QuantityRange { least: -HUGE, most: HUGE, unit }
 }
 
+/// The longest time a run may take \[s\].
+pub(crate) const LONGEST_TIME: f64 = 1e12;
+
+/// A time from the start \[s\].
+const TIME: QuantityRange = QuantityRange { least: TINY, most: LONGEST_TIME, unit: "s" };
+
 /// An absolute angle \[rad\].
 pub(super) const ANGLE: QuantityRange =
     QuantityRange { least: -WIDEST_ANGLE, most: WIDEST_ANGLE, unit: "rad" };

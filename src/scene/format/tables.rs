@@ -9,7 +9,7 @@ pub(in crate::scene) use self::laws::*;
 pub(in crate::scene) use self::loads::*;
 
 use super::{
-    ANGLE, Field, FieldShape, INERTIA, KeyTable, MASS, MOST_BARS, QuantityRange, RATE, not_negative,
+    ANGLE, Field, FieldShape, INERTIA, KeyTable, MASS, MOST_BARS, QuantityRange, RATE, TIME, not_negative,
     optional, positive, required, signed,
 };
 
@@ -145,8 +145,8 @@ pub(in crate::scene) static SCENE: KeyTable = KeyTable {
                 no motor drives must have its angle and rate; \
              where loops, sliders, welds or free bars are, the rest is found from what is given.",
         ),
-        required("until", FieldShape::Number(positive("s")), "10", "Horizon: the run ends at this time."),
-        required("every", FieldShape::Number(positive("s")), "0.01", "Output interval, at most the horizon."),
+        required("until", FieldShape::Number(TIME), "10", "Horizon: the run ends at this time."),
+        required("every", FieldShape::Number(TIME), "0.01", "Output interval, at most the horizon."),
     ],
 };
 

@@ -308,7 +308,8 @@ impl At<'_> {
     }
 }
 
-pub(in crate::scene) fn is_name(text: &str) -> bool {
+/// True for what a part may be called.
+pub(crate) fn is_name(text: &str) -> bool {
     (1..=LONGEST_NAME).contains(&text.len())
         && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'_')
 }

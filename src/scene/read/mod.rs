@@ -16,7 +16,7 @@ mod start;
 mod tables;
 
 pub(super) use at::{At, Fields};
-pub(crate) use at::{listed, nearest};
+pub(crate) use at::{is_name, listed, nearest};
 pub(super) use start::GivenStart;
 
 use super::error::SceneError;
