@@ -243,3 +243,63 @@ fn what_is_not_finite_ends_in_a_typed_stop() {
     }
     assert!(driftless::stepping::Radau::new(4, Default::default()).is_none());
 }
+
+/// A bar about its end, and another the same, each with a torque that feeds its rate:
+/// omega' = lambda omega, lambda = torque/inertia about the pin.
+fn fed(lambda: f64, until: f64) -> Scene {
+    let bar = |name: &str| {
+        format!(r#"{{"name": "{name}", "mass": 3, "centre": [0.5, 0], "inertia": 0.25, "length": 1}}"#)
+    };
+    let hinge = |name: &str| {
+        format!(
+            r#"{{"name": "of_{name}", "between": [{{"body": "ground", "point": [0, 0]}},
+                {{"body": "{name}", "point": [0, 0]}}]}}"#
+        )
+    };
+    let torque = |name: &str| {
+        format!(r#"{{"name": "feeds_{name}", "body": "{name}", "torque": "{lambda}*{name}.omega"}}"#)
+    };
+    let two = |each: &dyn Fn(&str) -> String| [each("a"), each("b")].join(", ");
+    let text = format!(
+        r#"{{"name": "fed", "gravity": [0, 0], "bars": [{}], "hinges": [{}], "torques": [{}],
+            "start": {{"a": {{"phi": 0.3, "omega": 1e-6}}, "b": {{"phi": 1, "omega": 2e-6}}}},
+            "until": {until}, "every": {until}}}"#,
+        two(&bar),
+        two(&hinge),
+        two(&torque)
+    );
+    driftless::scene::parse_scene(&text, "fed.json", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// What grows is resolved though steps far longer than 1/lambda would damp it, and their error estimate with
+/// it: omega = omega(0) exp(lambda t).
+#[test]
+fn a_fast_mode_that_grows_is_not_damped() {
+    for (method, rtol) in [(RADAU[0], 1e-6), (RADAU[1], 1e-6), (RADAU[1], 1e-9)] {
+        let outcome = finished(&fed(3e8, 6e-8), &request(method, rtol));
+        for (omega, start) in outcome.last.omega.iter().zip([1e-6, 2e-6]) {
+            let share = omega / (start * 18.0_f64.exp());
+            assert!((share - 1.0).abs() < 1e-2, "{method} at {rtol:e}: {omega}, {share} of it");
+        }
+        // Up to 0.5 s it grows beyond all numbers, and no run comes to an end.
+        let few = Request { max_evaluations: Some(3000), ..request(method, rtol) };
+        let stop = run(&fed(3e8, 0.5), &few).stop.expect("a stop");
+        assert!(stop.t < 3e-6, "{stop}");
+    }
+}
+
+/// The words are those of growth, and no spring is called rigid where there is none.
+#[test]
+fn growth_is_told_as_growth() {
+    let plan = |method, until| {
+        let scene = fed(3e8, until);
+        driftless::run::Plan::new(&scene, &common::compile(&scene), &request(method, 1e-9))
+    };
+    let told = plan(RADAU[0], 0.1).expect("a plan").notes.join("; ");
+    assert!(told.contains("grows at 3e8 /s at the start; radau5 takes short steps"), "{told}");
+    for method in [MethodId::Taylor, RADAU[1]] {
+        let refusal = plan(method, 0.5).expect_err("a refusal").to_string();
+        assert!(refusal.contains("it grows at 3e8 /s at the start"), "{refusal}");
+        assert!(!refusal.contains("rigid") && !refusal.contains("oscillates"), "{refusal}");
+    }
+}

@@ -172,6 +172,10 @@ impl<const N: usize> OdeSystem for Elimination<N> {
         true
     }
 
+    fn may_grow_by_rates(&self) -> bool {
+        self.mechanism.may_grow_by_rates()
+    }
+
     fn label(&self, i: usize) -> String {
         let partition = &self.mechanism.partition;
         let f = partition.count();

@@ -291,6 +291,10 @@ impl OdeSystem for Looped {
         self.angles.jacobian(t, y, jacobian)
     }
 
+    fn may_grow_by_rates(&self) -> bool {
+        self.angles.may_grow_by_rates()
+    }
+
     fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
         self.angles.stiffness(t, y)
     }

@@ -236,6 +236,11 @@ pub trait OdeSystem {
         false
     }
 
+    /// False where nothing feeds modes by their rates: what grows then is an equilibrium left behind.
+    fn may_grow_by_rates(&self) -> bool {
+        true
+    }
+
     /// How stiff the mechanism is at (t, y); `None` where the field stands for none.
     fn stiffness(&mut self, _t: Time, _y: &[f64]) -> Option<Stiffness> {
         None

@@ -98,6 +98,10 @@ impl<const N: usize, const WORK: bool> OdeSystem for Multiplier<N, WORK> {
         true
     }
 
+    fn may_grow_by_rates(&self) -> bool {
+        self.mechanism.may_grow_by_rates()
+    }
+
     fn stiffness(&mut self, t: Time, y: &[f64]) -> Option<Stiffness> {
         let n = self.mechanism.coordinates();
         Some(Stiffness::at(&self.mechanism, t, &y[..n], &y[n..2 * n]))

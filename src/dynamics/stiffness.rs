@@ -38,7 +38,7 @@ pub struct Stiffness {
     /// Magnitude of the largest eigenvalue of the linearised equations \[rad/s\]; not a number where the
     /// equations are not finite.
     pub fastest: f64,
-    /// Minus its real part \[1/s\]: positive where the mode dies away.
+    /// Minus its real part \[1/s\]: positive where the mode dies away, negative where it grows.
     pub decay: f64,
     /// The rate of everything else \[rad/s\]: gravity on the bars, their own rates, and the laws of motors;
     /// beside a mode that dies away that of the slowest mode at least, which is its own where it is the only
@@ -66,9 +66,11 @@ impl Stiffness {
         if found.is_damped() {
             found.slow = found.slow.max(slowest);
         }
-        if let Some(mode) =
-            fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest)
-        {
+        // No spring or damper feeds a mode.
+        if let (false, Some(mode)) = (
+            found.is_growing(),
+            fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest),
+        ) {
             found.culprit = Some(mode.name);
             (found.energy, found.share) = (Some(mode.energy), Some(mode.energy / mechanism.energy_scale));
         }
@@ -86,6 +88,11 @@ impl Stiffness {
     /// True where the mode dies away within a few periods, or does not swing at all.
     pub fn is_damped(&self) -> bool {
         self.decay > 0.1 * self.fastest
+    }
+
+    /// True where the mode grows as fast.
+    pub fn is_growing(&self) -> bool {
+        -self.decay > 0.1 * self.fastest
     }
 
     /// How many times faster the mode is than the rest.

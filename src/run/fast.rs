@@ -2,12 +2,13 @@
 //! follow, and in about how many steps.
 //!
 //! A fast mode that swings is resolved, whatever it takes: its energy acts on the slow motion, and a method
-//! that damps it away returns a wrong one, smoothly. Past 1e8 radians that wants to be asked for.
+//! that damps it away returns a wrong one, smoothly. Past 1e8 radians that wants to be asked for, and as much
+//! of a mode that grows.
 
 use super::methods::MethodId;
 use super::plan::{Request, RequestRefusal};
 use crate::arithmetic::shown::{estimate, order, plain, steps};
-use crate::dynamics::Stiffness;
+use crate::dynamics::{Mechanism, Stiffness};
 
 /// How much faster than all else a mode must be to be worth a note.
 const STIFF: f64 = 30.0;
@@ -23,11 +24,11 @@ pub struct FastMode {
     pub spring: Option<String>,
     /// Its rate \[rad/s\].
     pub rate: f64,
-    /// How fast it dies away \[1/s\].
+    /// How fast it dies away \[1/s\]; negative where it grows.
     pub decay: f64,
     /// The rate of all else \[rad/s\].
     pub slow: f64,
-    /// Its periods to the horizon; zero where it dies away within a few.
+    /// Its periods to the horizon; zero where it dies away within a few, or grows as fast.
     pub periods: f64,
     /// About how many steps the method takes to follow it; zero where it need not.
     pub steps: f64,
@@ -39,12 +40,12 @@ impl FastMode {
     /// What is `found` of the start, on the way to `until` \[s\] by a method; `step` is that of a fixed-step
     /// method \[s\].
     pub fn new(found: Stiffness, method: MethodId, step: Option<f64>, until: f64) -> Self {
-        let is_damped = found.is_damped();
-        let dies = is_damped && matches!(method, MethodId::Radau(_));
+        let swings = !found.is_damped() && !found.is_growing();
+        let passes = found.is_damped() && matches!(method, MethodId::Radau(_));
         let steps = step.map_or(found.radians(until) / radians_a_step(method), |step| until / step);
         Self {
-            periods: if is_damped { 0.0 } else { found.periods(until) },
-            steps: if dies { 0.0 } else { steps },
+            periods: if swings { found.periods(until) } else { 0.0 },
+            steps: if passes { 0.0 } else { steps },
             spring: found.culprit,
             rate: found.fastest,
             decay: found.decay,
@@ -63,35 +64,54 @@ impl FastMode {
         self.periods > 0.0
     }
 
+    /// True where it grows, by more than a tenth of its rate.
+    fn grows(&self) -> bool {
+        !self.swings() && self.decay < 0.0
+    }
+
+    /// What it does on the way to `until` \[s\] beside dying away.
+    fn course(&self, until: f64) -> String {
+        let rate = estimate(self.rate);
+        match self.grows() {
+            true => format!("grows at {rate} /s at the start"),
+            false => {
+                let periods = estimate(self.periods);
+                format!("oscillates at {rate} rad/s, {periods} periods until t = {} s", plain(until))
+            }
+        }
+    }
+
     fn name(&self) -> String {
         self.spring.as_ref().map_or_else(|| "the fastest mode".into(), |name| format!("spring {name}"))
     }
 
-    /// Refuses to follow very many periods unless that is asked for; Radau methods do not follow them, and
-    /// fixed steps are what they were asked to be.
+    /// Refuses to follow very many periods, or as much growth, unless that is asked for; Radau methods do not
+    /// follow periods, and fixed steps are what they were asked to be.
     ///
     /// # Errors
     /// More than 1e8 rad, no effort stated.
-    pub fn check(&self, method: MethodId, request: &Request, until: f64) -> Result<(), RequestRefusal> {
+    pub fn check(
+        &self,
+        mechanism: &Mechanism,
+        method: MethodId,
+        request: &Request,
+        until: f64,
+    ) -> Result<(), RequestRefusal> {
         let is_asked_for = request.max_evaluations.is_some()
             || !method.is_adaptive()
-            || matches!(method, MethodId::Radau(_));
-        if is_asked_for || !self.swings() || self.rate * until <= MOST_RADIANS {
+            || self.swings() && matches!(method, MethodId::Radau(_));
+        if is_asked_for || !(self.swings() || self.grows()) || self.rate * until <= MOST_RADIANS {
             return Ok(());
         }
+        let is_spring = mechanism.springs.iter().any(|spring| self.spring.as_ref() == Some(&spring.name));
+        let rigid = if is_spring { "\"model\": \"rigid\" for the spring, " } else { "" };
+        let alternative =
+            format!("a shorter --until, {rigid}or --max-evaluations with the evaluations that may take");
         Err(RequestRefusal {
             is_usage: false,
-            what: format!("{} over {until} s", self.name()),
-            reason: format!(
-                "it oscillates at {} rad/s, {} periods until t = {} s, about {}",
-                estimate(self.rate),
-                estimate(self.periods),
-                plain(until),
-                steps(self.steps)
-            ),
-            alternative: "a shorter --until, \"model\": \"rigid\" for the spring, or --max-evaluations with \
-                the evaluations that may take"
-                .into(),
+            what: format!("{} over {} s", self.name(), plain(until)),
+            reason: format!("it {}, about {}", self.course(until), steps(self.steps)),
+            alternative,
         })
     }
 
@@ -100,28 +120,28 @@ impl FastMode {
         if !self.is_stiff() {
             return None;
         }
-        let (name, rate) = (self.name(), estimate(self.rate));
-        if !self.swings() {
+        let name = self.name();
+        if !(self.swings() || self.grows()) {
             let cost = if self.steps > 0.0 {
                 format!("; {method} follows it in about {}", steps(self.steps))
             } else {
                 String::new()
             };
             return Some(format!(
-                "{name} is stiff, {rate} rad/s, and dies away at {} /s{cost}",
+                "{name} is stiff, {} rad/s, and dies away at {} /s{cost}",
+                estimate(self.rate),
                 estimate(self.decay)
             ));
         }
-        let oscillates = format!(
-            "{name} oscillates at {rate} rad/s, {} periods until t = {} s",
-            estimate(self.periods),
-            plain(until)
-        );
-        let followed = format!("{oscillates}, about {}", steps(self.steps));
+        let course = format!("{name} {}", self.course(until));
+        if self.grows() && matches!(method, MethodId::Radau(_)) {
+            return Some(format!("{course}; {method} takes short steps as long as it does"));
+        }
+        let followed = format!("{course}, about {}", steps(self.steps));
         Some(match (method, self.energy_share) {
             (MethodId::Radau(_), Some(share)) if share > EXCITED => {
                 format!(
-                    "{oscillates}; {method} takes its energy away, {} of the scale, wherever its steps are \
+                    "{course}; {method} takes its energy away, {} of the scale, wherever its steps are \
                         longer than a period",
                     order(share)
                 )

@@ -167,7 +167,7 @@ impl Plan {
         }
         let stiffness = stiffness.map(|found| FastMode::new(found, method, step, until));
         if let Some(mode) = &stiffness {
-            mode.check(method, request, until)?;
+            mode.check(mechanism, method, request, until)?;
             notes.extend(mode.note(method, until));
         }
         let max_evaluations = request.max_evaluations.unwrap_or(usual_max_evaluations(method, until));

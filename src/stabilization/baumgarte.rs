@@ -52,6 +52,10 @@ impl<const N: usize> OdeSystem for Baumgarte<N> {
         true
     }
 
+    fn may_grow_by_rates(&self) -> bool {
+        self.inner.may_grow_by_rates()
+    }
+
     fn label(&self, i: usize) -> String {
         self.inner.label(i)
     }

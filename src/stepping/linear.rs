@@ -134,6 +134,15 @@ impl<T: MatrixEntry> LuFactors<T> {
     }
 }
 
+impl LuFactors<f64> {
+    /// Whether the determinant of the matrix is negative.
+    pub fn is_negative(&self) -> bool {
+        let exchanges = self.exchange.iter().enumerate().filter(|&(k, &row)| k != row).count();
+        let negative = self.pivot.iter().filter(|&&pivot| pivot < 0.0).count();
+        (exchanges + negative) % 2 == 1
+    }
+}
+
 /// Solves L U x = load in place, with reciprocal pivots.
 #[inline(always)]
 pub fn substitute<T: MatrixEntry>(rows: usize, factors: &[T], pivot: &[T], load: &mut [T]) {

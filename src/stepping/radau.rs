@@ -2,6 +2,7 @@
 //!
 //! Implicit, adaptive, stiffly accurate and L-stable: fast modes that are damped cost it nothing once they
 //! have died away, and its steps follow the slow motion. To choose for dampers and damped stiff springs.
+//! Modes that grow it would damp as well, so that steps are short enough for them (`step_size.rs`).
 //! *Not* for stiff springs that swing: it eats their energy wherever its steps are longer than their periods,
 //! and where they are not the explicit methods are cheaper.  It asks for a field with a
 //! [Jacobian](OdeSystem::jacobian).
@@ -23,6 +24,7 @@
 
 mod dense;
 mod newton;
+mod step_size;
 mod tableau;
 
 use self::newton::NewtonEnd;
@@ -63,6 +65,8 @@ struct RadauScratch {
     /// J (d × d), and where it was taken.
     jacobian: Vec<f64>,
     place: (Time, Vec<f64>),
+    /// The longest step in which it resolves what grows \[s\], once it was asked for.
+    longest: Option<f64>,
     /// Factors of 1 - h mu J, one a mode, for the step `factored`; zero where there are none.
     real: LuFactors<f64>,
     pairs: Vec<LuFactors<Complex<f64>>>,
@@ -178,15 +182,6 @@ impl Radau {
         state.memory.extend([wanted, accepted, error, contraction, keeps, *hi, *lo]);
         state.memory.extend_from_slice(place);
         state.memory.extend_from_slice(&self.work.last);
-    }
-
-    /// A first step from the sizes of unknowns and rates; the error estimate corrects it.
-    fn first_step(&self, state: &State, span: f64, short: f64) -> f64 {
-        let norm = |x: &[f64]| {
-            x.iter().zip(&self.work.scale).map(|(x, scale)| (x / scale) * (x / scale)).sum::<f64>().sqrt()
-        };
-        let guess = 0.01 * norm(&state.y) / norm(&self.work.start);
-        if guess.is_finite() && guess > 0.0 { guess.min(span) } else { span.min(short) }
     }
 
     /// The new state, and the error over the tolerance; filtered once more where the step is a hard one, just
@@ -337,6 +332,10 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
             }
             if self.work.factored != h {
                 self.factor(h, d);
+            }
+            if let Some(shorter) = self.shortened_by_growth(field.may_grow_by_rates(), h) {
+                control.wanted = shorter;
+                continue;
             }
             self.predict(h, control.accepted, false);
             // A work integral follows the motion and not the reverse: two iterations make it exact, and their

@@ -149,10 +149,15 @@ impl Mechanism {
 
     /// True where the scene has a damper, or a force from outside that depends on rates.
     pub fn is_damped(&self) -> bool {
-        self.forces.iter().any(UserForce::depends_on_rates)
+        self.may_grow_by_rates()
             || !self.frictions.is_empty()
             || self.springs.iter().any(|spring| spring.damping != 0.0)
             || self.torsions.iter().any(|torsion| torsion.damping != 0.0)
+    }
+
+    /// True where forces may feed modes by their rates, as formulas and forces from outside may.
+    pub fn may_grow_by_rates(&self) -> bool {
+        self.forces.iter().any(UserForce::depends_on_rates)
     }
 
     /// The forces that are no parts of the scene, whether they act or not.

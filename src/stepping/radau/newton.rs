@@ -35,7 +35,7 @@ impl Radau {
         }
         let d = work.place.1.len();
         work.jacobian.resize(d * d, 0.0);
-        work.factored = 0.0;
+        (work.factored, work.longest) = (0.0, None);
         field.jacobian(work.place.0, &work.place.1, &mut work.jacobian)
     }
 
