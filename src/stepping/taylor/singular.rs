@@ -229,8 +229,8 @@ impl<T: Coefficient> SingularPassage<T> {
         })
     }
 
-    /// True where no surfaces jam ([`JAMS`](crate::dynamics::friction::paradox::JAMS)) on the way through: the
-    /// determinant of the equations of friction keeps its sign.
+    /// True where no surfaces jam ([`JAMS`](crate::dynamics::friction::paradox::JAMS)) on the way through:
+    /// the determinant of the equations of friction keeps its sign.
     fn friction_follows(
         &mut self,
         mechanism: &Mechanism,
