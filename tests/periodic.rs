@@ -449,7 +449,9 @@ fn drives_that_do_not_repeat_themselves_have_no_period() {
             assert!(matches!(refused, Err(ModesError::NotPeriodic { .. })), "{torque}: {refused:?}");
         }
     }
-    let pulse = turned_by("0.1 - 3*b.sin - 0.1*b.omega + if(t < 0.47, 0, 1)*if(t < 0.475, 5, 0)");
+    let pulse = turned_by(
+        "0.5*sin(2*pi*t/(0.35 s)) - 3*b.sin - 0.1*b.omega + if(t < 0.47, 0, 1)*if(t < 0.475, 5, 0)",
+    );
     assert_eq!(found(&pulse, 0, Some(0.35)).expect("a search").motions.len(), 0);
 }
 
