@@ -245,7 +245,7 @@ fn a_method_that_is_not_there_is_refused_by_its_own_name() {
         for step in [None, Some(0.01)] {
             let request = Request { method: Some(method), step, ..Request::default() };
             let simulation = Simulation::new(&scene("free")).expect("equations").options(request);
-            let refused = simulation.until(1.0).run().err().expect("a refusal").to_string();
+            let refused = simulation.until(1.0).run().expect_err("a refusal").to_string();
             assert!(refused.contains(&format!("{method:?}")) && refused.contains("Gauss(8)"), "{refused}");
         }
     }
