@@ -55,8 +55,8 @@
 //! # Features
 //!
 //! `cli`, `charts`, `threads` (sweeps on several of them), `fit` and `digits` are on by default;
-//! `default-features = false` leaves the core.  [`source_problem`] has the problem everything began with, its published numbers
-//! and its errata.
+//! `default-features = false` leaves the core.  [`source_problem`] has the problem everything began with,
+//! its published numbers and its errata.
 //!
 //! Units are SI throughout, angles in radians, absolute, from +x, counter-clockwise.
 

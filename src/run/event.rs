@@ -61,8 +61,8 @@ pub trait Event: Send + Sync {
     fn name(&self) -> &str;
 
     /// The event function: a smooth function of time, positions and rates, whose zero is the event; so is its
-    /// way past zero where an impact, or a joint that closes, makes the rates jump.  Where it is not a number,
-    /// as of a body that is not there, the run stops.
+    /// way past zero where an impact, or a joint that closes, makes the rates jump.  Where it is not a
+    /// number, as of a body that is not there, the run stops.
     fn value(&self, at: &Configuration<f64>) -> f64;
 
     /// Which passages count; both unless said otherwise.
