@@ -162,6 +162,7 @@ impl PassedWall {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::arithmetic::Scalar;
 
     #[test]
     fn the_cubic_has_the_values_and_rates_of_both_ends() {
