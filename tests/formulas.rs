@@ -233,6 +233,33 @@ fn refusals_in_scenes_name_the_place() {
     assert!(twice.contains("events[0].off[1] = \"T\"") && twice.contains("does not switch on"), "{twice}");
 }
 
+/// An event would switch all of that name without a word.
+#[test]
+fn a_name_of_several_parts_cannot_be_switched() {
+    let with = |more: &str| {
+        rotor(
+            [1.0, 0.0],
+            1.0,
+            &format!(
+                r#""torques": [{{"name": "s", "body": "bar", "torque": 1}}, {{"name": "u", "body": "bar", "torque": 1}}],
+                "torsion_springs": [{{"name": "s", "body": "bar", "stiffness": 6, "free_angle": 1}}], {more}"#
+            ),
+        )
+    };
+    let event = |what: &str| format!(r#""events": [{{"name": "E", "when": "bar.phi", {what}}}]"#);
+    for (more, place) in [
+        (event(r#""off": ["u", "s"]"#), "events[0].off[1]"),
+        (event(r#""on": ["s"]"#), "events[0].on[0]"),
+        (r#""inactive": ["s"]"#.to_owned(), "inactive[0]"),
+    ] {
+        let message = refused(&with(&more));
+        let says =
+            format!("{place} = \"s\" is the name of a torsion spring and a torque: must be the name of one");
+        assert!(message.contains(&says) && message.contains("hint: rename"), "{message}");
+    }
+    scene(&with(&event(r#""off": ["u"]"#)));
+}
+
 #[test]
 fn a_spring_as_a_formula_is_the_scenes_own_in_every_method() {
     let mut own = read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");

@@ -1,16 +1,16 @@
-//! Formulas of time and state: points, signals, laws of forces and springs, potentials and events.
+//! Formulas of time and state: points, signals, laws of forces and springs, and potentials.
 
-use super::at::{At, Fields, listed, nearest};
+use super::at::{At, Fields};
+use super::judge::{check_name, fits, refused};
 use super::loads;
 use super::names::BarNames;
-use super::resolve::{Valued, check_name, fits, refused};
+use super::resolve::Valued;
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, FieldShape, QuantityRange, SCENE};
 use crate::scene::formula::unit::Dimension;
-use crate::scene::law::{Direction, Integral, Load, LoadLaw, NamedPoint, SceneEvent, Signal};
+use crate::scene::law::{Integral, Load, LoadLaw, NamedPoint, Signal};
 use crate::scene::locate::{Located, Member, Value};
 use crate::scene::names::{Bound, Names, Scope};
-use crate::scene::set::hint;
 use crate::scene::{Coupling, Force, Scene, Spring, Torque, TorsionSpring};
 
 /// Signals at most.
@@ -35,7 +35,7 @@ pub(super) fn split<T>(all: Vec<Either<T>>, laws: &mut Vec<LoadLaw>) -> Vec<T> {
 }
 
 /// A text, or a number as one.
-fn written(node: &Located) -> Option<String> {
+pub(super) fn written(node: &Located) -> Option<String> {
     match &node.value {
         Value::Text(text) => Some(text.clone()),
         Value::Number(number) => Some(format!("{number:?}")),
@@ -44,7 +44,7 @@ fn written(node: &Located) -> Option<String> {
 }
 
 /// The text of a formula that must be there.
-fn formula(fields: &Fields, name: &str) -> Result<String, SceneError> {
+pub(super) fn formula(fields: &Fields, name: &str) -> Result<String, SceneError> {
     let at = fields.required(name)?;
     written(at.node).ok_or_else(|| match fields.table.field(name) {
         Some(field) => at.refuse_value(&field.shape.allowed(), &field.for_example()),
@@ -156,55 +156,8 @@ pub(super) fn potential(fields: &Fields, name: String) -> Result<LoadLaw, SceneE
     Ok(LoadLaw { name, load: Load::Potential { energy: formula(fields, "energy")? } })
 }
 
-/// An event.
-pub(super) fn event(fields: &Fields, name: String) -> Result<SceneEvent, SceneError> {
-    let direction = match fields.word_or_first("direction")? {
-        0 => Direction::Either,
-        1 => Direction::Rising,
-        _ => Direction::Falling,
-    };
-    let set = match fields.optional("set") {
-        None => Vec::new(),
-        Some(at) => pairs(&at)?,
-    };
-    Ok(SceneEvent {
-        name,
-        when: formula(fields, "when")?,
-        direction,
-        stop: fields.word_or_first("action")? == 1,
-        on: fields.optional("on").map_or(Ok(Vec::new()), |at| names(&at))?,
-        off: fields.optional("off").map_or(Ok(Vec::new()), |at| names(&at))?,
-        set,
-    })
-}
-
-/// Refuses a part that an event switches on and off at once.
-fn check_on_and_off(event: &SceneEvent, at: &At) -> Result<(), SceneError> {
-    let Some(off) = at.child("off") else { return Ok(()) };
-    let Value::List(nodes) = &off.node.value else { return Ok(()) };
-    let both = nodes.iter().zip(&event.off).position(|(_, part)| event.on.contains(part));
-    both.map_or(Ok(()), |number| {
-        let allowed = "must be a part that the event does not switch on";
-        let hint = "leave it in `on` or in `off`; a later change takes another event";
-        Err(off.item(&nodes[number], number).refuse_value(allowed, hint))
-    })
-}
-
-/// A list of names.
-pub(super) fn names(at: &At) -> Result<Vec<String>, SceneError> {
-    let hint = "for example [\"latch\"]";
-    let Value::List(nodes) = &at.node.value else {
-        return Err(at.refuse_value(&FieldShape::Names.allowed(), hint));
-    };
-    let name = |(number, node)| match &at.item(node, number).node.value {
-        Value::Text(name) => Ok(name.clone()),
-        _ => Err(at.item(node, number).refuse_value("must be the name of a part", hint)),
-    };
-    nodes.iter().enumerate().map(name).collect()
-}
-
 /// Formulas by name.
-fn pairs<'a>(at: &At<'a>) -> Result<Vec<(String, String)>, SceneError> {
+pub(super) fn pairs<'a>(at: &At<'a>) -> Result<Vec<(String, String)>, SceneError> {
     let hint = "for example {\"speed\": \"sqrt(tip.vx^2 + tip.vy^2)\"}";
     let Value::Object(members) = &at.node.value else {
         return Err(at.refuse_value(&FieldShape::Signals.allowed(), hint));
@@ -263,8 +216,7 @@ pub(super) fn integrals(
     Ok(all.into_iter().enumerate().map(integral).collect())
 }
 
-/// Judges every formula of a scene where it stands: its names, its dimensions; and the parts that events
-/// name.
+/// Judges every formula of a scene where it stands: its names, its dimensions; and what events do.
 pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Valued]) -> Result<(), SceneError> {
     let is_plain = scene.laws.is_empty() && scene.signals.is_empty() && scene.integrals.is_empty();
     let is_plain = is_plain && scene.walls.iter().all(|wall| wall.aim.is_none());
@@ -336,24 +288,7 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Valued]) -> 
             return Err(at.refuse(&problem, allowed, hint));
         }
     }
-    let parts = Parts::of(scene);
-    for event in &scene.events {
-        let at = found(root.child("events").and_then(|at| at.named(&event.name)));
-        judge(&found(at.child("when")), &event.when, &scope, None)?;
-        at.child("on").map_or(Ok(()), |list| parts.check(&list))?;
-        at.child("off").map_or(Ok(()), |list| parts.check(&list))?;
-        check_on_and_off(event, &at)?;
-        for (name, text) in &event.set {
-            let value = found(at.child("set").and_then(|set| set.child(name)));
-            let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
-            if !known.contains(&name.as_str()) {
-                let hint = hint(name, &known);
-                return Err(value.refuse("is no parameter", "must be a parameter of the scene", &hint));
-            }
-            judge(&value, text, &scope, None)?;
-        }
-    }
-    root.child("inactive").map_or(Ok(()), |list| parts.check(&list))
+    super::events::check(root, scene, &scope, parameters)
 }
 
 /// What the field of a part must come to.
@@ -372,7 +307,7 @@ fn quantity_of(list: &str, key: &str, part: &At) -> Option<QuantityRange> {
 }
 
 /// Judges one formula that stands at `at`: its names, and its dimension where that of the field is known.
-fn judge(
+pub(super) fn judge(
     at: &At,
     text: &str,
     scope: &Scope,
@@ -395,49 +330,4 @@ fn is_of_place(at: &At, names: &Names, bound: &Bound) -> Result<(), SceneError> 
     let allowed = "a potential is a formula of angles and positions";
     let hint = "what depends on time or rates does work: give it as a force, a torque or a tension";
     Err(at.refuse(&problem, allowed, hint))
-}
-
-/// What events can switch, and springs that they cannot.
-struct Parts<'a>(Vec<&'a str>, Vec<&'a str>);
-
-impl<'a> Parts<'a> {
-    fn of(scene: &'a Scene) -> Self {
-        let names = (scene.springs.iter().filter(|spring| !spring.rigid).map(|part| &part.name))
-            .chain(scene.torsion_springs.iter().map(|part| &part.name))
-            .chain(scene.forces.iter().map(|part| &part.name))
-            .chain(scene.torques.iter().map(|part| &part.name))
-            .chain(scene.laws.iter().map(|part| &part.name))
-            .chain(scene.hinges.iter().map(|part| &part.name))
-            .chain(scene.motors.iter().map(|part| &part.name))
-            .chain(scene.drives.iter().map(|part| &part.name))
-            .chain(scene.couplings.iter().map(|part| &part.name))
-            .chain(scene.locks.iter().map(|part| &part.name))
-            .chain(scene.walls.iter().map(|part| &part.name));
-        let rigid = scene.springs.iter().filter(|spring| spring.rigid).map(|spring| spring.name.as_str());
-        Self(names.map(String::as_str).collect(), rigid.collect())
-    }
-
-    /// Refuses a list with a name that none has.
-    fn check(&self, list: &At) -> Result<(), SceneError> {
-        let Value::List(nodes) = &list.node.value else { return Ok(()) };
-        for (number, node) in nodes.iter().enumerate() {
-            let at = list.item(node, number);
-            let Value::Text(name) = &node.value else { continue };
-            if self.0.contains(&name.as_str()) {
-                continue;
-            }
-            let hint = match nearest(name, self.0.iter().copied()) {
-                _ if self.1.contains(&name.as_str()) => {
-                    "a spring whose model is \"rigid\" always acts".into()
-                }
-                Some(near) => format!("did you mean \"{near}\"?"),
-                None if self.0.is_empty() => "the scene has none".to_owned(),
-                None => format!("there are: {}", listed(&self.0)),
-            };
-            let allowed = "must be the name of a spring, torsion spring, force, torque, potential, hinge, \
-                motor, lock or wall";
-            return Err(at.refuse_value(allowed, &hint));
-        }
-        Ok(())
-    }
 }

@@ -5,8 +5,10 @@
 
 mod at;
 mod bars;
+mod events;
 mod friction;
 mod joints;
+mod judge;
 mod laws;
 mod loads;
 mod names;
@@ -150,7 +152,7 @@ fn scene(
     let (forces, _) = named(&fields, "forces", |fields, name| laws::force(fields, name, &known))?;
     let (torques, _) = named(&fields, "torques", |fields, name| laws::torque(fields, name, &known))?;
     let (potentials, _) = named(&fields, "potentials", laws::potential)?;
-    let (events, _) = named(&fields, "events", laws::event)?;
+    let (events, _) = named(&fields, "events", events::event)?;
     let signals = laws::signals(&fields, &parameters)?;
     let integrals = laws::integrals(&fields, &parameters, &signals, &known)?;
     let mut laws = Vec::new();
@@ -193,7 +195,7 @@ fn scene(
         laws,
         events,
         outputs: outputs::outputs(&fields)?,
-        inactive: fields.optional("inactive").map_or(Ok(Vec::new()), |at| laws::names(&at))?,
+        inactive: fields.optional("inactive").map_or(Ok(Vec::new()), |at| events::names(&at))?,
         until,
         every,
         ..Scene::default()

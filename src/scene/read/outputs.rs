@@ -1,7 +1,7 @@
 //! Outputs: formulas by name, or a list of formulas.
 
 use super::at::{At, Fields};
-use super::resolve::refused;
+use super::judge::refused;
 use crate::scene::error::SceneError;
 use crate::scene::format::FieldShape;
 use crate::scene::locate::{Located, Value};

@@ -1,7 +1,7 @@
 //! Tables of points for formulas: written in the scene, or two columns of a CSV file beside it.
 
 use super::at::At;
-use super::resolve::check_name;
+use super::judge::check_name;
 use crate::scene::PointTable;
 use crate::scene::error::SceneError;
 use crate::scene::format::FieldShape;
