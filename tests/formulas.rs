@@ -260,6 +260,41 @@ fn a_name_of_several_parts_cannot_be_switched() {
     scene(&with(&event(r#""off": ["u"]"#)));
 }
 
+/// What an event sets is judged as what stands in its place, as far as that is known where it is read.
+#[test]
+fn values_that_events_set_fit_their_parameters() {
+    let with = |k: &str, set: &str| {
+        rotor(
+            [1.0, 0.0],
+            1.0,
+            &format!(
+                r#""parameters": {{"k": {k}}}, "torques": [{{"name": "T", "body": "bar", "torque": "k"}}],
+                "events": [{{"name": "E", "when": "bar.phi", "set": {{"k": {set}}}}}]"#
+            ),
+        )
+    };
+    for (k, set, says) in [
+        (r#""3 N*m""#, r#""2 m""#, ".set.k = \"2 m\": is m: must be of the unit of the parameter k, J"),
+        ("3", "1e40", "comes to 1e40: must be a number from -1e30 to 1e30"),
+        ("3", r#""1/0""#, "is infinite: must be a number"),
+        ("3", r#""1e29*k^4""#, "comes to 8.1e30: must be a number"),
+        ("3", r#""sqrt(-k)""#, "has no value: must be a number"),
+    ] {
+        let message = refused(&with(k, set));
+        assert!(message.contains(says) && message.contains("hint: "), "{message}");
+    }
+    for (k, set) in [(r#""3 N*m""#, "2"), (r#""3 N*m""#, r#""0.5*k""#), ("3", r#""1/bar.omega""#)] {
+        let scene = scene(&with(k, set));
+        let mechanism = Mechanism::new(&scene).expect("a mechanism");
+        assert_eq!(Plan::new(&scene, &mechanism, &Request::default()).expect("a plan").notes, [""; 0]);
+    }
+    let vain = with("3", "2").replace(r#""torque": "k""#, r#""torque": 1"#);
+    let vain = scene(&vain);
+    let mechanism = Mechanism::new(&vain).expect("a mechanism");
+    let notes = Plan::new(&vain, &mechanism, &Request::default()).expect("a plan").notes;
+    assert!(matches!(&notes[..], [note] if note.starts_with("events set k, but no law")), "{notes:?}");
+}
+
 #[test]
 fn a_spring_as_a_formula_is_the_scenes_own_in_every_method() {
     let mut own = read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");

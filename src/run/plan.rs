@@ -11,7 +11,7 @@ pub(super) use self::pairing::check_forces_of_joints;
 pub(super) use self::pairing::usual;
 
 use self::pairing::{check_method, check_vibration, pair};
-use self::rates::{fastest_rate, fixed_step, model_error, rate_about_rods};
+use self::rates::{fastest_rate, fixed_step, model_error, rate_about_rods, set_in_vain};
 use super::choice::{Choice, Prefer, choose, least_tolerance, usual_tolerance};
 use super::custom::Custom;
 use super::fast::{self, FastMode};
@@ -170,6 +170,7 @@ impl Plan {
             mode.check(mechanism, method, request, until)?;
             notes.extend(mode.note(method, until));
         }
+        notes.extend(set_in_vain(scene, mechanism));
         let max_evaluations = request.max_evaluations.unwrap_or(usual_max_evaluations(method, until));
         notes.extend(cut_short(method, step, rate, until, max_evaluations));
         let rows = rows(until, every);

@@ -1,4 +1,4 @@
-//! Steps of fixed-step methods, and how fast a scene moves at most.
+//! Steps of fixed-step methods, how fast a scene moves at most, and what its events set in vain.
 
 use super::{Request, RequestRefusal, is_whole, usage};
 use crate::arithmetic::shown::order;
@@ -143,4 +143,19 @@ pub(super) fn model_error(mechanism: &Mechanism, rate: Option<f64>, notes: &mut 
         order(error)
     ));
     Some(error)
+}
+
+/// What there is to say of parameters that events set, though nothing of the motion is made of them.
+pub(super) fn set_in_vain(scene: &Scene, mechanism: &Mechanism) -> Option<String> {
+    let formulas = &mechanism.laws.as_ref()?.formulas;
+    let name = |number: usize| scene.parameters.get(number).map(|parameter| parameter.name.as_str());
+    let names: Vec<&str> = formulas.set_in_vain().filter_map(name).collect();
+    let is_made = if names.len() == 1 { "it" } else { "them" };
+    (!names.is_empty()).then(|| {
+        format!(
+            "events set {}, but no law, signal or event is made of {is_made}: numbers of the scene keep what \
+                they are at the start",
+            names.join(", ")
+        )
+    })
 }

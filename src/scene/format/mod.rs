@@ -89,7 +89,7 @@ pub(super) struct QuantityRange {
 
 /// Magnitudes beyond these have no physical sense, and their squares would leave the doubles.
 const TINY: f64 = 1e-30;
-const HUGE: f64 = 1e30;
+pub(super) const HUGE: f64 = 1e30;
 
 /// Just below 2⁴³, where the last place of an angle grows beyond 1e-3 rad.
 pub(super) const WIDEST_ANGLE: f64 = 8.796093e12;

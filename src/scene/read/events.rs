@@ -1,14 +1,16 @@
 //! Events: when they come, what they set, and the parts they switch.
 
 use super::at::{At, Fields, listed, nearest};
+use super::judge::HINTS;
 use super::laws::{formula, judge, pairs};
 use super::resolve::Valued;
+use crate::arithmetic::shown::about;
 use crate::scene::Scene;
 use crate::scene::error::SceneError;
-use crate::scene::format::FieldShape;
+use crate::scene::format::{FieldShape, HUGE};
 use crate::scene::law::{Direction, Load, SceneEvent};
 use crate::scene::locate::Value;
-use crate::scene::names::Scope;
+use crate::scene::names::{Bound, Meaning, Scope};
 use crate::scene::set::hint;
 
 /// An event.
@@ -76,15 +78,54 @@ pub(super) fn check<'a>(
         check_on_and_off(event, &at)?;
         for (name, text) in &event.set {
             let value = found(at.child("set").and_then(|set| set.child(name)));
-            let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
-            if !known.contains(&name.as_str()) {
-                let hint = hint(name, &known);
-                return Err(value.refuse("is no parameter", "must be a parameter of the scene", &hint));
-            }
-            judge(&value, text, scope, None)?;
+            check_set(&value, name, text, scope, parameters)?;
         }
     }
     root.child("inactive").map_or(Ok(()), |list| parts.check(&list))
+}
+
+/// Refuses a value at `at` that the parameter `name` cannot have.
+fn check_set(
+    at: &At,
+    name: &str,
+    text: &str,
+    scope: &Scope,
+    parameters: &[Valued],
+) -> Result<(), SceneError> {
+    let Some(parameter) = parameters.iter().find(|known| known.name == name) else {
+        let known: Vec<&str> = parameters.iter().map(|known| known.name.as_str()).collect();
+        return Err(at.refuse("is no parameter", "must be a parameter of the scene", &hint(name, &known)));
+    };
+    let (bound, dimension) = judge(at, text, scope, None)?;
+    if let (Some(found), Some(wanted)) = (dimension, parameter.dimension)
+        && !found.is(wanted)
+    {
+        let allowed = format!("must be of the unit of the parameter {name}, {wanted}");
+        let problem = format!("= {}: is {found}", at.source.written(at.node.span));
+        return Err(at.refuse(&problem, &allowed, "write it in the unit of the parameter"));
+    }
+    let Some(value) = constant(&bound, parameters) else { return Ok(()) };
+    if value.abs() <= HUGE {
+        return Ok(());
+    }
+    let what = match value {
+        value if value.is_nan() => "has no value".into(),
+        value if value.is_infinite() => "is infinite".into(),
+        value => format!("comes to {}", about(value)),
+    };
+    let problem = format!("= {}: {what}", at.source.written(at.node.span));
+    let allowed = format!("must be a number from -{HUGE:e} to {HUGE:e}");
+    Err(at.refuse(&problem, &allowed, HINTS[usize::from(bound.formula.names().next().is_none())]))
+}
+
+/// What a formula of parameters comes to; `None` where there is more in it.
+fn constant(bound: &Bound, parameters: &[Valued]) -> Option<f64> {
+    let value = |meaning: &Meaning| match meaning {
+        Meaning::Parameter(number) => parameters.get(*number).map(|known| known.value),
+        _ => None,
+    };
+    let values: Option<Vec<f64>> = bound.meanings.iter().map(value).collect();
+    Some(bound.formula.value(&values?))
 }
 
 /// What events can switch, by kind and name, and springs that they cannot.

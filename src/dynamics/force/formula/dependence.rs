@@ -3,6 +3,7 @@
 use super::{Expression, FormulaEvent, Formulas};
 use crate::dynamics::constraint::Site;
 use crate::scene::Meaning;
+use std::collections::BTreeSet;
 
 impl Expression {
     /// True where time is in it, and true where conditions choose its branches, itself or by the signals it
@@ -80,5 +81,25 @@ impl Formulas {
         let has_signals = own().any(|meaning| matches!(meaning, Meaning::Signal(_)));
         let signals = self.signals.iter().filter(move |_| has_signals);
         own().chain(signals.flat_map(|expression| &expression.meanings))
+    }
+
+    /// The parameters that events set though no law, signal or event is made of them, by number.
+    pub fn set_in_vain(&self) -> impl Iterator<Item = usize> {
+        let of_events = self.events.iter().flat_map(|event| {
+            let set = event.set.iter().map(|(_, expression)| expression);
+            std::iter::once(&event.when).chain(set)
+        });
+        let of = |meaning: &Meaning<Site>| match meaning {
+            Meaning::Parameter(number) => Some(*number),
+            _ => None,
+        };
+        let used: Vec<usize> = self
+            .switched()
+            .chain(of_events)
+            .flat_map(|expression| &expression.meanings)
+            .filter_map(of)
+            .collect();
+        let set: BTreeSet<usize> = self.events.iter().flat_map(FormulaEvent::parameters).collect();
+        set.into_iter().filter(move |number| !used.contains(number))
     }
 }
