@@ -295,6 +295,47 @@ fn values_that_events_set_fit_their_parameters() {
     assert!(matches!(&notes[..], [note] if note.starts_with("events set k, but no law")), "{notes:?}");
 }
 
+/// Hints say what was meant.
+#[test]
+fn slips_in_formulas_are_told_by_what_was_meant() {
+    let with = |torque: &str, more: &str| {
+        refused(&rotor(
+            [1.0, 0.0],
+            1.0,
+            &format!(
+                r#""tables": {{"g": [[0, 0], [1, 1], [2, 3]]}}, {more}
+                "torques": [{{"name": "T", "body": "bar", "torque": "{torque}"}}]"#
+            ),
+        ))
+    };
+    for (torque, more, problem, hint) in [
+        ("3*g", "", "g is a table", "hint: write g(…)"),
+        ("bar.phi*PI", "", "unknown name PI", "hint: did you mean pi?"),
+        ("3 bar.phi", "", "bar.phi is no unit", "hint: write products with *, as in 2*bar.phi"),
+        ("bar.omega**2", "", "is missing here", "hint: powers are written with ^"),
+        ("t + 1 m/s^2", "", "puts s and m/s² together", "hint: "),
+        ("a", r#""signals": {"a": "2*b", "b": "t"},"#, "b is a signal that comes later", "write b first"),
+        ("a", r#""signals": {"a": "2*a"},"#, "a is made of itself", "hint: a signal is made of those before"),
+        ("k", r#""parameters": {"k": "2*q"},"#, "unknown name q", "hint: there is no other parameter"),
+        ("k", r#""parameters": {"k": "2*bar.phi"},"#, "unknown name bar.phi", "state is a signal"),
+        ("1", r#""parameters": {"pi": 3},"#, "has a meaning of its own", "hint: pi is the number 3.14159…"),
+        ("1", r#""parameters": {"sin": 3},"#, "has a meaning of its own", "hint: sin is a function"),
+    ] {
+        let message = with(torque, more);
+        assert!(message.contains(problem) && message.contains(hint), "{torque} {more}: {message}");
+    }
+    let rate = rotor([1.0, 0.0], 1.0, r#""signals": {}"#);
+    let rate = refused(&rate.replace(r#""omega": 0"#, r#""omega": "3 rad""#));
+    assert!(rate.contains("hint: write 3 rad/s"), "{rate}");
+    let nine = parse_scene(
+        &rotor([1.0, 0.0], 1.0, r#""signals": {}"#),
+        "test",
+        &["bar9.phi=1".parse().expect("an override")],
+    );
+    let nine = nine.expect_err("no such bar").to_string();
+    assert!(nine.contains("bar9.phi does not exist") && nine.contains("did you mean `bar`?"), "{nine}");
+}
+
 #[test]
 fn a_spring_as_a_formula_is_the_scenes_own_in_every_method() {
     let mut own = read_scene("examples/scenes/spring.json".as_ref(), &[]).expect("a scene");

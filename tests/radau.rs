@@ -284,7 +284,7 @@ fn a_fast_mode_that_grows_is_not_damped() {
         // Up to 0.5 s it grows beyond all numbers, and no run comes to an end.
         let few = Request { max_evaluations: Some(3000), ..request(method, rtol) };
         let stop = run(&fed(3e8, 0.5), &few).stop.expect("a stop");
-        assert!(stop.t < 3e-6, "{stop}");
+        assert!(stop.t < 3e-6 && !stop.to_string().contains("0.0000"), "{stop}");
     }
 }
 

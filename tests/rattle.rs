@@ -630,3 +630,24 @@ fn bars_at_rest_without_gravity_stay_and_count() {
     assert!(distance(&run.motion(), &start) < 1e-30);
     assert_eq!(run.statistics, Statistics { steps: 100, evaluations: 900, ..Statistics::default() });
 }
+
+/// What is told of a formula is true of it: it has no potential, or it depends on rates.
+#[test]
+fn formulas_that_rattle_does_not_take_are_told_by_what_they_are() {
+    let with = |torque: &str| {
+        let text = format!(
+            r#"{{"name": "r", "gravity": [0, 0], "bars": [{{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}}],
+            "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b", "point": [0, 0]}}]}}],
+            "torques": [{{"name": "T", "body": "b", "torque": "{torque}"}}],
+            "start": {{"b": {{"phi": 0.3, "omega": 0}}}}, "until": 1, "every": 1}}"#
+        );
+        let scene = driftless::scene::parse_scene(&text, "r", &[]).unwrap_or_else(|error| panic!("{error}"));
+        let method = MethodId::Rattle(Composition::Suzuki5);
+        let request = Request { method: Some(method), step: Some(0.01), ..Request::default() };
+        Plan::new(&scene, &compile(&scene), &request).expect_err("a refusal").to_string()
+    };
+    let of_place = with("-sin(b.phi)");
+    assert!(of_place.contains("`T` is not given by a potential"), "{of_place}");
+    let of_rates = with("-tanh(b.omega)");
+    assert!(of_rates.contains("with force or torque T") && !of_rates.contains("damper"), "{of_rates}");
+}

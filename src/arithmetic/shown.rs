@@ -38,6 +38,11 @@ pub(crate) fn steps(x: f64) -> String {
     format!("{} {steps}", count(x))
 }
 
+/// The step \[s\] of a stop in brackets, with a space before them; nothing where none was tried.
+pub(crate) fn tried(step: f64) -> String {
+    if step == 0.0 { String::new() } else { format!(" (step {} s)", about(step)) }
+}
+
 /// To six digits.
 pub(crate) fn figure(x: f64) -> String {
     decimal(x, 6)

@@ -136,8 +136,11 @@ impl<'a> DigitsTask<'a> {
         let (scene, mechanism) = super::compile(&flags.scene, text)?;
         let typed = super::simulate::typed(arguments, &flags.scene.set);
         let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
-        let until = flags.digits.trusted_until.or(flags.plan.until).map(shortest).transpose()?;
-        let every = flags.plan.every.map(shortest).transpose()?;
+        let until = match flags.digits.trusted_until {
+            Some(until) => Some(shortest("--trusted-until", until)?),
+            None => flags.plan.until.map(|until| shortest("--until", until)).transpose()?,
+        };
+        let every = flags.plan.every.map(|every| shortest("--every", every)).transpose()?;
         let source = DigitsSource { template, typed, until, every, scene, mechanism };
         let within = flags.digits.trusted_until.map(|_| flags.digits.within.unwrap_or(1e-3));
         Ok(Self { flags, source, text, arguments, within, measured: None, attempt: 0 })
@@ -421,12 +424,12 @@ enum EarlyEnd {
     Table(std::io::Error),
 }
 
-/// A number of the command line as its shortest decimal.
-fn shortest(value: f64) -> Result<String, Failure> {
+/// A number of seconds of the command line as its shortest decimal.
+fn shortest(option: &str, value: f64) -> Result<String, Failure> {
     if value.is_finite() && value > 0.0 {
         return Ok(format!("{value:?}"));
     }
-    let text = format!("{value} s is no time\nhint: a number of seconds above 0");
+    let text = format!("{option}: {value} s is no time\nhint: a number of seconds above 0");
     Err(Failure::new(Exit::Usage, text))
 }
 

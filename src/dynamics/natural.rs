@@ -63,6 +63,12 @@ pub enum NaturalError {
         "force or torque `{0}` follows a bar or a law of time: the natural form takes constant ones only"
     )]
     Applied(String),
+    /// Formulas and forces from outside must be potentials.
+    #[error(
+        "force or torque `{0}` is not given by a potential of directions and positions: beside these the \
+            natural form takes constant ones only"
+    )]
+    WithoutPotential(String),
     /// Impacts are not handled.
     #[error("wall `{0}`: the natural form has no impacts")]
     Wall(String),
@@ -120,7 +126,7 @@ impl Natural {
             return Err(NaturalError::Wall(contact.row.name.clone()));
         }
         if let Some(force) = mechanism.forces.iter().find(|force| !force.is_potential_of_place()) {
-            return Err(NaturalError::Applied(force.name.clone()));
+            return Err(NaturalError::WithoutPotential(force.name.clone()));
         }
         let mut applied = vec![Complex::ZERO; mechanism.coordinates()];
         let mut torques = Vec::new();

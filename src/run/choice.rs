@@ -20,6 +20,7 @@
 
 use super::methods::{MethodId, Stabilization};
 use super::plan::{MANY_COORDINATES, Request, usual};
+use crate::arithmetic::shown::plain;
 use crate::dynamics::Mechanism;
 use crate::dynamics::stiffness::Stiffness;
 use crate::stepping::Taylor;
@@ -224,7 +225,10 @@ fn chosen(
     // Over 150 s of `wall` the tolerance that leaves rounding costs `dp8` 2.6 times as much, for a thousand
     // times the drift.
     if !is_free && tolerance.is_none() && is_long(mechanism, until) && n <= FEW_COORDINATES && is_kept {
-        let why = format!("over {until} s its series drifts by rounding only, and impacts are located on it");
+        let why = format!(
+            "over {} s its series drifts by rounding only, and impacts are located on it",
+            plain(until)
+        );
         return (MethodId::Taylor, why);
     }
     if !is_free {
@@ -265,7 +269,7 @@ fn chosen(
     } else if mechanism.is_damped() {
         "the scene is damped, and its series is the most accurate for the time".into()
     } else if is_long(mechanism, until) {
-        format!("over {until} s its series drifts by rounding only, for the least time")
+        format!("over {} s its series drifts by rounding only, for the least time", plain(until))
     } else {
         "over a short horizon its series is the most accurate for the time".into()
     };

@@ -141,7 +141,7 @@ impl Plan {
         let mut every = request.every.unwrap_or(scene.every).min(until);
         let mut notes = Vec::new();
         if request.every.is_some_and(|asked| asked > until) {
-            notes.push(format!("the output interval is cut to the horizon, {until} s"));
+            notes.push(format!("the output interval is cut to the horizon, {} s", plain(until)));
         }
         let rate = fastest_rate(scene, mechanism);
         let stiffness = Stiffness::at_start(mechanism, &mechanism.start(scene));
@@ -179,7 +179,7 @@ impl Plan {
             return Err(match request.every {
                 Some(_) => usage("--every", reason, "a longer output interval"),
                 None => mismatch(
-                    format!("every: an output interval of {every:?} s up to {until} s"),
+                    format!("every: an output interval of {} s up to {} s", plain(every), plain(until)),
                     &reason,
                     "a longer every in the scene, or --every",
                 ),
@@ -187,7 +187,7 @@ impl Plan {
         }
         let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.constraints.len()) as f64;
         if request.every.is_none() && numbers > MOST_NUMBERS {
-            let what = format!("an output interval of {every} s up to {until} s");
+            let what = format!("an output interval of {} s up to {} s", plain(every), plain(until));
             let reason = format!(
                 "the trajectory would hold {} numbers, about {:.0} GB",
                 count(numbers),

@@ -284,7 +284,7 @@ impl<C: Real> Scope<'_, C> {
             let Some((meaning, dimension)) = self.find(name) else {
                 let known =
                     self.names.order.iter().map(String::as_str).chain(self.own.iter().map(|own| own.0));
-                return Err(formula.unknown(name, &known.collect::<Vec<_>>()));
+                return Err(formula.unknown(name, &known.collect::<Vec<_>>(), &self.names.tables));
             };
             meanings.push(meaning);
             dimensions.push(dimension);

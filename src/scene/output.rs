@@ -337,7 +337,7 @@ impl OutputNames {
                 }
                 (None, None) => {
                     let known = self.names.listed().chain(self.order.iter().map(String::as_str));
-                    return Err(formula.unknown(name, &known.collect::<Vec<_>>()));
+                    return Err(formula.unknown(name, &known.collect::<Vec<_>>(), self.names.tables()));
                 }
             };
             are_torques &= own == TORQUE;

@@ -135,6 +135,10 @@ pub(super) fn put(
         Err(ShortNameError::NoKey { keys, hint, .. }) => {
             return Err(source.refusal(value.span, &set.path, "is not a known key", &keys, &hint));
         }
+        Err(ShortNameError::Unknown(hint)) if set.path.contains('.') => {
+            let allowed = "must begin with a key of the scene or the name of a part";
+            return Err(source.refusal(value.span, &set.path, "does not exist", allowed, &hint));
+        }
         // The walk along the path says what is wrong with it.
         Err(ShortNameError::Unknown(_)) => set.path.clone(),
     };

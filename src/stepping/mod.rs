@@ -35,7 +35,7 @@ pub use radau::Radau;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
-use crate::arithmetic::shown::about;
+use crate::arithmetic::shown::{figure, tried};
 use crate::dynamics::{MotionPowers, OdeSystem, State, Time};
 
 /// Counts of one run, and the effort it is allowed.
@@ -367,7 +367,7 @@ impl Cause {
 
 /// A typed stop.
 #[derive(Clone, Debug, PartialEq, thiserror::Error, serde::Serialize, serde::Deserialize)]
-#[error("{method} stopped at t = {t} s (step {} s): {what}; {hint}", about(*step))]
+#[error("{method} stopped at t = {} s{}: {what}; {hint}", figure(*t), tried(*step))]
 pub struct StepError {
     /// Why.
     pub cause: Cause,
@@ -440,7 +440,7 @@ fn refuse_the_past(method: &str, state: &State, until: Time, time_unit: f64) -> 
         method: method.into(),
         t: state.time.hi,
         step: left,
-        what: format!("t = {} s lies behind", until.hi),
+        what: format!("t = {} s lies behind", figure(until.hi)),
         hint: "turn the rates round and integrate forwards, or use a Gauss method".into(),
     })
 }

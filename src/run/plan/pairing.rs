@@ -46,15 +46,17 @@ pub(super) fn pair(
         ));
     }
     if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
-        let reason = "RATTLE takes forces that depend on positions only, and a damper's does not";
+        let by_rates = mechanism.forces.iter().find(|force| force.depends_on_rates());
+        let what = by_rates.map_or("dampers".to_owned(), |force| format!("force or torque {}", force.name));
+        let reason = "RATTLE takes potentials and constant forces, and what depends on rates is neither";
         return Err(mismatch(
-            format!("{method} on a scene with dampers"),
+            format!("{method} on a scene with {what}"),
             reason,
             "--method dop853, or gauss16 for a fixed step",
         ));
     }
     let on_branches = || match mechanism.law_without_potential() {
-        Some(name) => Err(NaturalError::Applied(name.to_owned())),
+        Some(name) => Err(NaturalError::WithoutPotential(name.to_owned())),
         None => Natural::new(std::sync::Arc::new(mechanism.clone())),
     };
     if matches!(method, MethodId::Rattle(_))

@@ -1,7 +1,7 @@
 //! Steps of fixed-step methods, how fast a scene moves at most, and what its events set in vain.
 
 use super::{Request, RequestRefusal, is_whole, usage};
-use crate::arithmetic::shown::order;
+use crate::arithmetic::shown::{order, plain};
 use crate::dynamics::Mechanism;
 use crate::dynamics::kernel::Kernel;
 use crate::run::methods::MethodId;
@@ -27,7 +27,8 @@ pub(super) fn fixed_step(
         if !whole {
             *every = until / (until / *every).ceil();
             notes.push(format!(
-                "the output interval is {every} s, so that the fixed steps end on the horizon"
+                "the output interval is {} s, so that the fixed steps end on the horizon",
+                plain(*every)
             ));
         }
         // Halves of the output interval are exact, so that its multiples are met to the last bit.
@@ -37,19 +38,25 @@ pub(super) fn fixed_step(
     if asked > until * (1.0 + 1e-9) {
         return Err(usage(
             "--step",
-            format!("{asked} s is longer than the horizon, {until} s"),
+            format!("{} s is longer than the horizon, {} s", plain(asked), plain(until)),
             "a shorter step",
         ));
     }
     let step = if is_whole(until, asked) { asked } else { until / (until / asked).ceil() };
     if step != asked {
         notes.push(format!(
-            "the step is {step} s instead of {asked} s, so that whole steps end on the horizon"
+            "the step is {} s instead of {} s, so that whole steps end on the horizon",
+            plain(step),
+            plain(asked)
         ));
     }
     let stride = (*every / step).round().max(1.0);
     if (stride * step - *every).abs() > 1e-9 * *every {
-        notes.push(format!("the output interval is {} s instead of {every} s: whole steps", stride * step));
+        notes.push(format!(
+            "the output interval is {} s instead of {} s: whole steps",
+            plain(stride * step),
+            plain(*every)
+        ));
     }
     *every = stride * step;
     Ok(step)

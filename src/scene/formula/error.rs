@@ -66,6 +66,9 @@ pub(crate) fn meant(name: &str, known: &[&str]) -> String {
             };
         }
     }
+    if name.eq_ignore_ascii_case("pi") {
+        return "did you mean pi?".into();
+    }
     match crate::scene::read::nearest(name, known.iter().copied()) {
         Some(near) => format!("did you mean {near}?"),
         None if known.is_empty() => "nothing has a name here".into(),

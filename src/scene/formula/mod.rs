@@ -177,8 +177,11 @@ impl Formula {
         self.conditions.len()
     }
 
-    /// An error at a name of this formula that nothing has.
-    pub fn unknown(&self, name: &str, known: &[&str]) -> FormulaError {
+    /// An error at a name of this formula that nothing has, unless it is that of a table.
+    pub fn unknown(&self, name: &str, known: &[&str], tables: &[Interpolant]) -> FormulaError {
+        if tables.iter().any(|table| table.name == name) {
+            return self.refused(name, format!("{name} is a table"), format!("write {name}(…)"));
+        }
         self.refused(name, format!("unknown name {name}"), meant(name, known))
     }
 

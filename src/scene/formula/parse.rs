@@ -148,12 +148,12 @@ impl<'a> Parser<'a> {
             }
             b'0'..=b'9' | b'.' => self.number(),
             b'a'..=b'z' | b'A'..=b'Z' | b'_' => self.name(),
-            _ => Err(self.error(
-                self.at,
-                self.at + 1,
-                "a number, a name or ( is missing here",
-                "operators are + - * / ^",
-            )),
+            _ => {
+                let is_power = byte == b'*' && self.text[..self.at].ends_with('*');
+                let hint =
+                    if is_power { "powers are written with ^, as x^2" } else { "operators are + - * / ^" };
+                Err(self.error(self.at, self.at + 1, "a number, a name or ( is missing here", hint))
+            }
         }
     }
 
@@ -219,9 +219,14 @@ impl<'a> Parser<'a> {
         let Some(b'a'..=b'z' | b'A'..=b'Z') = self.peek() else { return Ok(Vec::new()) };
         let (word, end) = self.word();
         let Some(first) = find(word) else {
-            let hint = meant(word, &super::unit::UNITS.iter().map(|unit| unit.name).collect::<Vec<_>>());
+            let hint = match word.contains('.') {
+                true => format!("write products with *, as in 2*{word}"),
+                false => {
+                    let units: Vec<&str> = super::unit::UNITS.iter().map(|unit| unit.name).collect();
+                    format!("{}; write products with *", meant(word, &units))
+                }
+            };
             let problem = format!("{word} is no unit");
-            let hint = format!("{hint}; write products with *");
             return Err(self.error(self.at, end, &problem, &hint));
         };
         self.at = end;

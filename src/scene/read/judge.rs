@@ -31,8 +31,15 @@ pub(super) fn check_name(
         return Err(source.refusal(span, path, "is no name for formulas", allowed, "for example \"k\""));
     }
     if RESERVED.contains(&name) || FUNCTIONS.iter().any(|function| function.0 == name) {
-        let hint = "t is time, length, rate and angle are those of the spring a formula belongs to";
-        return Err(source.refusal(span, path, "has a meaning of its own in formulas", allowed, hint));
+        let hint = match name {
+            "t" => "t is time: choose another name".to_owned(),
+            "pi" => "pi is the number 3.14159…: choose another name".to_owned(),
+            _ if RESERVED.contains(&name) => {
+                format!("{name} is that of the spring a formula belongs to: choose another name")
+            }
+            _ => format!("{name} is a function: choose another name"),
+        };
+        return Err(source.refusal(span, path, "has a meaning of its own in formulas", allowed, &hint));
     }
     if taken.contains(&name) {
         let allowed = "names must be different";
@@ -64,8 +71,12 @@ pub(super) fn fits(
     match dimension {
         Some(found) if !found.is(wanted) => {
             let unit = if quantity.unit.is_empty() { "a pure number" } else { quantity.unit };
+            let trimmed = formula.text().trim();
             let hint = match found.is(Dimension::of("")) {
-                true => format!("a number before it gives it the unit: 1*({})", formula.text().trim()),
+                true if quantity.unit.starts_with("rad/") && trimmed.ends_with("rad") => {
+                    format!("write {trimmed}{}", quantity.unit.replacen("rad", "", 1).replace('²', "^2"))
+                }
+                true => format!("a number before it gives it the unit: 1*({trimmed})"),
                 false if quantity.unit.is_empty() => "write it without a unit".to_owned(),
                 false => format!("write it in {unit}; numbers without a unit are in {unit} as well"),
             };

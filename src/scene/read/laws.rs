@@ -7,6 +7,7 @@ use super::names::BarNames;
 use super::resolve::Valued;
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, FieldShape, QuantityRange, SCENE};
+use crate::scene::formula::Formula;
 use crate::scene::formula::unit::Dimension;
 use crate::scene::law::{Integral, Load, LoadLaw, NamedPoint, Signal};
 use crate::scene::locate::{Located, Member, Value};
@@ -229,8 +230,10 @@ pub(super) fn check<'a>(root: &At<'a>, scene: &Scene, parameters: &[Valued]) -> 
     }
     // What was read stands in the file.
     let found = |at: Option<At<'a>>| at.unwrap_or_else(|| root.clone());
-    for signal in &scene.signals {
+    for (number, signal) in scene.signals.iter().enumerate() {
         let at = found(root.child("signals").and_then(|at| at.child(&signal.name)));
+        let later: Vec<&str> = scene.signals[number..].iter().map(|signal| signal.name.as_str()).collect();
+        is_in_order(&at, &signal.formula, &names, &later)?;
         let (bound, dimension) = judge(&at, &signal.formula, &names.alone(), None)?;
         names.signal(&signal.name, &bound, dimension);
     }
@@ -321,6 +324,21 @@ pub(super) fn judge(
         fits(&bound.formula, dimension, quantity).map_err(refused)?;
     }
     Ok((bound, dimension))
+}
+
+/// Refuses a signal that is made of itself or of `later` ones.
+fn is_in_order(at: &At, text: &str, names: &Names, later: &[&str]) -> Result<(), SceneError> {
+    let Ok(formula) = Formula::parse_with(text, names.tables()) else { return Ok(()) };
+    let Some(name) = formula.names().find(|name| later.contains(name)) else { return Ok(()) };
+    let (problem, hint) = match later.first() == Some(&name) {
+        true => (format!("{name} is made of itself"), "a signal is made of those before it".to_owned()),
+        false => {
+            let hint = format!("a signal is made of those before it: write {name} first");
+            (format!("{name} is a signal that comes later"), hint)
+        }
+    };
+    let error = formula.refused(name, problem, hint);
+    Err(refused(at.source, at.node.span, &at.path, "must be a formula", &error))
 }
 
 /// Refuses a potential that depends on time or rates.

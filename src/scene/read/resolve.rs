@@ -96,6 +96,7 @@ fn parameters(source: &Texts, tree: &Located, tables: &[Interpolant]) -> Result<
     }
     let mut order = InOrder {
         source,
+        tables,
         names: Vec::new(),
         formulas: Vec::new(),
         known: Vec::new(),
@@ -131,6 +132,7 @@ fn parameters(source: &Texts, tree: &Located, tables: &[Interpolant]) -> Result<
 /// Evaluates parameters after those they are made of.
 struct InOrder<'a> {
     source: &'a Texts,
+    tables: &'a [Interpolant],
     names: Vec<&'a str>,
     /// Path, place and formula of each; none of a number.
     formulas: Vec<(String, Span, Option<Formula>)>,
@@ -140,6 +142,21 @@ struct InOrder<'a> {
 }
 
 impl InOrder<'_> {
+    /// A name in the formula of parameter `number` that no parameter has.
+    fn unknown(&self, number: usize, formula: &Formula, name: &str) -> FormulaError {
+        if name == "t" || name.contains('.') {
+            let hint = "parameters are numbers; what changes with time and state is a signal";
+            return formula.refused(name, format!("unknown name {name}"), hint.into());
+        }
+        let others = self.names.iter().enumerate().filter(|(other, _)| *other != number);
+        let others: Vec<&str> = others.map(|(_, name)| *name).collect();
+        let mut error = formula.unknown(name, &others, self.tables);
+        if others.is_empty() && error.hint.starts_with("nothing") {
+            error.hint = "there is no other parameter".into();
+        }
+        error
+    }
+
     fn settle(&mut self, number: usize) -> Result<(), SceneError> {
         if self.known[number].is_some() {
             return Ok(());
@@ -154,7 +171,7 @@ impl InOrder<'_> {
             return Err(source.refusal(span, &path, &problem, &allowed, "give one of them as a number"));
         }
         let part = |name| self.names.iter().position(|known| *known == name);
-        let unknown = |name| refused(formula.unknown(name, &self.names));
+        let unknown = |name: &str| refused(self.unknown(number, &formula, name));
         let parts: Vec<usize> =
             formula.names().map(|name| part(name).ok_or_else(|| unknown(name))).collect::<Result<_, _>>()?;
         self.open.push(number);
@@ -309,7 +326,7 @@ impl Resolver<'_> {
                 let names = beside.iter().map(|known| known.0);
                 let known: Vec<&str> =
                     names.chain(self.parameters.iter().map(|known| known.name.as_str())).collect();
-                let mut error = formula.unknown(name, &known);
+                let mut error = formula.unknown(name, &known, self.tables);
                 if known.is_empty() {
                     error.hint =
                         "\"parameters\": {…} gives numbers names; numbers depend on these alone".into();
