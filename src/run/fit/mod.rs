@@ -391,8 +391,8 @@ fn chosen(scene: &Scene, data: &Data, request: &FitRequest) -> Result<(Vec<Outpu
         let bar = scene.bars.first().map_or("bar1", |bar| &bar.name);
         return Err(FitError::Data(format!(
             "{}: no column is named after an output or a quantity of the scene\nhint: quantities are angles, \
-                rates, points and forces, as {bar}.phi [rad]; for another one, as an energy, add an output by \
-                a formula (--output) and name the column after it",
+                rates, points and forces, as {bar}.phi [rad]; for another one, as an energy, add an output \
+                by a formula (--output) and name the column after it",
             data.source
         )));
     }
