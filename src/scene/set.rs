@@ -135,7 +135,8 @@ pub(super) fn put(
         Err(ShortNameError::NoKey { keys, hint, .. }) => {
             return Err(source.refusal(value.span, &set.path, "is not a known key", &keys, &hint));
         }
-        Err(ShortNameError::Unknown(hint)) if set.path.contains('.') => {
+        // A part and its key; whole paths have more.
+        Err(ShortNameError::Unknown(hint)) if set.path.matches('.').count() == 1 => {
             let allowed = "must begin with a key of the scene or the name of a part";
             return Err(source.refusal(value.span, &set.path, "does not exist", allowed, &hint));
         }
