@@ -116,6 +116,7 @@ impl<C: Scalar> Tree<C> {
     }
 
     /// The entries of translational coordinates; the twist holds conj(p) in the columns of x and y.
+    #[inline(always)]
     fn translational_mass_terms<T: Over<C>>(&self, z: &[Complex<T>], mass: &mut [T], twist: &mut [T]) {
         let (n, angles) = (self.coordinates, self.angles);
         for x in (angles..n).step_by(2) {
@@ -224,11 +225,16 @@ impl<C: Scalar> Tree<C> {
 /// Writes the reciprocal pivots; they come out non-finite or negative where M is not positive definite.
 #[inline(always)]
 pub fn factor<T: Scalar, const N: usize>(bodies: usize, mass: &mut [T], pivot: &mut [T]) {
-    factor_by::<T, N>(bodies, mass, pivot, |_, pivot| T::ONE / pivot);
+    let n = size::<N>(bodies);
+    let (mass, pivot) = (&mut mass[..n * n], &mut pivot[..n]);
+    for k in (0..n).rev() {
+        pivot[k] = T::ONE / mass[k * n + k];
+        eliminate(n, mass, k, pivot[k]);
+    }
 }
 
 /// The same of any symmetric matrix, `reciprocal` telling the reciprocal of a row's pivot, or zero where the
-/// row is left out.
+/// row is left out.  Not for vectors: where it is not inlined it calls each of their operations.
 #[inline(always)]
 pub fn factor_by<T: Scalar, const N: usize>(
     rows: usize,
@@ -240,12 +246,18 @@ pub fn factor_by<T: Scalar, const N: usize>(
     let (matrix, pivot) = (&mut matrix[..n * n], &mut pivot[..n]);
     for k in (0..n).rev() {
         pivot[k] = reciprocal(k, matrix[k * n + k]);
-        for i in 0..k {
-            let l = matrix[i * n + k] * pivot[k];
-            for j in 0..=i {
-                let full = matrix[j * n + k];
-                matrix[j * n + i] -= l * full;
-            }
+        eliminate(n, matrix, k, pivot[k]);
+    }
+}
+
+/// Takes row `k` out of those before it.
+#[inline(always)]
+fn eliminate<T: Scalar>(n: usize, matrix: &mut [T], k: usize, reciprocal: T) {
+    for i in 0..k {
+        let l = matrix[i * n + k] * reciprocal;
+        for j in 0..=i {
+            let full = matrix[j * n + k];
+            matrix[j * n + i] -= l * full;
         }
     }
 }

@@ -2,7 +2,7 @@
 
 mod scratch;
 use super::newton::Newton;
-use super::sums::{combine, largest, shifted, sum_of};
+use super::sums::{columns, combine, largest, shifted, sum_of};
 use super::tableau::{GaussTableau, lane};
 use super::{Gauss, IDLE_SWEEPS, MOST_SWEEPS, NEARLY, NEWTON_STEPS, SETTLED};
 use crate::arithmetic::DoubleDouble;
@@ -391,7 +391,7 @@ impl GaussStep<'_> {
     #[inline(always)]
     fn restage<L: Lanes>(&mut self, state: &State) {
         let scratch = &mut *self.scratch;
-        let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
+        let (even, odd) = (columns::<L>(&self.tableau.even), columns::<L>(&self.tableau.odd));
         for k in 0..state.y.len() {
             let [first, second] = scratch.increment[k].halves::<L>();
             let (sums, differences) = (first.add(second).array(), first.sub(second).array());
@@ -403,7 +403,7 @@ impl GaussStep<'_> {
                 across = odd[j].mul_add(L::splat(differences[j]), across);
             }
             let (middle, rest) = (L::splat(middle), L::splat(rest));
-            let moved = [across.add(up).add(rest), across.sub(up).add(rest)].map(|offset| middle.add(offset));
+            let moved = [middle.add(across.add(up).add(rest)), middle.add(across.sub(up).add(rest))];
             let before = scratch.points.y[k].halves::<L>();
             scratch.change[k] = largest([moved[0].sub(before[0]), moved[1].sub(before[1])]);
             scratch.points.y[k] = Octet::of(moved);
@@ -414,7 +414,7 @@ impl GaussStep<'_> {
     #[inline(always)]
     fn restage_exactly<L: Lanes>(&mut self, state: &State) {
         let scratch = &mut *self.scratch;
-        let (even, odd) = (self.tableau.even.map(L::of), self.tableau.odd.map(L::of));
+        let (even, odd) = (columns::<L>(&self.tableau.even), columns::<L>(&self.tableau.odd));
         for k in 0..state.y.len() {
             let ([first, second], [first_low, second_low]) =
                 (scratch.increment[k].halves::<L>(), scratch.increment_low[k].halves::<L>());

@@ -2,6 +2,12 @@
 
 use crate::arithmetic::lanes::Lanes;
 
+/// Four columns as vectors: written out, since a closure that is not inlined calls each operation.
+#[inline(always)]
+pub(super) fn columns<L: Lanes>(of: &[[f64; 4]; 4]) -> [L; 4] {
+    [L::of(of[0]), L::of(of[1]), L::of(of[2]), L::of(of[3])]
+}
+
 /// `middle + (across + up)` in pairs, the first by far the largest.
 #[inline(always)]
 pub(super) fn shifted<L: Lanes>(middle: (L, L), across: (L, L), up: (L, L)) -> (L, L) {
