@@ -401,7 +401,7 @@ fn turned_by(torque: &str) -> Scene {
 /// with r + 1/r the trace of the two solutions after a period.  Times that are no period are refused, although
 /// nothing acts where the bar starts.
 #[test]
-fn a_stiffness_that_swings_has_the_multipliers_of_mathieus_equation() {
+fn a_stiffness_that_varies_has_the_multipliers_of_mathieus_equation() {
     let scene = turned_by("-(3 + 2.5*cos(9.6*t))*b.sin");
     let period = TAU / 9.6;
     let slope = |t: f64, [x, v]: [f64; 2]| [v, -(25.0 + 125.0 / 6.0 * (9.6 * t).cos()) * x];
@@ -455,7 +455,7 @@ fn drives_that_do_not_repeat_themselves_have_no_period() {
     assert_eq!(found(&pulse, 0, Some(0.35)).expect("a search").motions.len(), 0);
 }
 
-/// A body on a vertical rail over a table that swings at 20 rad/s.  One impact a period: the product of the
+/// A body on a vertical rail over a table that oscillates at 20 rad/s.  One impact a period: the product of the
 /// multipliers is e^2.  Other periods are refused, and so is a drive beside that has none with the table.
 #[test]
 fn moving_walls_are_drives() {

@@ -7,6 +7,9 @@
 use super::sum::nearest;
 use super::{DoubleDouble, Real, Scalar};
 
+/// The angle that spreads its multiples evenly over a turn \[rad\]: no fraction of one.
+pub const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+
 /// Wraps one angle \[rad\] kept as `hi + lo`; returns the turns taken off.
 #[inline(always)]
 pub fn wrap(hi: &mut f64, lo: &mut f64) -> i64 {

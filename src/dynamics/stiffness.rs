@@ -67,10 +67,10 @@ impl Stiffness {
             found.slow = found.slow.max(slowest);
         }
         // No spring or damper feeds a mode.
-        if let (false, Some(mode)) = (
-            found.is_growing(),
-            fastest_spring(mechanism, time, phi, omega).filter(|mode| mode.rate >= SHARE * fastest),
-        ) {
+        if !found.is_growing()
+            && let Some(mode) = fastest_spring(mechanism, time, phi, omega)
+            && mode.rate >= SHARE * fastest
+        {
             found.culprit = Some(mode.name);
             (found.energy, found.share) = (Some(mode.energy), Some(mode.energy / mechanism.energy_scale));
         }

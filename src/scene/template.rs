@@ -177,19 +177,19 @@ impl Template {
     /// As [`variable`](Self::variable).
     pub fn unit(&self, path: &str) -> Result<String, SceneError> {
         let variable = self.variable(path)?;
+        if !variable.unit.is_empty() {
+            return Ok(variable.unit.to_owned());
+        }
         let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
         let formula = match tree.at(&variable.path).map(|node| &node.value) {
-            Some(Value::Text(text)) if variable.unit.is_empty() => Formula::parse(text).ok(),
+            Some(Value::Text(text)) => Formula::parse(text).ok(),
             _ => None,
         };
         let own = formula.as_ref().and_then(Formula::number_alone).and_then(|(_, unit)| unit);
-        Ok(own.map_or_else(
-            || variable.unit.to_owned(),
-            |unit| match unit.is(Dimension::NONE) {
-                true => "rad".to_owned(),
-                false => unit.unit(),
-            },
-        ))
+        Ok(own.map_or_else(String::new, |unit| match unit.is(Dimension::NONE) {
+            true => "rad".to_owned(),
+            false => unit.unit(),
+        }))
     }
 
     /// The value of a number as it is written in the scene, or given by an override, with or without a unit;

@@ -11,6 +11,7 @@
 //! As long as f does not depend on time the row does no work.
 
 use super::{ConstraintArguments, Linearised, Site};
+use crate::arithmetic::angle::GOLDEN_ANGLE;
 use crate::arithmetic::tape::{Slot, Symbol, Tape, number_of};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::Time;
@@ -44,9 +45,8 @@ impl AimInput {
     }
 }
 
-/// Places at which slopes are looked at for their sizes, and the angle that spreads them over a turn \[rad\].
+/// Places at which slopes are looked at for their sizes.
 const PLACES: usize = 8;
-const GOLDEN: f64 = 2.399_963_229_728_653;
 
 /// A formula of time and place with its derivatives.
 #[derive(Clone, Debug, PartialEq)]
@@ -178,7 +178,7 @@ impl Aim {
         let mut sizes: Vec<(usize, f64)> = self.coordinates().map(|k| (k, 0.0)).collect();
         let room = self.inputs.iter().filter_map(AimInput::coordinate).max().map_or(0, |most| most + 1);
         for place in 1..=PLACES {
-            let turn = |k: usize| (GOLDEN * (place * (k + 1)) as f64) % TAU - PI;
+            let turn = |k: usize| (GOLDEN_ANGLE * (place * (k + 1)) as f64) % TAU - PI;
             let z: Vec<Complex<f64>> = (0..room).map(|k| Complex::unit(turn(k))).collect();
             let mut phi: Vec<f64> = (0..room).map(turn).collect();
             for input in &self.inputs {

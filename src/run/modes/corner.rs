@@ -11,6 +11,7 @@
 
 use super::local::{Local, moving};
 use super::search::EquilibriumSearch;
+use crate::arithmetic::angle::GOLDEN_ANGLE;
 use nalgebra::{DMatrix, DVector};
 
 /// The distances h, of coordinates \[rad, units of length\] and of rates \[1/s of these\]: corners nearer
@@ -21,9 +22,8 @@ const DISTANCES: [f64; 2] = [1e-5, 1e-6];
 const KEPT: f64 = 0.5;
 /// What is left over the largest derivatives and accelerations where it may be what constraints are off by.
 const NOTICED: f64 = 1e-5;
-/// Mixed directions, and the step of their angles \[rad\], no fraction of a turn: the golden angle.
+/// Mixed directions.
 const MIXED: usize = 8;
-const GOLDEN: f64 = 2.399_963_229_728_653;
 
 impl EquilibriumSearch<'_> {
     /// True where the accelerations have a corner or a jump at an equilibrium, or derivatives that are not
@@ -91,7 +91,8 @@ impl EquilibriumSearch<'_> {
 /// Every axis of a space and mixed directions in it, both ways, the largest entry of each at most 1.
 fn directions(size: usize) -> Vec<DVector<f64>> {
     let axis = |j: usize| DVector::from_fn(size, |i, _| f64::from(u8::from(i == j)));
-    let mixed = |k: usize| DVector::from_fn(size, |i, _| (GOLDEN * ((k + 1) * (i + 1)) as f64).sin());
+    let mixed =
+        |k: usize| DVector::from_fn(size, |i, _| libm::sin(GOLDEN_ANGLE * ((k + 1) * (i + 1)) as f64));
     let all = (0..size).map(axis).chain((0..MIXED).map(mixed));
     all.flat_map(|direction| [-&direction, direction]).collect()
 }

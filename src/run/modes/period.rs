@@ -5,6 +5,7 @@
 
 use super::ModesError;
 use super::local::{Local, moving as moving_at};
+use crate::arithmetic::angle::GOLDEN_ANGLE;
 use crate::arithmetic::{Complex, Scalar};
 use crate::dynamics::constraint::{ConstraintArguments, ConstraintEquation, RowMeasure};
 use crate::dynamics::force::UserForce;
@@ -25,15 +26,13 @@ const LATER: [f64; 18] =
     [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 13.0, 21.0, 34.0, 55.0, 89.0, 144.0, 233.0, 377.0, 610.0, 987.0];
 /// Most periods after which laws are compared.
 const LATEST: f64 = 1e5;
-/// States in motion in which forces are compared, beside the start at rest, and the step of the angles they
-/// are spread by \[rad\].
+/// States in motion in which forces are compared, beside the start at rest.
 const IN_MOTION: usize = 3;
-const GOLDEN: f64 = 2.399_963_229_728_653;
 
 /// The frequencies of the sines of a law \[rad/s\].
 fn frequencies(law: &Law) -> impl Iterator<Item = f64> {
-    let swings = |sine: &&Sine| sine.amplitude != 0.0 && sine.frequency != 0.0;
-    law.sines.iter().filter(swings).map(|sine| sine.frequency)
+    let oscillates = |sine: &&Sine| sine.amplitude != 0.0 && sine.frequency != 0.0;
+    law.sines.iter().filter(oscillates).map(|sine| sine.frequency)
 }
 
 /// True where a law is not the same at all times, on its branches.
@@ -177,7 +176,8 @@ fn is_same(
 
 /// The start at rest, and states in motion in which forces of place and rates act as well.
 fn states(local: &Local, phi: &[f64]) -> Vec<[Vec<f64>; 2]> {
-    let spread = |number: usize, k: usize| local.unit[k] * (GOLDEN * (number * (k + 1)) as f64).sin();
+    let spread =
+        |number: usize, k: usize| local.unit[k] * libm::sin(GOLDEN_ANGLE * (number * (k + 1)) as f64);
     let still = [phi.to_vec(), vec![0.0; phi.len()]];
     let in_motion = (1..=IN_MOTION).map(|number| {
         let rate = |k: usize| spread(number + IN_MOTION, k) / local.mechanism.units.time;

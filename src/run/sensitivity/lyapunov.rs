@@ -23,7 +23,7 @@ use crate::dynamics::{Mechanism, Motion};
 use crate::run::driver::Pause;
 use crate::run::observer::Step;
 use crate::run::running::Outcome;
-use crate::run::trust::cannot_be_chaotic;
+use crate::run::trust::{TOO_SHORT, cannot_be_chaotic};
 use crate::scene::{Scene, Template};
 use serde::Serialize;
 
@@ -45,7 +45,6 @@ const ABOVE: f64 = 2.0;
 /// like; where nothing turns, growth or decay by a power does.
 const SHORT: f64 = 47.0;
 
-const TOO_SHORT: &str = "the run is too short to tell";
 const NEAR_UNSTABLE: &str = "small differences grow exponentially, as beside an unstable equilibrium, and a \
     single degree of freedom that nothing drives is not chaotic";
 

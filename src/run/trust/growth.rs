@@ -47,7 +47,8 @@ pub(super) struct Growth {
     pub why: Option<&'static str>,
 }
 
-const TOO_SHORT: &str = "the run is too short to tell";
+/// What is said of runs that end before a motion has shown what it is like.
+pub(in crate::run) const TOO_SHORT: &str = "the run is too short to tell";
 const NEITHER: &str = "it is neither exponential in both halves of the run nor a power of time";
 const NEAR_UNSTABLE: &str = "it does not follow a power of time in this run, and a single degree of freedom \
     that nothing drives is not chaotic";

@@ -40,7 +40,7 @@ mod torques;
 pub use distance::DistanceMetric;
 pub(super) use error_estimator::{ErrorEstimator, SavedEstimator};
 pub use flow::{Flow, FlowState, flow};
-pub(super) use growth::cannot_be_chaotic;
+pub(super) use growth::{TOO_SHORT, cannot_be_chaotic};
 pub use inputs::{Input, Inputs};
 use measured::LAST_DIGIT;
 pub(super) use measured::crossing;

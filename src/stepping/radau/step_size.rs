@@ -13,7 +13,7 @@ use crate::dynamics::State;
 use nalgebra::linalg::Schur;
 use nalgebra::{DMatrix, linalg::balancing::balance_parlett_reinsch};
 
-/// Share of its size by which an eigenvalue grows that is to be resolved: others swing.
+/// Share of its size by which an eigenvalue grows that is to be resolved: others oscillate.
 const GROWS: f64 = 0.1;
 /// Eigenvalues below this share of the largest are rounding.
 const ROUNDING: f64 = 1e-7;
@@ -79,12 +79,12 @@ mod tests {
 
     /// lambda² = a + b lambda by hand.
     #[test]
-    fn what_grows_is_found_beside_what_decays_and_swings() {
+    fn what_grows_is_found_beside_what_decays_and_oscillates() {
         for (modes, expected) in [
             // Fed, beside a stiff damper; twice, where no determinant changes its sign.
             ([[0.0, 3e8], [0.0, -1e10]], 3e8),
             ([[0.0, 3e8], [0.0, 3e8]], 3e8),
-            // A saddle, and a pair that grows while it swings: |lambda|² = 1e8.
+            // A saddle, and a pair that grows while it oscillates: |lambda|² = 1e8.
             ([[4e6, 0.0], [-9.0, -1.0]], 2e3),
             ([[-1e8, 1e4], [-1e6, -1e3]], 1e4),
             // Nothing grows, or by less than a tenth of its size.
