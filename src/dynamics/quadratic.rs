@@ -124,7 +124,7 @@ impl<C: Real> Quadratic<C> {
     pub fn power<T: Over<C>>(&self, m: usize, z: &[Complex<T>], n: usize) -> T {
         let linear = self.linear.iter().fold(T::ZERO, |sum, &(k, g)| sum + Complex::of(g).dot(z[m * n + k]));
         let product = |j: usize, k: usize, h: Complex<C>| {
-            (0..=m).fold(T::ZERO, |sum, l| sum + z[l * n + j].dot(z[(m - l) * n + k].turn(h)))
+            (0..m + 1).fold(T::ZERO, |sum, l| sum + z[l * n + j].dot(z[(m - l) * n + k].turn(h)))
         };
         self.bilinear.iter().fold(linear, |sum, &(j, k, h)| sum + product(j, k, h))
     }

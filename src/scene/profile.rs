@@ -70,7 +70,7 @@ impl Profile {
                 1 => T::ONE,
                 _ => T::ZERO,
             };
-            series.advance(&self.tape, m, |_| power);
+            series.advance(&self.tape, m, &|_| power);
         }
         series.of(self.results[0]).to_vec()
     }

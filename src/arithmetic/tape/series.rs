@@ -51,7 +51,7 @@ impl<T: Real> TapeSeries<T> {
     }
 
     /// Finds power `m` of all results, from that of the inputs and from all powers before.
-    pub fn advance(&mut self, tape: &Tape, m: usize, input: impl Fn(u32) -> T) {
+    pub fn advance(&mut self, tape: &Tape, m: usize, input: &dyn Fn(u32) -> T) {
         for (i, operation) in tape.operations.iter().enumerate() {
             let (before, rest) = self.powers.split_at_mut(i * self.stride);
             let (own, after) = rest.split_at_mut(self.stride);
@@ -117,10 +117,15 @@ impl<T: Real> TapeSeries<T> {
     }
 }
 
-/// Sum of the terms, from zero.
+/// Sum of the terms, from zero: a loop over numbers below an end is compiled with its terms, while a fold over
+/// an inclusive range calls each of them.
 #[inline(always)]
 fn sum<T: Real>(range: std::ops::RangeInclusive<usize>, term: impl Fn(usize) -> T) -> T {
-    range.fold(T::ZERO, |sum, j| sum + term(j))
+    let mut sum = T::ZERO;
+    for j in *range.start()..*range.end() + 1 {
+        sum += term(j);
+    }
+    sum
 }
 
 /// x / m; a reciprocal that is rounded once and used in every step would be a drift.

@@ -62,7 +62,7 @@ fn series_agree_with_differences_of_values_along_a_path() {
     let path = [[1.2, 0.9], [0.3, -0.2], [-0.1, 0.0], [0.0, 0.4]];
     let mut series = TapeSeries::<DoubleDouble>::new(&tape, 12);
     for m in 0..=12 {
-        series.advance(&tape, m, |input| {
+        series.advance(&tape, m, &|input| {
             DoubleDouble::of(path.get(m).map_or(0.0, |power| power[input as usize]))
         });
     }
@@ -138,6 +138,6 @@ fn powers_above_zero_are_zero_below() {
     }
     // The first powers are those of the value alone, as there is no series.
     let mut series = TapeSeries::<f64>::new(&tape, 3);
-    (0..=3).for_each(|m| series.advance(&tape, m, |_| [0.0, 1.0, 0.5, 0.0][m]));
+    (0..=3).for_each(|m| series.advance(&tape, m, &|_| [0.0, 1.0, 0.5, 0.0][m]));
     assert_eq!(series.of(slots[0]), [0.0; 4]);
 }

@@ -74,7 +74,7 @@ impl<T: Coefficient> Series<T> {
         for &(j, k, h) in &place.bilinear {
             for (m, power) in powers.iter_mut().enumerate() {
                 let term = |l: usize| self.z[l * n + j].dot(self.z[(m - l) * n + k].turn(h));
-                *power += (0..=m).fold(T::ZERO, |sum, l| sum + term(l)).value();
+                *power += (0..m + 1).fold(T::ZERO, |sum, l| sum + term(l)).value();
             }
         }
         if let Some(law) = &contact.row.law {

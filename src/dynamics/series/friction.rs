@@ -207,9 +207,10 @@ impl<T: SeriesNumber> FrictionSeries<T> {
         }
         let mut add = |push: &Option<ConstraintForce<T::Constant>>, multiplier: &dyn Fn(usize) -> T| {
             let Some(push) = push else { return };
-            let force = (0..=m).fold(Complex::ZERO, |sum, l| {
-                sum + direction(push, &z[(m - l) * n..(m - l + 1) * n], m - l).times(multiplier(l))
-            });
+            let mut force = Complex::ZERO;
+            for l in 0..m + 1 {
+                force += direction(push, &z[(m - l) * n..(m - l + 1) * n], m - l).times(multiplier(l));
+            }
             if let Some(body) = push.on {
                 needed[body] += force;
             }
@@ -316,7 +317,8 @@ impl<T: SeriesNumber> FrictionSeries<T> {
                 RowMeasure::Place(tangent) => tangent.power(m + 1, z, n).scale((m + 1) as f64),
             };
             place.speed.push(speed);
-            lost += (0..=m).fold(T::ZERO, |sum, l| sum + place.force[l] * place.speed[m - l]);
+            let of_powers = place.force[..=m].iter().zip(place.speed[..=m].iter().rev());
+            lost += of_powers.fold(T::ZERO, |sum, (&force, &speed)| sum + force * speed);
         }
         self.lost[m] = lost;
         lost

@@ -104,7 +104,7 @@ pub fn integral<T: Real>(series: &[T], first: usize, stride: usize, skip: usize,
     for m in (skip..count).rev() {
         sum = sum * h + series[first + m * stride] / T::of((m + 1) as f64);
     }
-    (0..=skip).fold(sum, |sum, _| sum * h)
+    (0..skip + 1).fold(sum, |sum, _| sum * h)
 }
 
 /// Rounds the numbers of one kind to those of another.

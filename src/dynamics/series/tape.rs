@@ -30,7 +30,7 @@ impl<T: Factored> TapePowers<T> {
     #[inline(always)]
     pub fn advance(&mut self, tape: &Tape, m: usize, scale: &Scale<T>, input: impl Fn(u32) -> T) {
         match self {
-            Self::Plain(series) => series.advance(tape, m, input),
+            Self::Plain(series) => series.advance(tape, m, &input),
             Self::Factored(series) => series.advance(tape, m, scale, input),
         }
     }

@@ -27,7 +27,7 @@ impl<T: SeriesNumber> FormulaSeries<T> {
         let part = &formula.parts[1];
         for m in 0..=order {
             let input = |number: u32| at.power(formula, formula.inputs[number as usize], m);
-            self.0.advance(&part.tape, m, input);
+            self.0.advance(&part.tape, m, &input);
         }
         part.torques.first().map_or(&[], |&(_, slot)| self.0.of(slot))
     }

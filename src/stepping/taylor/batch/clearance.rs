@@ -95,7 +95,7 @@ impl Clearance {
         let StepFrom { lane, order, length, time } = step;
         self.most.clear();
         self.most.extend((0..coordinates).map(|coordinate| {
-            (0..=order).rev().fold([0.0, 0.0], |[rate, slope], m| {
+            (0..order + 1).rev().fold([0.0, 0.0], |[rate, slope], m| {
                 [rate * length + series.rate_of(m, coordinate, lane).abs(), slope * length + rate]
             })
         }));

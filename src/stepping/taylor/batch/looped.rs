@@ -282,11 +282,11 @@ impl LaneKernel for LoopLanes {
             let at = body * ROOM + k;
             Complex::new(self.x[at].0[lane], self.y[at].0[lane])
         };
-        let vector = |h: f64| (0..=order + 1).rev().fold(Complex::ZERO, |sum, k| sum.times(h) + power(k));
+        let vector = |h: f64| (0..order + 2).rev().fold(Complex::ZERO, |sum, k| sum.times(h) + power(k));
         let (from, between, to) = (power(0), vector(0.5 * after), vector(after));
         let turned = |a: Complex<f64>, b: Complex<f64>| libm::atan2(a.cross(b), a.dot(b));
         let velocity =
-            (1..=order + 1).rev().fold(Complex::ZERO, |sum, k| sum.times(after) + power(k).times(k as f64));
+            (1..order + 2).rev().fold(Complex::ZERO, |sum, k| sum.times(after) + power(k).times(k as f64));
         let rate = to.cross(velocity) / to.norm_squared();
         (self.start(lane, body) + turned(from, between) + turned(between, to), rate)
     }

@@ -229,7 +229,7 @@ mod tests {
         let mut exact = TapeSeries::<DoubleDouble>::new(&tape, HIGHEST_ORDER);
         let mut results = vec![LawPowers::NONE; tape.len()];
         for m in 0..=HIGHEST_ORDER {
-            exact.advance(&tape, m, |number| DoubleDouble::from(inputs(number, m)));
+            exact.advance(&tape, m, &|number| DoubleDouble::from(inputs(number, m)));
             advance::<Portable>(tape.operations(), &mut results, m, |number| inputs(number, m));
             let (found, wanted) = (results[slots[0] as usize].at(m), exact.of(slots[0])[m].hi);
             assert!((found - wanted).abs() < 1e-13 * (1.0 + 2f64.powi(m as i32)), "{m}: {found} {wanted}");
