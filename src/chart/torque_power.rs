@@ -55,6 +55,52 @@ pub struct TorquePower {
     pub horizon: Option<f64>,
 }
 
+/// What one panel shows.
+struct Quantity {
+    /// A line for each motor, empty where it is shown elsewhere.
+    lines: Vec<Vec<Point>>,
+    /// Name of the axis.
+    name: &'static str,
+    unit: &'static str,
+}
+
+impl TorquePower {
+    /// The largest magnitude of a motor's power, or torque or force, with its time [s], where it is known.
+    fn peak(&self, motor: usize, is_power: bool) -> Option<[f64; 2]> {
+        self.peaks.get(motor).and_then(|both| both[usize::from(is_power)])
+    }
+
+    /// The values of a motor against time, the known largest one among them.
+    fn line(&self, motor: usize, is_power: bool) -> Vec<Point> {
+        let own = &self.motors[motor];
+        let values = if is_power { &own.power } else { &own.torque };
+        let peak = self.peak(motor, is_power).map(|[value, t]| [t, value]);
+        let mut points: Vec<Point> = own.time.iter().zip(values).map(|(&t, &v)| [t, v]).chain(peak).collect();
+        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        points
+    }
+
+    /// Torques, forces and powers, of the first two those that motors have.
+    fn quantities(&self) -> Vec<Quantity> {
+        let motors = || 0..self.motors.len();
+        let pushes = |motor: usize| self.sliders.contains(&motor);
+        let loads = |of_sliders: bool| {
+            let line = |motor| if pushes(motor) == of_sliders { self.line(motor, false) } else { Vec::new() };
+            motors().map(line).collect()
+        };
+        let mut quantities = Vec::with_capacity(3);
+        if self.sliders.is_empty() || motors().any(|motor| !pushes(motor)) {
+            quantities.push(Quantity { lines: loads(false), name: "torque [N·m]", unit: "N·m" });
+        }
+        if !self.sliders.is_empty() {
+            quantities.push(Quantity { lines: loads(true), name: "force [N]", unit: "N" });
+        }
+        let powers = motors().map(|motor| self.line(motor, true)).collect();
+        quantities.push(Quantity { lines: powers, name: "power [W]", unit: "W" });
+        quantities
+    }
+}
+
 /// What a third panel adds to the height of the page \[pt\].
 const HIGHER: f64 = 110.0;
 
@@ -64,51 +110,31 @@ const HIGHER: f64 = 110.0;
 /// # Errors
 /// [`ChartError`] if the resolution is out of range or drawing fails.
 pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, ChartError> {
-    let sliders = &chart.sliders;
-    let is_kept =
-        |force: Option<bool>, motor: usize| force.is_none_or(|force| sliders.contains(&motor) == force);
-    let known = |motor: usize, which: usize| chart.peaks.get(motor).and_then(|both| both[which]);
-    let data = |values: fn(&MotorSeries) -> &Vec<f64>, force: Option<bool>| -> Vec<Vec<Point>> {
-        let line = |(k, motor): (usize, &MotorSeries)| {
-            let peak = known(k, usize::from(force.is_none())).map(|[value, t]| [t, value]);
-            let points = motor.time.iter().zip(values(motor)).map(|(&t, &v)| [t, v]).chain(peak);
-            let mut points: Vec<Point> = points.filter(|_| is_kept(force, k)).collect();
-            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            points
-        };
-        chart.motors.iter().enumerate().map(line).collect()
-    };
-    let mut rows = Vec::with_capacity(3);
-    if sliders.is_empty() || (0..chart.motors.len()).any(|motor| is_kept(Some(false), motor)) {
-        rows.push((data(|motor| &motor.torque, Some(false)), "torque [N·m]", "N·m"));
-    }
-    if !sliders.is_empty() {
-        rows.push((data(|motor| &motor.torque, Some(true)), "force [N]", "N"));
-    }
-    rows.push((data(|motor| &motor.power, None), "power [W]", "W"));
-    let size = [PAGE[0], PAGE[1] + (rows.len() - 2) as f64 * HIGHER];
+    let quantities = chart.quantities();
+    let size = [PAGE[0], PAGE[1] + (quantities.len() - 2) as f64 * HIGHER];
     let sheet = Sheet::new(size, px_per_pt)?;
     let marks = marks(chart.motors.iter().map(|motor| motor.name.as_str()));
     let several = chart.motors.len() > 1;
     let labels = shortened_apart(&sheet, chart.motors.iter().map(|motor| motor.name.as_str()));
 
-    let powers = rows.iter().flat_map(|row| &row.0);
-    let x = Axis::tight("time [s]", powers.flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
+    let all = quantities.iter().flat_map(|quantity| &quantity.lines);
+    let x = Axis::tight("time [s]", all.flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
     // Zero belongs to both: its line parts driving from braking.
-    let y = |row: &(Vec<Vec<Point>>, &str, &str)| {
-        Axis::fit(row.1, row.0.iter().flatten().map(|p| p[1]).chain(zero(&row.0)))
+    let y = |Quantity { lines, name, .. }: &Quantity| {
+        Axis::fit(name, lines.iter().flatten().map(|p| p[1]).chain(zero(lines)))
     };
     let mut caption = chart.caption.clone();
     let crowded = {
         // Tried on a page of its own: the caption has to be known before the panels have their places.
         let trial = Sheet::new(size, 0.5)?;
-        let panels = stacked(&trial, 40.0, &x, rows.iter().map(y).collect(), 20.0)?;
-        panels.iter().zip(&rows).any(|(panel, row)| row.0.iter().any(|line| panel.crowded(line)))
+        let panels = stacked(&trial, 40.0, &x, quantities.iter().map(y).collect(), 20.0)?;
+        let mut pairs = panels.iter().zip(&quantities);
+        pairs.any(|(panel, quantity)| quantity.lines.iter().any(|line| panel.crowded(line)))
     };
-    let marked: Vec<bool> = (rows.iter().filter(|row| row.0.len() <= MARKED))
-        .flat_map(|row| row.0.iter().enumerate().map(move |(motor, line)| (row.2, motor, line)))
-        .filter(|(.., line)| top(line).is_some())
-        .map(|(unit, motor, _)| known(motor, usize::from(unit == "W")).is_some())
+    let marked: Vec<bool> = (quantities.iter().filter(|quantity| quantity.lines.len() <= MARKED))
+        .flat_map(|quantity| quantity.lines.iter().enumerate().map(move |line| (quantity.unit, line)))
+        .filter(|(_, (_, line))| top(line).is_some())
+        .map(|(unit, (motor, _))| chart.peak(motor, unit == "W").is_some())
         .collect();
     let exact = marked.iter().filter(|&&is_known| is_known).count();
     let largest = LARGEST[usize::from(exact > 0) + usize::from(exact == marked.len())];
@@ -117,9 +143,9 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     caption.push(said.join(", "));
     let under = sheet.heading(&chart.title, &caption)?;
     let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
-    let panels = stacked(&sheet, under, &x, rows.iter().map(y).collect(), right)?;
+    let panels = stacked(&sheet, under, &x, quantities.iter().map(y).collect(), right)?;
     let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
-    for (k, (panel, (lines, _, unit))) in panels.iter().zip(&rows).enumerate() {
+    for (k, (panel, Quantity { lines, unit, .. })) in panels.iter().zip(&quantities).enumerate() {
         panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
         let own = MarkStyle {
             colour: if *unit == "W" { VERMILLION } else { BLUE },

@@ -55,6 +55,18 @@ impl Default for Cost {
     }
 }
 
+impl Cost {
+    /// The name of the axis and what costs up to the largest are multiplied by on it.
+    fn axis(&self, largest: f64) -> (String, f64) {
+        match self {
+            Self::Time(name) if largest < 0.02 => (format!("{name} [µs]"), 1e6),
+            Self::Time(name) if largest < 20.0 => (format!("{name} [ms]"), 1e3),
+            Self::Time(name) => (format!("{name} [s]"), 1.0),
+            Self::Count(name) => (name.clone(), 1.0),
+        }
+    }
+}
+
 /// Error of several methods against what they cost.
 #[derive(Clone, Debug, Default)]
 pub struct WorkPrecision {
@@ -88,12 +100,7 @@ pub fn work_precision(chart: &WorkPrecision, px_per_pt: f64) -> Result<Picture, 
     let usable = |p: &&[f64; 2]| p[0] > 0.0 && p[0] <= 1e300 && p[1] >= 0.0 && p[1] <= 1e300;
     let largest =
         chart.series.iter().flat_map(|s| &s.points).filter(usable).map(|p| p[0]).fold(0.0, f64::max);
-    let (name, scale) = match &chart.cost {
-        Cost::Time(name) if largest < 0.02 => (format!("{name} [µs]"), 1e6),
-        Cost::Time(name) if largest < 20.0 => (format!("{name} [ms]"), 1e3),
-        Cost::Time(name) => (format!("{name} [s]"), 1.0),
-        Cost::Count(name) => (name.clone(), 1.0),
-    };
+    let (name, scale) = chart.cost.axis(largest);
     let lost = chart.lost.filter(|&value| value > 0.0 && value < 1e299);
     let most = lost.map_or(f64::INFINITY, |lost| 10.0 * lost);
     let points: Vec<Vec<Point>> = chart
