@@ -4,21 +4,18 @@
 //! choose, the *modes*; a run that meets a zero of a condition ends its step there and records the laws anew
 //! on the other branch, so that no method ever steps across a corner.
 
+mod binding;
 mod dependence;
 mod there;
 
-use super::law::{Acts, ForceLaw};
+use super::law::ForceLaw;
 use crate::arithmetic::Scalar;
 use crate::arithmetic::scratch::with_copies;
 use crate::arithmetic::tape::Symbol;
 use crate::dynamics::constraint::{Aim, Site};
-use crate::dynamics::forest::Forest;
 use crate::dynamics::{CompileError, Configuration};
 use crate::scene::formula::{Formula, Numbers, Origin};
-use crate::scene::{
-    Bound, Coupled, Coupling, Decimal, Direction, Load, Meaning, Names, Parameter, Place, PointTable, Scene,
-    Scope, Wall,
-};
+use crate::scene::{Decimal, Direction, Meaning};
 use std::sync::Arc;
 
 /// From the first point to the second: the vector and its length.
@@ -180,6 +177,9 @@ pub(crate) struct DrivenPart {
 /// An aim and what has it.
 pub(crate) type PlacedAim<'a, C> = (&'a DrivenPart, Arc<Aim<C>>);
 
+/// An aim with what has it and the angles it is of.
+type AngleAim<C> = (DrivenPart, Vec<usize>, Expression<C>);
+
 /// All formulas of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Formulas<C = f64> {
@@ -190,171 +190,14 @@ pub(crate) struct Formulas<C = f64> {
     /// Laws of motors and walls that are formulas.
     pub(super) profiles: Vec<(DrivenPart, Expression<C>)>,
     /// Aims of motors and walls that depend on the mechanism, with the angles they are of.
-    aims: Vec<(DrivenPart, Vec<usize>, Expression<C>)>,
+    aims: Vec<AngleAim<C>>,
     /// Events.
     pub events: Vec<FormulaEvent<C>>,
     /// What each condition is part of, for messages.
     pub conditions: Vec<String>,
 }
 
-/// Collects expressions and numbers their conditions.
-struct Binder<'a, C> {
-    forest: &'a Forest<C>,
-    tables: &'a [PointTable<C>],
-    /// Parameters above zero that no event sets.
-    positive: Vec<bool>,
-    conditions: Vec<String>,
-}
-
-impl<C: Decimal> Binder<'_, C> {
-    fn bind(scope: &Scope<C>, text: &str, owner: &str) -> Result<Bound<C>, CompileError> {
-        let unsound = |error| CompileError::Unsound(format!("formula of `{owner}`: {error}"));
-        scope.bind(text).map(|(bound, _)| bound).map_err(unsound)
-    }
-
-    /// Numbers the conditions of a formula and finds its points.
-    fn placed(&mut self, Bound { mut formula, meanings }: Bound<C>, owner: &str) -> Expression<C> {
-        let is_positive = |parameter: usize| self.positive.get(parameter) == Some(&true);
-        formula.note_exponents(
-            |name| matches!(meanings[name], Meaning::Parameter(parameter) if is_positive(parameter)),
-        );
-        let first = self.conditions.len();
-        self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
-        let site = |place| self.forest.site(&place);
-        let meanings = meanings.into_iter().map(|meaning| meaning.with_points(site)).collect();
-        let numbers = C::HAS_CONSTANTS.then(|| Box::new(Numbers::of(&formula, self.tables)));
-        Expression { formula, meanings, numbers, first }
-    }
-
-    fn expression(
-        &mut self,
-        scope: &Scope<C>,
-        text: &str,
-        owner: &str,
-    ) -> Result<Expression<C>, CompileError> {
-        let bound = Self::bind(scope, text, owner)?;
-        Ok(self.placed(bound, owner))
-    }
-}
-
 impl<C: Decimal> Formulas<C> {
-    /// Those of a scene; `None` where it has none.
-    pub fn of(scene: &Scene<C>, forest: &Forest<C>) -> Result<Option<Self>, CompileError> {
-        let motors = (scene.motors.iter().map(|motor| (&motor.name, Some(&motor.law), false)))
-            .chain(scene.drives.iter().map(|drive| (&drive.name, Some(&drive.law), false)))
-            .chain(scene.walls.iter().map(|wall| (&wall.name, wall.law.as_ref(), true)));
-        let driven: Vec<_> = motors
-            .filter_map(|(name, law, is_wall)| {
-                Some((DrivenPart { name: name.clone(), is_wall }, law?.profile.as_ref()?))
-            })
-            .collect();
-        let is_plain = scene.laws.is_empty()
-            && scene.couplings.is_empty()
-            && scene.walls.iter().all(|wall| wall.aim.is_none());
-        if is_plain && scene.events.is_empty() && driven.is_empty() {
-            return Ok(None);
-        }
-        let mut names = Names::of(scene);
-        let is_set =
-            |name: &String| scene.events.iter().any(|event| event.set.iter().any(|(set, _)| set == name));
-        let is_positive =
-            |parameter: &Parameter<C>| parameter.value.value() > 0.0 && !is_set(&parameter.name);
-        let positive = scene.parameters.iter().map(is_positive).collect();
-        let mut binder = Binder { forest, tables: &scene.tables, positive, conditions: Vec::new() };
-        let mut signals = Vec::new();
-        for signal in &scene.signals {
-            let bound = Binder::bind(&names.alone(), &signal.formula, &signal.name)?;
-            names.signal(&signal.name, &bound, None);
-            signals.push(binder.placed(bound, &signal.name));
-        }
-        let mut laws = Vec::new();
-        for law in &scene.laws {
-            let scope = names.within(&law.load);
-            let mut expression = |text: &str| binder.expression(&scope, text, &law.name);
-            let (potential, place) = match &law.load {
-                Load::Force { bar, point, force: [x, y], follows } => {
-                    let site = forest.site(&Place { bar: Some(*bar), point: *point });
-                    let force = Box::new([expression(x)?, expression(y)?]);
-                    (None, Acts::Point { site, follows: *follows, force })
-                }
-                Load::Torque { bar, relative_to, torque } => {
-                    let torque = expression(torque)?;
-                    (None, Acts::Torque { body: *bar, base: *relative_to, torque })
-                }
-                Load::Spring { between, potential, tension } => {
-                    let sites = between.each_ref().map(|place| forest.site(place));
-                    let potential = potential.as_deref().map(&mut expression).transpose()?;
-                    let tension = tension.as_deref().map(&mut expression).transpose()?;
-                    (potential, Acts::Span { sites, tension })
-                }
-                Load::TorsionSpring { bar, relative_to, potential, torque } => {
-                    let potential = potential.as_deref().map(&mut expression).transpose()?;
-                    let place = match torque {
-                        Some(torque) => Acts::Torque {
-                            body: *bar,
-                            base: *relative_to,
-                            torque: expression(&format!("-({torque})"))?,
-                        },
-                        None => Acts::Nowhere,
-                    };
-                    (potential, place)
-                }
-                Load::Potential { energy } => (Some(expression(energy)?), Acts::Nowhere),
-            };
-            laws.push(ForceLaw { name: law.name.clone(), potential, place });
-        }
-        let mut profiles = Vec::new();
-        for (part, profile) in driven {
-            let expression = binder.expression(&names.alone(), profile.text(), &part.name)?;
-            profiles.push((part, expression));
-        }
-        let mut aims = Vec::new();
-        for Coupling { name, coupled, aim } in &scene.couplings {
-            let angles = match *coupled {
-                Coupled::Angle { bar, relative_to } => std::iter::once(bar).chain(relative_to).collect(),
-                Coupled::Travel(_) => Vec::new(),
-            };
-            let part = DrivenPart { name: name.clone(), is_wall: false };
-            aims.push((part, angles, binder.expression(&names.alone(), aim, name)?));
-        }
-        for Wall { name, aim, .. } in &scene.walls {
-            let Some(aim) = aim else { continue };
-            let part = DrivenPart { name: name.clone(), is_wall: true };
-            aims.push((part, Vec::new(), binder.expression(&names.alone(), aim, name)?));
-        }
-        let mut whens = Vec::new();
-        let of_laws = binder.conditions.len();
-        for event in &scene.events {
-            whens.push(binder.expression(&names.alone(), &event.when, &event.name)?);
-        }
-        let mut conditions = std::mem::take(&mut binder.conditions);
-        if !C::HAS_CONSTANTS {
-            // In doubles the functions of events are never extended beyond their corners.
-            conditions.truncate(of_laws);
-        }
-        let parameter = |name: &String| scene.parameters.iter().position(|known| known.name == *name);
-        let mut events = Vec::new();
-        for (event, when) in scene.events.iter().zip(whens) {
-            let mut set = Vec::new();
-            for (name, text) in &event.set {
-                let number = parameter(name)
-                    .ok_or_else(|| CompileError::Unsound(format!("event `{}` sets {name}", event.name)))?;
-                set.push((number, binder.expression(&names.alone(), text, &event.name)?));
-            }
-            events.push(FormulaEvent {
-                name: event.name.clone(),
-                when,
-                direction: event.direction,
-                stop: event.stop,
-                on: event.on.clone(),
-                off: event.off.clone(),
-                set,
-            });
-        }
-        let parameters = scene.parameters.iter().map(|parameter| parameter.value).collect();
-        Ok(Some(Self { parameters, signals, laws, profiles, aims, events, conditions }))
-    }
-
     /// Calls `then` with the signals on the branches that `modes` say.
     pub(super) fn with_signals<S: Scalar, R>(
         &self,
@@ -415,7 +258,7 @@ impl<C: Decimal> Formulas<C> {
     /// # Errors
     /// One that depends on rates.
     pub fn aims(&self, parameters: &[C], modes: &[bool]) -> Result<Vec<PlacedAim<'_, C>>, CompileError> {
-        let aim = |(part, angles, expression): &'_ (DrivenPart, Vec<usize>, Expression<C>)| {
+        let aim = |(part, angles, expression): &'_ AngleAim<C>| {
             let formula = |at: &Configuration<Symbol, C>| {
                 self.with_signals(at, parameters, modes, |signals| {
                     expression.evaluated(at, parameters, signals, modes)

@@ -55,22 +55,29 @@ pub fn times(block: &Block, x: Complex<f64>) -> Complex<f64> {
     Complex::new(block[0] * x.re + block[1] * x.im, block[2] * x.re + block[3] * x.im)
 }
 
-impl ReducedMatrices {
-    /// Of a mechanism and its linear rows; the error is the body whose pivot vanishes.
-    pub fn new(mechanism: &Mechanism, linear: Vec<LinearRow>) -> Result<Self, usize> {
-        let n = mechanism.coordinates();
-        let inverse = invert(mechanism)?;
+type Vectors = Vec<Vec<Complex<DoubleDouble>>>;
+
+/// Linear rows made orthonormal in the metric of D⁻¹: C = T Q.
+#[derive(Default)]
+struct OrthonormalRows {
+    /// Those that do not depend on the ones before them.
+    rows: Vec<LinearRow>,
+    /// D⁻¹ q of each row q of Q.
+    spreads: Vectors,
+    /// The rows of T, each up to its diagonal.
+    shares: Vec<Vec<DoubleDouble>>,
+}
+
+impl OrthonormalRows {
+    /// Of all linear rows, with D⁻¹ (n × n).
+    fn of(linear: Vec<LinearRow>, inverse: &[Complex<DoubleDouble>], n: usize) -> Self {
         let spread = |x: &[Complex<DoubleDouble>]| -> Vec<Complex<DoubleDouble>> {
             inverse
                 .chunks(n)
                 .map(|row| row.iter().zip(x).fold(Complex::ZERO, |sum, (&w, &x)| sum + w * x))
                 .collect()
         };
-        // Orthonormal rows q as D⁻¹ q, and how the rows are made of them: C = T Q.
-        let mut rows = Vec::new();
-        type Vectors = Vec<Vec<Complex<DoubleDouble>>>;
-        let (mut basis, mut spreads) = (Vectors::new(), Vectors::new());
-        let mut shares: Vec<Vec<DoubleDouble>> = Vec::new();
+        let (mut found, mut basis) = (Self::default(), Vectors::new());
         for row in linear {
             let mut rest = vec![Complex::<DoubleDouble>::ZERO; n];
             for &(k, g) in &row.place.linear {
@@ -80,7 +87,7 @@ impl ReducedMatrices {
             let mut share = vec![DoubleDouble::ZERO; basis.len()];
             // Twice, so that what rounding leaves of the first round goes.
             for _ in 0..2 {
-                for ((q, minv_jt), share) in basis.iter().zip(&spreads).zip(&mut share) {
+                for ((q, minv_jt), share) in basis.iter().zip(&found.spreads).zip(&mut share) {
                     let part = dot(minv_jt, &rest);
                     *share += part;
                     for (rest, &q) in rest.iter_mut().zip(q) {
@@ -100,43 +107,22 @@ impl ReducedMatrices {
             };
             share.push(length);
             basis.push(unit(&rest));
-            spreads.push(unit(&minv_jt));
-            shares.push(share);
-            rows.push(row);
+            found.spreads.push(unit(&minv_jt));
+            found.shares.push(share);
+            found.rows.push(row);
         }
-        // R = (D⁻¹ Qᵀ) T⁻¹, from the last column to the first.
-        let count = rows.len();
-        let mut back = spreads.clone();
-        for j in (0..count).rev() {
-            let divisor = DoubleDouble::ONE / shares[j][j];
-            for k in 0..n {
-                back[j][k] = back[j][k].times(divisor);
-            }
-            for i in 0..j {
-                for k in 0..n {
-                    let part = back[j][k].times(shares[j][i]);
-                    back[i][k] -= part;
-                }
-            }
-        }
-        let mut blocks = vec![[0.0; 4]; n * n];
-        for i in 0..n {
-            for j in i..n {
-                let w = inverse[i * n + j];
-                let mut block = [w.re, -w.im, w.im, w.re];
-                for q in &spreads {
-                    let (a, b) = (q[i], q[j]);
-                    let parts = [a.re * b.re, a.re * b.im, a.im * b.re, a.im * b.im];
-                    for (entry, part) in block.iter_mut().zip(parts) {
-                        *entry -= part;
-                    }
-                }
-                let [xx, xy, yx, yy] = block.map(|entry| entry.hi);
-                blocks[i * n + j] = [xx, xy, yx, yy];
-                blocks[j * n + i] = [xx, yx, xy, yy];
-            }
-            blocks[i * n + i][2] = blocks[i * n + i][1];
-        }
+        found
+    }
+}
+
+impl ReducedMatrices {
+    /// Of a mechanism and its linear rows; the error is the body whose pivot vanishes.
+    pub fn new(mechanism: &Mechanism, linear: Vec<LinearRow>) -> Result<Self, usize> {
+        let n = mechanism.coordinates();
+        let inverse = invert(mechanism)?;
+        let OrthonormalRows { rows, spreads, shares } = OrthonormalRows::of(linear, &inverse, n);
+        let back = put_back(spreads.clone(), &shares);
+        let blocks = reduce(&inverse, &spreads, n);
         let plain = |x: &Complex<DoubleDouble>| Complex::new(x.re.hi, x.im.hi);
         Ok(Self {
             elements: n,
@@ -177,6 +163,46 @@ impl ReducedMatrices {
             *x = Complex::new(x.re + -change.re, x.im + -change.im);
         }
     }
+}
+
+/// R = (D⁻¹ Qᵀ) T⁻¹ from D⁻¹ Qᵀ and T, from the last column to the first.
+fn put_back(mut back: Vectors, shares: &[Vec<DoubleDouble>]) -> Vectors {
+    for j in (0..shares.len()).rev() {
+        let divisor = DoubleDouble::ONE / shares[j][j];
+        for entry in &mut back[j] {
+            *entry = entry.times(divisor);
+        }
+        for i in 0..j {
+            for k in 0..back[j].len() {
+                let part = back[j][k].times(shares[j][i]);
+                back[i][k] -= part;
+            }
+        }
+    }
+    back
+}
+
+/// W, block by block: D⁻¹ less (D⁻¹ Qᵀ)(D⁻¹ Qᵀ)ᵀ.
+fn reduce(inverse: &[Complex<DoubleDouble>], spreads: &[Vec<Complex<DoubleDouble>>], n: usize) -> Vec<Block> {
+    let mut blocks = vec![[0.0; 4]; n * n];
+    for i in 0..n {
+        for j in i..n {
+            let w = inverse[i * n + j];
+            let mut block = [w.re, -w.im, w.im, w.re];
+            for q in spreads {
+                let (a, b) = (q[i], q[j]);
+                let parts = [a.re * b.re, a.re * b.im, a.im * b.re, a.im * b.im];
+                for (entry, part) in block.iter_mut().zip(parts) {
+                    *entry -= part;
+                }
+            }
+            let [xx, xy, yx, yy] = block.map(|entry| entry.hi);
+            blocks[i * n + j] = [xx, xy, yx, yy];
+            blocks[j * n + i] = [xx, yx, xy, yy];
+        }
+        blocks[i * n + i][2] = blocks[i * n + i][1];
+    }
+    blocks
 }
 
 /// Rate of a linear row.
