@@ -29,7 +29,7 @@ use crate::dynamics::kernel::{Bias, Kernel};
 use crate::dynamics::output::{Moment, OutputScratch};
 use crate::dynamics::{Mechanism, Motion};
 use crate::scene::Scene;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 /// What there is to know of a moment.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -275,71 +275,56 @@ fn contacts(
     contacts
 }
 
+/// One JSON object of all of them, by their names.
+fn by_name<'a, T>(all: impl IntoIterator<Item = T>, entry: impl Fn(T) -> (&'a String, Value)) -> Value {
+    let entries = all.into_iter().map(entry).map(|(name, told)| (name.clone(), told));
+    Value::Object(entries.collect())
+}
+
+impl Reaction {
+    /// What a constraint exerts, beside its multiplier, its violation and the rate of that.
+    fn object(&self, [multiplier, position, velocity]: [f64; 3]) -> Value {
+        let mut told = json!({
+            "multiplier": multiplier,
+            "position": position,
+            "velocity": velocity,
+            "unit": self.unit,
+            "unit_of_multiplier": self.unit_of_multiplier,
+            "on": self.on,
+            "from": self.from,
+            "determinate": self.is_determinate,
+        });
+        match (self.torque, self.force) {
+            (Some(torque), _) => told["torque"] = json!(torque),
+            (None, force) => told["force"] = json!(force),
+        }
+        told
+    }
+}
+
 impl Inspection {
     /// The report as one JSON object.
     pub fn object(&self, scene: &Scene) -> Value {
-        let bodies: Map<String, Value> = self
-            .bodies
-            .iter()
-            .map(|(name, [x, y, phi])| (name.clone(), json!({"x": x, "y": y, "phi": phi})))
-            .collect();
-        let constraints: Map<String, Value> = (self.constraints.iter().zip(&self.reactions))
-            .map(|((name, [multiplier, position, velocity]), reaction)| {
-                let mut told = json!({
-                    "multiplier": multiplier,
-                    "position": position,
-                    "velocity": velocity,
-                    "unit": reaction.unit,
-                    "unit_of_multiplier": reaction.unit_of_multiplier,
-                    "on": reaction.on,
-                    "from": reaction.from,
-                    "determinate": reaction.is_determinate,
-                });
-                match (reaction.torque, reaction.force) {
-                    (Some(torque), _) => told["torque"] = json!(torque),
-                    (None, force) => told["force"] = json!(force),
-                }
-                (name.clone(), told)
-            })
-            .collect();
-        let motors: Map<String, Value> = (self.motors.iter())
-            .map(|(name, [torque, power])| {
-                let reaction = self.reaction(name);
-                let told = json!({
-                    "torque": torque,
-                    "power": power,
-                    "unit": reaction.map(|reaction| reaction.unit_of_multiplier),
-                    "determinate": reaction.and_then(|reaction| reaction.is_determinate),
-                });
-                (name.clone(), told)
-            })
-            .collect();
-        let hinges: Map<String, Value> = (self.hinges.iter())
-            .map(|hinge| {
-                let told = json!({"force": hinge.force, "on": hinge.on, "from": hinge.from,
-                    "determinate": hinge.is_determinate});
-                (hinge.name.clone(), told)
-            })
-            .collect();
-        let walls: Map<String, Value> = (self.walls.iter())
-            .map(|wall| {
-                let impact = wall.impact.as_ref().map(|impact| {
-                    let after: Map<String, Value> = self
-                        .bodies
-                        .iter()
-                        .zip(&impact.omega)
-                        .map(|((name, _), omega)| (name.clone(), json!(omega)))
-                        .collect();
-                    json!({
-                        "impulse": impact.impulse,
-                        "energy_lost": impact.energy_lost,
-                        "motor_work": impact.motor_work,
-                        "omega_after": after,
-                    })
-                });
-                (wall.name.clone(), json!({"gap": wall.gap, "approach": wall.approach, "impact": impact}))
-            })
-            .collect();
+        let bodies = by_name(&self.bodies, |(name, [x, y, phi])| (name, json!({"x": x, "y": y, "phi": phi})));
+        let constraints = by_name(self.constraints.iter().zip(&self.reactions), |(constraint, reaction)| {
+            (&constraint.0, reaction.object(constraint.1))
+        });
+        let motors = by_name(&self.motors, |(name, [torque, power])| {
+            let reaction = self.reaction(name);
+            let told = json!({
+                "torque": torque,
+                "power": power,
+                "unit": reaction.map(|reaction| reaction.unit_of_multiplier),
+                "determinate": reaction.and_then(|reaction| reaction.is_determinate),
+            });
+            (name, told)
+        });
+        let hinges = by_name(&self.hinges, |hinge| {
+            let told = json!({"force": hinge.force, "on": hinge.on, "from": hinge.from,
+                "determinate": hinge.is_determinate});
+            (&hinge.name, told)
+        });
+        let walls = by_name(&self.walls, |wall| (&wall.name, self.contact_object(wall)));
         let [kinetic, potential] = self.energy;
         let mut said = json!({
             "scene": scene.name,
@@ -353,22 +338,30 @@ impl Inspection {
             "walls": walls,
         });
         if !self.outputs.is_empty() {
-            let outputs = self.outputs.iter();
-            let told =
-                outputs.map(|(name, unit, value)| (name.clone(), json!({"value": value, "unit": unit})));
-            said["outputs"] = Value::Object(told.collect());
+            said["outputs"] =
+                by_name(&self.outputs, |(name, unit, value)| (name, json!({"value": value, "unit": unit})));
         }
         if !self.frictions.is_empty() {
-            let places: Map<String, Value> = (self.frictions.iter())
-                .map(|(name, mode, is_torque, [friction, pressing])| {
-                    let unit = if *is_torque { "N m" } else { "N" };
-                    let told =
-                        json!({"mode": mode, "friction": -friction, "unit": unit, "pressed_by": pressing});
-                    (name.clone(), told)
-                })
-                .collect();
-            said["friction"] = Value::Object(places);
+            said["friction"] = by_name(&self.frictions, |(name, mode, is_torque, [friction, pressing])| {
+                let unit = if *is_torque { "N m" } else { "N" };
+                let told = json!({"mode": mode, "friction": -friction, "unit": unit, "pressed_by": pressing});
+                (name, told)
+            });
         }
         said
+    }
+
+    /// A wall with its impact, where there is one.
+    fn contact_object(&self, wall: &ReportedContact) -> Value {
+        let impact = wall.impact.as_ref().map(|impact| {
+            let after = self.bodies.iter().zip(&impact.omega);
+            json!({
+                "impulse": impact.impulse,
+                "energy_lost": impact.energy_lost,
+                "motor_work": impact.motor_work,
+                "omega_after": by_name(after, |((name, _), omega)| (name, json!(omega))),
+            })
+        });
+        json!({"gap": wall.gap, "approach": wall.approach, "impact": impact})
     }
 }

@@ -124,14 +124,17 @@ pub fn text(found: &Kinematics) -> String {
             "constraints are redundant: forces that rigid bodies leave open are those of least norm",
         );
     }
-    page.entry(
-        "assemblies",
-        &counted(
-            1 + found.branches.len() as u64,
-            "way to assemble it at the start",
-            "ways to assemble it at the start",
-        ),
-    );
+    assemblies(&mut page, found);
+    if !found.left_out.is_empty() {
+        page.entry("left out", &found.left_out.join(", "));
+    }
+    page.into_text()
+}
+
+/// How many ways there are to assemble the mechanism at the start, with the coordinates of the others.
+fn assemblies(page: &mut Page, found: &Kinematics) {
+    let ways = ["way to assemble it at the start", "ways to assemble it at the start"];
+    page.entry("assemblies", &counted(1 + found.branches.len() as u64, ways[0], ways[1]));
     let names = names(found);
     for (k, branch) in found.branches.iter().take(LISTED).enumerate() {
         let all: Vec<String> = names
@@ -144,10 +147,6 @@ pub fn text(found: &Kinematics) -> String {
             .collect();
         page.entry(if k == 0 { "others" } else { "" }, &all.join(", "));
     }
-    if !found.left_out.is_empty() {
-        page.entry("left out", &found.left_out.join(", "));
-    }
-    page.into_text()
 }
 
 fn lined(in_line: &[String]) -> String {

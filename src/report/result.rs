@@ -7,7 +7,7 @@ use crate::dynamics::Mechanism;
 use crate::run::Plan;
 #[cfg(feature = "files")]
 use crate::run::files::sha256;
-use crate::run::{Outcome, Sample};
+use crate::run::{Drift, Outcome, Sample};
 use crate::scene::Scene;
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
@@ -187,6 +187,20 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
     if let Some(stop) = &outcome.stop {
         page.entry("stopped", &format!("at t = {} s: {}", figure(stop.t), stop.what));
     }
+    final_state(&mut page, mechanism, last);
+    drifts(&mut page, mechanism, drift);
+    if !mechanism.contacts.is_empty() {
+        impacts(&mut page, mechanism, outcome);
+    }
+    super::outputs::describe(&mut page, mechanism, outcome);
+    super::friction::describe(&mut page, mechanism, outcome);
+    super::events::describe(&mut page, mechanism, outcome);
+    super::trust::describe(&mut page, mechanism, outcome);
+    page.into_text()
+}
+
+/// Time, angles and rates at the end, with centres of mass and integrals.
+fn final_state(page: &mut Page, mechanism: &Mechanism, last: &Sample) {
     page.entry("final state", &format!("t = {} s", figure(last.t)));
     let rows: Vec<Vec<String>> = (mechanism.own_bodies().iter().enumerate().take(LISTED))
         .map(|(k, body)| {
@@ -196,11 +210,15 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         })
         .collect();
     page.table(&["body", "phi [rad]", "omega [rad/s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]"], &rows);
-    more(&mut page, mechanism.own_bodies().len(), ["body", "bodies"]);
+    more(page, mechanism.own_bodies().len(), ["body", "bodies"]);
     for (number, (name, k)) in mechanism.integrals().enumerate() {
         let label = if number == 0 { "integrals" } else { "" };
         page.entry(label, &format!("{name} = {}", figure(last.omega[k])));
     }
+}
+
+/// Drift of the energy and of the constraints, and what a stabilizer did about it.
+fn drifts(page: &mut Page, mechanism: &Mechanism, drift: &Drift) {
     page.entry(
         "energy drift",
         &format!(
@@ -226,7 +244,7 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
             ),
         );
     }
-    more(&mut page, drift.constraints.len(), ["constraint", "constraints"]);
+    more(page, drift.constraints.len(), ["constraint", "constraints"]);
     if let Some(singular) = &drift.singular {
         let (smallest, constraint) = (magnitude(singular.smallest), &singular.constraint);
         page.entry(
@@ -238,40 +256,34 @@ pub fn text(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> String {
         let (now, most) = (magnitude(drift.stabilizer), magnitude(drift.stabilizer_max));
         page.entry("stabilizer", &format!("put in {now} J, {most} J at most"));
     }
-    if !mechanism.contacts.is_empty() {
+}
+
+/// Impacts and lasting contacts.
+fn impacts(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
+    page.entry(
+        "impacts",
+        &format!(
+            "{}, {} J lost in them",
+            outcome.impact_count,
+            loss(outcome.impact_loss, mechanism.energy_scale)
+        ),
+    );
+    if outcome.persistent_contact_count > 0 {
+        let still = outcome
+            .holds
+            .iter()
+            .filter(|hold| hold.until.is_none())
+            .map(|hold| hold.wall.as_str())
+            .collect::<Vec<_>>();
+        let still =
+            if still.is_empty() { String::new() } else { format!(", to the end on {}", still.join(", ")) };
         page.entry(
-            "impacts",
+            "stays on walls",
             &format!(
-                "{}, {} J lost in them",
-                outcome.impact_count,
-                loss(outcome.impact_loss, mechanism.energy_scale)
+                "{}, {} s in all{still}",
+                outcome.persistent_contact_count,
+                figure(outcome.persistent_contact_time)
             ),
         );
-        if outcome.persistent_contact_count > 0 {
-            let still = outcome
-                .holds
-                .iter()
-                .filter(|hold| hold.until.is_none())
-                .map(|hold| hold.wall.as_str())
-                .collect::<Vec<_>>();
-            let still = if still.is_empty() {
-                String::new()
-            } else {
-                format!(", to the end on {}", still.join(", "))
-            };
-            page.entry(
-                "stays on walls",
-                &format!(
-                    "{}, {} s in all{still}",
-                    outcome.persistent_contact_count,
-                    figure(outcome.persistent_contact_time)
-                ),
-            );
-        }
     }
-    super::outputs::describe(&mut page, mechanism, outcome);
-    super::friction::describe(&mut page, mechanism, outcome);
-    super::events::describe(&mut page, mechanism, outcome);
-    super::trust::describe(&mut page, mechanism, outcome);
-    page.into_text()
 }

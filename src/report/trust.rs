@@ -50,6 +50,48 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     let Some(trust) = &outcome.trust else {
         return page.entry("trust", "not asked for: --trust auto estimates the error");
     };
+    estimate(page, mechanism, outcome, trust);
+    if let Some(beside) = beside(trust) {
+        page.entry("", &beside);
+    }
+    if trust.shared.len() > 1 {
+        page.entry(
+            "",
+            &format!("not judged, as run and reference solution share them: {}", trust.shared.join(", ")),
+        );
+    }
+    if let (Some(why), true) = (trust.cut(), trust.error_estimate.is_some()) {
+        page.entry("", why);
+    }
+    if let Some(error) = trust.model_error {
+        page.entry(
+            "model",
+            &format!(
+                "springs taken for rods: off by about {} rad, more where errors grow, which no reference \
+                    solution sees",
+                magnitude(error)
+            ),
+        );
+    }
+    if let Some(lost) = trust.lost {
+        page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));
+    }
+    growth(page, trust);
+    if let Some(inputs) = &trust.inputs {
+        super::inputs::describe(page, trust, inputs);
+    } else if let Some(error) = trust.input_error {
+        let what = match error < 1.0 {
+            true => {
+                format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at))
+            }
+            false => format!("their last digit leaves no angle certain at {} s", rough(trust.at)),
+        };
+        page.entry("inputs", &what);
+    }
+}
+
+/// The horizon, or the error at the end, or why there is neither.
+fn estimate(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome, trust: &Trust) {
     let what =
         if mechanism.has_translations() { "rad, and positions to as much of the longest bar" } else { "rad" };
     let source = match (trust.how, &trust.error_estimator) {
@@ -98,31 +140,10 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
             }
         }
     }
-    if let Some(beside) = beside(trust) {
-        page.entry("", &beside);
-    }
-    if trust.shared.len() > 1 {
-        page.entry(
-            "",
-            &format!("not judged, as run and reference solution share them: {}", trust.shared.join(", ")),
-        );
-    }
-    if let (Some(why), true) = (trust.cut(), trust.error_estimate.is_some()) {
-        page.entry("", why);
-    }
-    if let Some(error) = trust.model_error {
-        page.entry(
-            "model",
-            &format!(
-                "springs taken for rods: off by about {} rad, more where errors grow, which no reference \
-                    solution sees",
-                magnitude(error)
-            ),
-        );
-    }
-    if let Some(lost) = trust.lost {
-        page.entry("", &format!("more than {LOST} rad off from {} s on", rough(lost)));
-    }
+}
+
+/// How errors grow.
+fn growth(page: &mut Page, trust: &Trust) {
     if let Some(found) = trust.lyapunov {
         let [exponent, uncertainty] = with_uncertainty(found.exponent, found.uncertainty);
         page.entry(
@@ -140,17 +161,6 @@ pub fn describe(page: &mut Page, mechanism: &Mechanism, outcome: &Outcome) {
     }
     if let Some(why) = trust.no_growth.as_ref().or(trust.unclear_growth.as_ref()) {
         page.entry("growth", &format!("not known: {why}"));
-    }
-    if let Some(inputs) = &trust.inputs {
-        super::inputs::describe(page, trust, inputs);
-    } else if let Some(error) = trust.input_error {
-        let what = match error < 1.0 {
-            true => {
-                format!("their last digit comes to about {} rad at {} s", magnitude(error), rough(trust.at))
-            }
-            false => format!("their last digit leaves no angle certain at {} s", rough(trust.at)),
-        };
-        page.entry("inputs", &what);
     }
 }
 
