@@ -126,16 +126,18 @@ impl ContactDriver {
         Ok(())
     }
 
+    /// Lets a change by an event take effect.
     fn change(
         &mut self,
         (event, at): (&str, SwitchFunction),
         Change { motion, switches, parameters, flips }: Change,
         outcome: &mut Outcome,
     ) -> Result<(), StepError> {
-        let refused = |contact_driver: &mut Self, what: String, hint: &str| StepError {
+        let before = self.motion();
+        let refused = |(what, hint): ChangeRefusal| StepError {
             cause: Cause::Unsuited,
             method: outcome.plan.method.to_string(),
-            t: contact_driver.motion().time.hi,
+            t: before.time.hi,
             step: 0.0,
             what: match flips {
                 Some(_) => format!("a formula of `{event}` changes its branch here, and {what}"),
@@ -143,80 +145,14 @@ impl ContactDriver {
             },
             hint: hint.into(),
         };
-        let before = self.motion();
         let balance = self.sampler.balance(&before);
-        let mut after = before.clone();
-        let (keeps_motion, mut keeps_parameters) = (motion.is_none(), true);
-        if let Some(motion) = motion {
-            let n = before.phi.len();
-            if (motion.phi.len(), motion.omega.len(), motion.turns.len()) != (n, n, before.turns.len()) {
-                return Err(refused(
-                    self,
-                    "gives a motion of other coordinates".into(),
-                    "change a clone of the motion it is shown",
-                ));
-            }
-            (after.phi, after.omega, after.turns) = (motion.phi, motion.omega, motion.turns);
-        }
-        for (part, on) in switches {
-            self.off.retain(|off| *off != part);
-            if !on {
-                self.off.push(part);
-            }
-        }
-        if let Some(Laws { formulas, parameters: known, modes }) = &self.whole.laws {
-            let mut modes = modes.clone();
-            let moved = after.phi != before.phi || after.omega != before.omega;
-            let next = parameters.unwrap_or_else(|| known.clone());
-            keeps_parameters = next == *known;
-            if moved || next != *known {
-                let at_zero = |events: &EventDetector| events.conditions_at_zero([&before, &after], &next);
-                let stays = self.events.as_ref().map(at_zero).unwrap_or_default();
-                let there = self.whole.seen(&after, |at| formulas.modes(at, &next));
-                // Where a condition is zero, rounding does not choose its branch.
-                for (number, (mode, there)) in modes.iter_mut().zip(there).enumerate() {
-                    if stays.get(number) != Some(&true) {
-                        *mode = there;
-                    }
-                }
-            } else if let (Some(number), Some(events)) = (flips, &self.events) {
-                events.flip(number, &after, &mut modes);
-            }
-            match self.whole.on_branch(next, modes) {
-                Ok(whole) => self.whole = Arc::new(whole),
-                Err(error) => {
-                    return Err(refused(self, format!("cannot go on: {error}"), "look at that formula"));
-                }
-            }
-            if let Some(events) = &mut self.events {
-                events.exchange(Arc::clone(&self.whole));
-            }
-        }
+        let keeps_motion = motion.is_none();
+        let mut after = changed_motion(&before, motion).map_err(refused)?;
+        self.switch_parts(switches);
+        let keeps_parameters = self.renew_laws(parameters, flips, [&before, &after]).map_err(refused)?;
         self.changes += 1;
         self.engage(&after);
-        let free = match self.whole.without(&self.off) {
-            Ok(free) => Arc::new(free),
-            Err(part) => {
-                return Err(refused(
-                    self,
-                    format!("switches `{part}`"),
-                    "name a spring, torsion spring, force, torque, wall, or a hinge, motor or lock that the \
-                        scene switches",
-                ));
-            }
-        };
-        let mut held = self.mechanism.held.clone();
-        held.retain(|&contact| !free.contacts[contact].is_off && stays(&free, contact, &after));
-        if let Err((what, hint)) = closing::close([&self.free, &free], &mut held, &mut after) {
-            return Err(refused(self, what, hint));
-        }
-        if let Some(what) = broken([(&*self.free, &before), (&*free, &after)]) {
-            let hint = match self.free.laws.as_ref().is_some_and(|laws| laws.formulas.drives()) {
-                true => "the law of a motor must keep its value and its rate through its corners",
-                false => "change rates along what the constraints allow",
-            };
-            return Err(refused(self, what, hint));
-        }
+        let (free, held) = self.acting_parts(&before, &mut after).map_err(refused)?;
         if held != self.mechanism.held {
             self.record(&held, after.time.hi, outcome);
         }
@@ -231,14 +167,7 @@ impl ContactDriver {
         }
         self.free = free;
         self.stabilizer += std::mem::take(&mut after.stabilizer);
-        let mut plan = outcome.plan.clone();
-        if self.mechanism.constraints.len() > self.free.constraints.len() {
-            plan.stabilization = super::methods::Stabilization::Projection;
-        }
-        let next = build(&self.mechanism, &mut plan, &after)?;
-        let last = std::mem::replace(&mut self.driver, next);
-        self.driver.follow(&*last);
-        self.sampler.exchange(Arc::clone(&self.free), Arc::clone(&self.mechanism));
+        self.rebuild(&outcome.plan, &after)?;
         let change = self.sampler.balance(&after) - balance;
         self.sampler.shift(change);
         outcome.event_energy += change.hi;
@@ -257,6 +186,111 @@ impl ContactDriver {
         }
         self.meet(outcome)
     }
+
+    /// Parts act from now on, or act no longer.
+    fn switch_parts(&mut self, switches: Vec<(String, bool)>) {
+        for (part, on) in switches {
+            self.off.retain(|off| *off != part);
+            if !on {
+                self.off.push(part);
+            }
+        }
+    }
+
+    /// Takes new parameters, and the branches of laws on which the changed motion is; true where the
+    /// parameters stay.
+    fn renew_laws(
+        &mut self,
+        parameters: Option<Vec<f64>>,
+        flips: Option<usize>,
+        [before, after]: [&Motion; 2],
+    ) -> Result<bool, ChangeRefusal> {
+        let Some(Laws { formulas, parameters: known, modes }) = &self.whole.laws else { return Ok(true) };
+        let mut modes = modes.clone();
+        let moved = after.phi != before.phi || after.omega != before.omega;
+        let next = parameters.unwrap_or_else(|| known.clone());
+        let keeps_parameters = next == *known;
+        if moved || next != *known {
+            let at_zero = |events: &EventDetector| events.conditions_at_zero([before, after], &next);
+            let stays = self.events.as_ref().map(at_zero).unwrap_or_default();
+            let there = self.whole.seen(after, |at| formulas.modes(at, &next));
+            // Where a condition is zero, rounding does not choose its branch.
+            for (number, (mode, there)) in modes.iter_mut().zip(there).enumerate() {
+                if stays.get(number) != Some(&true) {
+                    *mode = there;
+                }
+            }
+        } else if let (Some(number), Some(events)) = (flips, &self.events) {
+            events.flip(number, after, &mut modes);
+        }
+        match self.whole.on_branch(next, modes) {
+            Ok(whole) => self.whole = Arc::new(whole),
+            Err(error) => return Err((format!("cannot go on: {error}"), "look at that formula")),
+        }
+        if let Some(events) = &mut self.events {
+            events.exchange(Arc::clone(&self.whole));
+        }
+        Ok(keeps_parameters)
+    }
+
+    /// The mechanism of the parts that act, without holds, and the contacts still held; closes joints.
+    fn acting_parts(
+        &self,
+        before: &Motion,
+        after: &mut Motion,
+    ) -> Result<(Arc<Mechanism>, Vec<usize>), ChangeRefusal> {
+        let free = match self.whole.without(&self.off) {
+            Ok(free) => Arc::new(free),
+            Err(part) => {
+                return Err((
+                    format!("switches `{part}`"),
+                    "name a spring, torsion spring, force, torque, wall, or a hinge, motor or lock that the \
+                        scene switches",
+                ));
+            }
+        };
+        let mut held = self.mechanism.held.clone();
+        held.retain(|&contact| !free.contacts[contact].is_off && stays(&free, contact, after));
+        closing::close([&self.free, &free], &mut held, after)?;
+        if let Some(what) = broken([(&*self.free, before), (&*free, &*after)]) {
+            let hint = match self.free.laws.as_ref().is_some_and(|laws| laws.formulas.drives()) {
+                true => "the law of a motor must keep its value and its rate through its corners",
+                false => "change rates along what the constraints allow",
+            };
+            return Err((what, hint));
+        }
+        Ok((free, held))
+    }
+
+    /// A new driver from the changed motion on, for the mechanism as it is now.
+    fn rebuild(&mut self, plan: &Plan, after: &Motion) -> Result<(), StepError> {
+        let mut plan = plan.clone();
+        if self.mechanism.constraints.len() > self.free.constraints.len() {
+            plan.stabilization = super::methods::Stabilization::Projection;
+        }
+        let next = build(&self.mechanism, &mut plan, after)?;
+        let last = std::mem::replace(&mut self.driver, next);
+        self.driver.follow(&*last);
+        self.sampler.exchange(Arc::clone(&self.free), Arc::clone(&self.mechanism));
+        Ok(())
+    }
+}
+
+/// Why a change cannot be, and what to do.
+type ChangeRefusal = (String, &'static str);
+
+/// The motion after a change, by the one that is given.
+fn changed_motion(before: &Motion, given: Option<Motion>) -> Result<Motion, ChangeRefusal> {
+    let mut after = before.clone();
+    if let Some(motion) = given {
+        let n = before.phi.len();
+        if (motion.phi.len(), motion.omega.len(), motion.turns.len()) != (n, n, before.turns.len()) {
+            let hint = "change a clone of the motion it is shown";
+            return Err(("gives a motion of other coordinates".into(), hint));
+        }
+        (after.phi, after.omega, after.turns) = (motion.phi, motion.omega, motion.turns);
+    }
+    Ok(after)
 }
 
 /// Whether a point that is held is on its wall and moves with it; no longer where a corner or a parameter of

@@ -157,6 +157,170 @@ fn is_overdamped(stiffness: &Stiffness, until: f64) -> bool {
     stiffness.is_damped() && stiffness.ratio() > STIFF && stiffness.radians(until) > STIFF
 }
 
+/// What the choice of a method rests on.
+struct Situation<'a> {
+    mechanism: &'a Mechanism,
+    request: &'a Request,
+    stiffness: Option<&'a Stiffness>,
+    /// Horizon \[s\].
+    until: f64,
+    /// How constraints are kept, where there are any.
+    kept: Stabilization,
+    has_rows: bool,
+    /// True without walls.
+    is_free: bool,
+    /// Number of coordinates.
+    n: usize,
+    /// True where a series keeps the constraints.
+    is_kept: bool,
+    /// True where the series is that of the bodies one by one.
+    is_expanded: bool,
+}
+
+impl Situation<'_> {
+    /// The classic pair that keeps the constraints, in steps of its own where walls ask for that.
+    fn classic(&self) -> MethodId {
+        match self.is_free && !(self.has_rows && self.kept == Stabilization::Projection) {
+            true => MethodId::Dop853,
+            false => MethodId::Dp8,
+        }
+    }
+
+    /// The tolerance asked for.
+    fn tolerance(&self) -> Option<f64> {
+        self.request.rtol.or(self.request.atol)
+    }
+
+    /// The stiffness of a mode that makes an implicit method pay.
+    fn overdamped(&self) -> Option<&Stiffness> {
+        self.stiffness.filter(|stiffness| is_overdamped(stiffness, self.until))
+    }
+
+    /// Where parts of the scene leave few methods: friction, very many bodies, vibrating rods, aims.
+    fn by_parts(&self) -> Option<(MethodId, String)> {
+        let Self { mechanism, n, .. } = *self;
+        let is_adaptive = self.request.step.is_none();
+        if !mechanism.frictions.is_empty() && is_adaptive {
+            let method = match n > MANY_COORDINATES {
+                true => MethodId::Dp8,
+                false if self.overdamped().is_some() => MethodId::Radau(5),
+                false => MethodId::Taylor,
+            };
+            let why = "the scene has dry friction, whose transitions are located on its dense output";
+            return Some((method, why.into()));
+        }
+        if n > MANY_COORDINATES && self.is_free && is_adaptive {
+            let method = match (self.is_expanded, self.has_rows) {
+                (true, _) => MethodId::Taylor,
+                (false, true) => MethodId::Dp8,
+                (false, false) => MethodId::Dop853,
+            };
+            return Some((method, format!("{n} coordinates are taken body by body")));
+        }
+        if let Some(vibration) = &mechanism.vibration {
+            let why = format!("the vibration of rigid spring {} acts by its mean force", vibration.name);
+            return Some((self.classic(), why));
+        }
+        (mechanism.has_aims() && is_adaptive)
+            .then(|| (self.classic(), "laws of motors or walls depend on where the mechanism is".into()))
+    }
+
+    /// Where a fixed step is given.
+    fn by_step(&self) -> Option<(MethodId, String)> {
+        self.request.step?;
+        let why = if self.mechanism.has_closed_loops() {
+            "closed loops and sliders are kept by symmetric projection"
+        } else {
+            "it is the most accurate such method"
+        };
+        Some((MethodId::Gauss(8), format!("a fixed step was given; {why}")))
+    }
+
+    /// Where a stiff mode dies away.
+    fn by_damping(&self) -> Option<(MethodId, String)> {
+        let damped = self.overdamped()?;
+        let stages = if self.tolerance().unwrap_or_default() >= TIGHT { 3 } else { 5 };
+        let mode = damped
+            .culprit
+            .as_ref()
+            .map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
+        let why = format!("{mode} is {:.0} times as fast as the rest, and dies away", damped.ratio());
+        Some((MethodId::Radau(stages), why))
+    }
+
+    /// Where there are walls.
+    fn by_walls(&self) -> Option<(MethodId, String)> {
+        if self.is_free {
+            return None;
+        }
+        // Over 150 s of `wall` the tolerance that leaves rounding costs `dp8` 2.6 times as much, for a
+        // thousand times the drift.
+        let is_series = self.tolerance().is_none()
+            && is_long(self.mechanism, self.until)
+            && self.n <= FEW_COORDINATES
+            && self.is_kept;
+        Some(match is_series {
+            true => (
+                MethodId::Taylor,
+                format!(
+                    "over {} s its series drifts by rounding only, and impacts are located on it",
+                    plain(self.until)
+                ),
+            ),
+            false => (MethodId::Dp8, "the scene has walls, and impacts are located inside its steps".into()),
+        })
+    }
+
+    /// Where invariants are asked for and can be kept; the scene's rates go up to `rate` \[rad/s\].
+    fn by_invariants(&self, rate: f64) -> Option<(MethodId, String)> {
+        let mechanism = self.mechanism;
+        let is_eliminated = !self.has_rows || self.kept == Stabilization::Elimination;
+        let fastest = self.stiffness.map_or(rate, |stiffness| stiffness.fastest.max(rate));
+        let is_bearable = self.until * fastest / STEP <= MANY_STEPS;
+        let keeps = self.tolerance().is_none()
+            && !mechanism.is_damped()
+            && !mechanism.is_switched()
+            && is_eliminated
+            && is_bearable;
+        (self.request.prefer == Some(Prefer::Invariants) && keeps).then(|| match self.n > FEW_COORDINATES {
+            true => (
+                MethodId::Gauss(8),
+                "invariants were asked for, and a symplectic method keeps them best".into(),
+            ),
+            false => (MethodId::Taylor, EXTENDED.into()),
+        })
+    }
+
+    /// For all others: the series, where it pays.
+    fn by_cost(&self) -> (MethodId, String) {
+        let Self { mechanism, request, n, .. } = *self;
+        if self.kept == Stabilization::Baumgarte && self.has_rows {
+            let why = "Baumgarte's term is a force, and the everyday choice takes any";
+            return (MethodId::Dop853, why.into());
+        }
+        if n > FEW_COORDINATES && !self.is_expanded {
+            return (self.classic(), format!("{n} coordinates are cheaper to evaluate than to expand"));
+        }
+        let fast = self.stiffness.filter(|stiffness| stiffness.ratio() > STIFF && !stiffness.is_damped());
+        let why = if let Some(name) = fast.and_then(|fast| fast.culprit.as_ref()) {
+            format!("spring {name} vibrates undamped and is resolved, which its long steps do best")
+        } else if mechanism.has_closed_loops() {
+            "closed loops and sliders are kept by projection, and its steps pass singular positions".into()
+        } else if request.prefer == Some(Prefer::Path) {
+            "the path was asked for, and its series is the most accurate for the time".into()
+        } else if self.tolerance().is_some() {
+            "a tolerance was given, and its series is the fastest to it".into()
+        } else if mechanism.is_damped() {
+            "the scene is damped, and its series is the most accurate for the time".into()
+        } else if is_long(mechanism, self.until) {
+            format!("over {} s its series drifts by rounding only, for the least time", plain(self.until))
+        } else {
+            "over a short horizon its series is the most accurate for the time".into()
+        };
+        (MethodId::Taylor, why)
+    }
+}
+
 fn chosen(
     mechanism: &Mechanism,
     request: &Request,
@@ -168,112 +332,26 @@ fn chosen(
         return (MethodId::Taylor, "extended orders are those of its series".into());
     }
     let kept = request.stabilize.unwrap_or(usual(mechanism));
-    let (has_rows, is_free, n) =
-        (!mechanism.constraints.is_empty(), mechanism.contacts.is_empty(), mechanism.coordinates());
-    let classic = match is_free && !(has_rows && kept == Stabilization::Projection) {
-        true => MethodId::Dop853,
-        false => MethodId::Dp8,
-    };
+    let has_rows = !mechanism.constraints.is_empty();
     let is_kept = kept == Stabilization::None || kept == Stabilization::Projection || !has_rows;
-    let is_expanded = mechanism.recursion.is_some() && is_kept && mechanism.has_series();
-    let damped = stiffness.filter(|stiffness| is_overdamped(stiffness, until));
-    if !mechanism.frictions.is_empty() && request.step.is_none() {
-        let method = match n > MANY_COORDINATES {
-            true => MethodId::Dp8,
-            false if damped.is_some() => MethodId::Radau(5),
-            false => MethodId::Taylor,
-        };
-        return (
-            method,
-            "the scene has dry friction, whose transitions are located on its dense output".into(),
-        );
-    }
-    if n > MANY_COORDINATES && is_free && request.step.is_none() {
-        let method = match (is_expanded, has_rows) {
-            (true, _) => MethodId::Taylor,
-            (false, true) => MethodId::Dp8,
-            (false, false) => MethodId::Dop853,
-        };
-        return (method, format!("{n} coordinates are taken body by body"));
-    }
-    if let Some(vibration) = &mechanism.vibration {
-        return (classic, format!("the vibration of rigid spring {} acts by its mean force", vibration.name));
-    }
-    if mechanism.has_aims() && request.step.is_none() {
-        return (classic, "laws of motors or walls depend on where the mechanism is".into());
-    }
-    if request.step.is_some() {
-        let why = if mechanism.has_closed_loops() {
-            "closed loops and sliders are kept by symmetric projection"
-        } else {
-            "it is the most accurate such method"
-        };
-        return (MethodId::Gauss(8), format!("a fixed step was given; {why}"));
-    }
-    let tolerance = request.rtol.or(request.atol);
-    if let Some(damped) = damped {
-        let stages = if tolerance.unwrap_or_default() >= TIGHT { 3 } else { 5 };
-        let mode = damped
-            .culprit
-            .as_ref()
-            .map_or("the fastest mode".to_owned(), |name| format!("the mode of {name}"));
-        return (
-            MethodId::Radau(stages),
-            format!("{mode} is {:.0} times as fast as the rest, and dies away", damped.ratio()),
-        );
-    }
-    // Over 150 s of `wall` the tolerance that leaves rounding costs `dp8` 2.6 times as much, for a thousand
-    // times the drift.
-    if !is_free && tolerance.is_none() && is_long(mechanism, until) && n <= FEW_COORDINATES && is_kept {
-        let why = format!(
-            "over {} s its series drifts by rounding only, and impacts are located on it",
-            plain(until)
-        );
-        return (MethodId::Taylor, why);
-    }
-    if !is_free {
-        return (MethodId::Dp8, "the scene has walls, and impacts are located inside its steps".into());
-    }
-    let is_eliminated = !has_rows || kept == Stabilization::Elimination;
-    let fastest = stiffness.map_or(rate, |stiffness| stiffness.fastest.max(rate));
-    let is_bearable = until * fastest / STEP <= MANY_STEPS;
-    let keeps = tolerance.is_none()
-        && !mechanism.is_damped()
-        && !mechanism.is_switched()
-        && is_eliminated
-        && is_bearable;
-    if request.prefer == Some(Prefer::Invariants) && keeps {
-        return match n > FEW_COORDINATES {
-            true => (
-                MethodId::Gauss(8),
-                "invariants were asked for, and a symplectic method keeps them best".into(),
-            ),
-            false => (MethodId::Taylor, EXTENDED.into()),
-        };
-    }
-    if kept == Stabilization::Baumgarte && has_rows {
-        return (MethodId::Dop853, "Baumgarte's term is a force, and the everyday choice takes any".into());
-    }
-    if n > FEW_COORDINATES && !is_expanded {
-        return (classic, format!("{n} coordinates are cheaper to evaluate than to expand"));
-    }
-    let fast = stiffness.filter(|stiffness| stiffness.ratio() > STIFF && !stiffness.is_damped());
-    let why = if let Some(name) = fast.and_then(|fast| fast.culprit.as_ref()) {
-        format!("spring {name} vibrates undamped and is resolved, which its long steps do best")
-    } else if mechanism.has_closed_loops() {
-        "closed loops and sliders are kept by projection, and its steps pass singular positions".into()
-    } else if request.prefer == Some(Prefer::Path) {
-        "the path was asked for, and its series is the most accurate for the time".into()
-    } else if tolerance.is_some() {
-        "a tolerance was given, and its series is the fastest to it".into()
-    } else if mechanism.is_damped() {
-        "the scene is damped, and its series is the most accurate for the time".into()
-    } else if is_long(mechanism, until) {
-        format!("over {} s its series drifts by rounding only, for the least time", plain(until))
-    } else {
-        "over a short horizon its series is the most accurate for the time".into()
+    let situation = Situation {
+        mechanism,
+        request,
+        stiffness,
+        until,
+        kept,
+        has_rows,
+        is_free: mechanism.contacts.is_empty(),
+        n: mechanism.coordinates(),
+        is_kept,
+        is_expanded: mechanism.recursion.is_some() && is_kept && mechanism.has_series(),
     };
-    (MethodId::Taylor, why)
+    (situation.by_parts())
+        .or_else(|| situation.by_step())
+        .or_else(|| situation.by_damping())
+        .or_else(|| situation.by_walls())
+        .or_else(|| situation.by_invariants(rate))
+        .unwrap_or_else(|| situation.by_cost())
 }
 
 #[cfg(test)]

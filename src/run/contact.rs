@@ -340,6 +340,11 @@ impl ContactDriver {
                 return Ok(false);
             }
         }
+        Err(self.too_many_events(outcome))
+    }
+
+    /// Why a run stops that meets too many events before the next output time.
+    fn too_many_events(&mut self, outcome: &Outcome) -> StepError {
         let (what, hint) = match outcome.events.last() {
             _ if !self.free.contacts.is_empty() => (
                 "impacts and releases".to_owned(),
@@ -357,7 +362,7 @@ impl ContactDriver {
             ),
         };
         let what = format!("more than {EVENTS_MOST} {what} before the next output time");
-        Err(self.stopped(&outcome.plan, what, hint))
+        self.stopped(&outcome.plan, what, hint)
     }
 
     /// True where something is to be done at an event that is due at the end of the run.

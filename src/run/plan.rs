@@ -5,6 +5,7 @@
 
 mod pairing;
 mod rates;
+mod rows;
 
 #[cfg(feature = "digits")]
 pub(super) use self::pairing::check_forces_of_joints;
@@ -12,12 +13,13 @@ pub(super) use self::pairing::usual;
 
 use self::pairing::{check_method, check_vibration, pair};
 use self::rates::{fastest_rate, fixed_step, model_error, rate_about_rods, set_in_vain};
+use self::rows::{checked_rows, rows};
 use super::choice::{Choice, Prefer, choose, least_tolerance, usual_tolerance};
 use super::custom::Custom;
 use super::fast::{self, FastMode};
 use super::methods::{MethodId, Stabilization};
 use crate::arithmetic::DoubleDouble;
-use crate::arithmetic::shown::{self, count, figure, order, plain};
+use crate::arithmetic::shown::{self, figure, order, plain};
 use crate::dynamics::{Mechanism, Stiffness, Time};
 use crate::scene::{LONGEST_TIME, Scene};
 use crate::stepping::{Taylor, Tolerance};
@@ -113,8 +115,6 @@ const MAX_EVALUATIONS: (f64, f64) = (1e8, 1e7);
 const MOST_EVALUATIONS: [f64; 2] = [1e10, 1e9];
 /// Most rows a run may write.
 pub const MAX_ROWS: f64 = 1e9;
-/// Most numbers of a trajectory that a scene asks for by itself: about a gigabyte.
-const MOST_NUMBERS: f64 = 5e7;
 /// So many coordinates are cheaper body by body, with multipliers, than in the matrices that eliminated
 /// coordinates and momenta ask for.
 pub(in crate::run) const MANY_COORDINATES: usize = 48;
@@ -173,32 +173,7 @@ impl Plan {
         notes.extend(set_in_vain(scene, mechanism));
         let max_evaluations = request.max_evaluations.unwrap_or(usual_max_evaluations(method, until));
         notes.extend(cut_short(method, step, rate, until, max_evaluations));
-        let rows = rows(until, every);
-        if rows > MAX_ROWS {
-            let reason = format!("{} rows would be written; at most {MAX_ROWS:e}", count(rows));
-            return Err(match request.every {
-                Some(_) => usage("--every", reason, "a longer output interval"),
-                None => mismatch(
-                    format!("every: an output interval of {} s up to {} s", plain(every), plain(until)),
-                    &reason,
-                    "a longer every in the scene, or --every",
-                ),
-            });
-        }
-        let numbers = rows * (5 + 6 * mechanism.bodies.len() + 4 * mechanism.constraints.len()) as f64;
-        if request.every.is_none() && numbers > MOST_NUMBERS {
-            let what = format!("an output interval of {} s up to {} s", plain(every), plain(until));
-            let reason = format!(
-                "the trajectory would hold {} numbers, about {:.0} GB",
-                count(numbers),
-                (numbers * 2e-8).ceil()
-            );
-            return Err(mismatch(
-                what,
-                &reason,
-                &format!("a longer --every, or --every {every} if that is meant"),
-            ));
-        }
+        let rows = checked_rows(mechanism, request, until, every)?;
         Ok(Self {
             method,
             step,
@@ -358,11 +333,6 @@ fn cut_short(
 fn is_whole(until: f64, step: f64) -> bool {
     let steps = (until / step).round();
     (until / step - steps).abs() <= 1e-9 * steps
-}
-
-/// Output rows after the first; the last may come early.
-fn rows(until: f64, every: f64) -> f64 {
-    (until / every * (1.0 - 1e-12)).ceil().max(1.0)
 }
 
 /// Every number asked for must be positive and finite; steps and tolerances must suit one another.

@@ -1,7 +1,7 @@
 //! Values set from outside: `--set walls.wall.restitution=0.5`.
 
 use super::error::SceneError;
-use super::locate::{Located, Member, Text, Texts, Value, push_index, push_key};
+use super::locate::{Located, Member, Span, Text, Texts, Value, push_index, push_key};
 use super::number;
 use super::read::nearest;
 use super::template::{ShortNameError, is_number, whole};
@@ -155,102 +155,107 @@ pub(super) fn put(
 /// Puts `value` into `tree` at a whole path.
 fn place(source: &Texts, tree: &mut Located, path: &str, value: Located) -> Result<(), SceneError> {
     let span = value.span;
-    let refused = |path: &str, problem: &str, allowed: &str, hint: &str| {
-        source.refusal(span, path, problem, allowed, hint)
-    };
     let Some(steps) = steps(path) else {
-        let hint = "for example walls.wall.restitution, bars[1].length, gravity[0]";
-        return Err(refused(path, "is not a path", "must be keys, names and [indices] joined by dots", hint));
+        let (allowed, hint) = (
+            "must be keys, names and [indices] joined by dots",
+            "for example walls.wall.restitution, bars[1].length, gravity[0]",
+        );
+        return Err(source.refusal(span, path, "is not a path", allowed, hint));
     };
-    let bars = names(tree);
+    let mut walk = Walk { source, span, bars: names(tree), path: String::new() };
     let mut at = tree;
-    let mut path = String::new();
-    let last = steps.len() - 1;
     for (number, step) in steps.iter().enumerate() {
-        let holder = path.clone();
-        match (step, &mut at.value) {
+        at = match (step, &mut at.value) {
             (PathStep::Key(key), Value::Object(members)) => {
-                push_key(&mut path, key);
-                let found = members.iter().position(|member| member.key == *key);
-                match found {
-                    Some(index) => at = &mut members[index].node,
-                    None if number == last => {
-                        members.push(Member { key: (*key).to_owned(), span, node: value });
-                        return Ok(());
-                    }
-                    None if may_be_added(&steps[..=number], &bars) => {
-                        members.push(Member {
-                            key: (*key).to_owned(),
-                            span,
-                            node: Located { span, value: Value::Object(Vec::new()) },
-                        });
-                        let Some(added) = members.last_mut() else { return Ok(()) };
-                        at = &mut added.node;
-                    }
-                    None => {
-                        let known: Vec<&str> = match steps[..number] {
-                            [PathStep::Key("start")] => bars.iter().map(String::as_str).collect(),
-                            _ => members.iter().map(|member| member.key.as_str()).collect(),
-                        };
-                        let hint = hint(key, &known);
-                        return Err(refused(
-                            &path,
-                            "does not exist",
-                            "what holds the value must be in the scene",
-                            &hint,
-                        ));
-                    }
-                }
+                walk.member(members, key, &steps[..=number], number + 1 == steps.len())?
             }
-            (PathStep::Key(key), Value::List(nodes)) => {
-                let known: Vec<&str> = nodes.iter().filter_map(name).collect();
-                let Some(index) = nodes.iter().position(|node| name(node) == Some(key)) else {
-                    push_key(&mut path, key);
-                    let hint = if known.is_empty() {
-                        "use an index, as in gravity[0]".to_owned()
-                    } else {
-                        hint(key, &known)
-                    };
-                    return Err(refused(
-                        &path,
-                        "does not exist",
-                        &format!("{holder} must have an element of that name"),
-                        &hint,
-                    ));
-                };
-                push_index(&mut path, index);
-                at = &mut nodes[index];
-            }
-            (PathStep::Index(index), Value::List(nodes)) => {
-                push_index(&mut path, *index);
-                let count = nodes.len();
-                let Some(node) = nodes.get_mut(*index) else {
-                    let hint = "indices count from 0; an element cannot be added";
-                    return Err(refused(
-                        &path,
-                        "does not exist",
-                        &format!("{holder} has {count} elements"),
-                        hint,
-                    ));
-                };
-                at = node;
-            }
+            (PathStep::Key(key), Value::List(nodes)) => walk.named_element(nodes, key)?,
+            (PathStep::Index(index), Value::List(nodes)) => walk.element(nodes, *index)?,
             (PathStep::Index(_), _) => {
-                return Err(refused(
-                    &path,
-                    "is not a list",
-                    "only lists have indices",
-                    "use a key, as in start.bar1.phi",
-                ));
+                let hint = "use a key, as in start.bar1.phi";
+                return Err(walk.refused("is not a list", "only lists have indices", hint));
             }
             (PathStep::Key(key), _) => {
                 let allowed = format!("it has no `{key}` to set");
-                return Err(refused(&path, "is a single value", &allowed, "set the value itself"));
+                return Err(walk.refused("is a single value", &allowed, "set the value itself"));
             }
-        }
+        };
     }
     *at = value;
     Ok(())
+}
+
+/// A path followed through a tree.
+struct Walk<'a> {
+    source: &'a Texts,
+    /// Where the value stands that is put in.
+    span: Span,
+    /// Names of the bars.
+    bars: Vec<String>,
+    /// The path so far.
+    path: String,
+}
+
+impl Walk<'_> {
+    fn refused(&self, problem: &str, allowed: &str, hint: &str) -> SceneError {
+        self.source.refusal(self.span, &self.path, problem, allowed, hint)
+    }
+
+    /// The value of a key, which is the last of `steps`; a new one where the path ends with it, or where the
+    /// scene may do without what it holds.
+    fn member<'t>(
+        &mut self,
+        members: &'t mut Vec<Member>,
+        key: &str,
+        steps: &[PathStep],
+        is_last: bool,
+    ) -> Result<&'t mut Located, SceneError> {
+        push_key(&mut self.path, key);
+        let found = members.iter().position(|member| member.key == key);
+        if found.is_none() && !is_last && !may_be_added(steps, &self.bars) {
+            let known: Vec<&str> = match steps {
+                [PathStep::Key("start"), _] => self.bars.iter().map(String::as_str).collect(),
+                _ => members.iter().map(|member| member.key.as_str()).collect(),
+            };
+            let (allowed, hint) = ("what holds the value must be in the scene", hint(key, &known));
+            return Err(self.refused("does not exist", allowed, &hint));
+        }
+        let index = found.unwrap_or_else(|| {
+            let node = Located { span: self.span, value: Value::Object(Vec::new()) };
+            members.push(Member { key: key.to_owned(), span: self.span, node });
+            members.len() - 1
+        });
+        Ok(&mut members[index].node)
+    }
+
+    /// The element of a name.
+    fn named_element<'t>(
+        &mut self,
+        nodes: &'t mut [Located],
+        key: &str,
+    ) -> Result<&'t mut Located, SceneError> {
+        let Some(index) = nodes.iter().position(|node| name(node) == Some(key)) else {
+            let allowed = format!("{} must have an element of that name", self.path);
+            push_key(&mut self.path, key);
+            let known: Vec<&str> = nodes.iter().filter_map(name).collect();
+            let hint = match known.is_empty() {
+                true => "use an index, as in gravity[0]".to_owned(),
+                false => hint(key, &known),
+            };
+            return Err(self.refused("does not exist", &allowed, &hint));
+        };
+        push_index(&mut self.path, index);
+        Ok(&mut nodes[index])
+    }
+
+    /// The element of an index.
+    fn element<'t>(&mut self, nodes: &'t mut [Located], index: usize) -> Result<&'t mut Located, SceneError> {
+        let allowed = format!("{} has {} elements", self.path, nodes.len());
+        push_index(&mut self.path, index);
+        let missing =
+            || self.refused("does not exist", &allowed, "indices count from 0; an element cannot be added");
+        nodes.get_mut(index).ok_or_else(missing)
+    }
 }
 
 /// Objects that a scene may do without and that a path may begin: the start, that of a bar, the law of a

@@ -4,8 +4,8 @@ use super::fit::written_starts;
 use super::format::GROUND;
 use super::friction::FrictionPart;
 use super::{
-    Coupled, Coupling, Force, Friction, FrictionPlace, Given, Law, Load, LoadLaw, NamedPoint, Place, Scene,
-    SceneEvent, Slider, Torque,
+    Coupled, Coupling, Force, Friction, FrictionPlace, Given, Hinge, Law, Load, LoadLaw, NamedPoint, Place,
+    Scene, SceneEvent, Slider, Torque, Wall,
 };
 use serde::ser::{Serialize, SerializeStruct, Serializer};
 use serde_json::{Map, Value, json};
@@ -19,149 +19,138 @@ impl Scene {
 
     /// The same with this start.
     pub(super) fn with_start(&self, start: Map<String, Value>) -> Value {
-        let body = |bar: Option<usize>| bar.map_or(GROUND, |bar| self.bars[bar].name.as_str());
-        let place = |place: &Place| json!({"body": body(place.bar), "point": place.point});
-        let bars: Vec<_> = (self.bars[..self.own_bars()].iter())
-            .map(|bar| {
+        let mut said = json!({
+            "name": self.name,
+            "description": self.description,
+            "gravity": self.gravity,
+            "bars": objects(&self.bars[..self.own_bars()], |bar| {
                 json!({"name": bar.name, "mass": bar.mass, "centre": bar.centre,
                 "inertia": bar.inertia, "length": bar.length})
-            })
-            .collect();
-        let hinges: Vec<_> = self.hinges[..self.own_hinges()]
-            .iter()
-            .enumerate()
-            .map(|(i, hinge)| {
-                let said = json!({"name": hinge.name, "between": hinge.between.each_ref().map(place)});
-                with(said, "friction", &self.friction((FrictionPart::Hinge, i)))
-            })
-            .collect();
-        let sliders: Vec<_> = (self.sliders.iter().enumerate())
-            .map(|(i, Slider { name, point, rail, locked })| {
-                let said = json!({
-                    "name": name,
-                    "point": place(point),
-                    "rail": {"body": body(rail.place.bar), "point": rail.place.point,
-                        "direction": rail.direction},
-                    "angle": if *locked { "locked" } else { "free" },
-                });
-                with(said, "friction", &self.friction((FrictionPart::Slider, i)))
-            })
-            .collect();
-        let welds: Vec<_> = self
-            .welds
-            .iter()
-            .map(|weld| json!({"name": weld.name, "between": weld.between.each_ref().map(place)}))
-            .collect();
-        let locks: Vec<_> = (self.locks.iter())
-            .map(|lock| {
-                let said = json!({"name": lock.name, "body": body(Some(lock.bar)),
-                    "relative_to": body(lock.relative_to)});
+            }),
+            "hinges": self.hinge_objects(),
+            "sliders": self.slider_objects(),
+            "welds": objects(&self.welds, |weld| {
+                json!({"name": weld.name, "between": weld.between.each_ref().map(|place| self.place(place))})
+            }),
+            "locks": objects(&self.locks, |lock| {
+                let said = json!({"name": lock.name, "body": self.body(Some(lock.bar)),
+                    "relative_to": self.body(lock.relative_to)});
                 with(said, "angle", &lock.angle)
-            })
-            .collect();
-        let springs: Vec<_> = (self.springs.iter())
-            .map(|spring| {
+            }),
+            "springs": objects(&self.springs, |spring| {
                 json!({
                     "name": spring.name,
-                    "between": spring.between.each_ref().map(place),
+                    "between": spring.between.each_ref().map(|place| self.place(place)),
                     "stiffness": spring.stiffness,
                     "free_length": spring.free_length,
                     "damping": spring.damping,
                     "model": if spring.rigid { "rigid" } else { "elastic" },
                 })
-            })
-            .collect();
-        let torsion_springs: Vec<_> = (self.torsion_springs.iter())
-            .map(|spring| {
+            }),
+            "torsion_springs": objects(&self.torsion_springs, |spring| {
                 json!({
                     "name": spring.name,
-                    "body": body(Some(spring.bar)),
-                    "relative_to": body(spring.relative_to),
+                    "body": self.body(Some(spring.bar)),
+                    "relative_to": self.body(spring.relative_to),
                     "stiffness": spring.stiffness,
                     "free_angle": spring.free_angle,
                     "damping": spring.damping,
                 })
-            })
-            .collect();
-        let forces: Vec<_> = (self.forces.iter())
-            .map(|Force { name, bar, point, force, follows, law }| {
+            }),
+            "forces": objects(&self.forces, |Force { name, bar, point, force, follows, law }| {
                 let frame = if *follows { "body" } else { "ground" };
-                let said = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force,
-                    "frame": frame});
+                let said = json!({"name": name, "body": self.body(Some(*bar)), "point": point,
+                    "force": force, "frame": frame});
                 with(said, "law", law)
-            })
-            .collect();
-        let torques: Vec<_> = (self.torques.iter())
-            .map(|Torque { name, bar, relative_to, torque, law }| {
-                let said = json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to),
-                    "torque": torque});
+            }),
+            "torques": objects(&self.torques, |Torque { name, bar, relative_to, torque, law }| {
+                let said = json!({"name": name, "body": self.body(Some(*bar)),
+                    "relative_to": self.body(*relative_to), "torque": torque});
                 with(said, "law", law)
-            })
-            .collect();
-        let motors: Vec<_> = (self.motors.iter())
-            .map(|motor| {
-                json!({"name": motor.name, "body": body(Some(motor.bar)),
-                "relative_to": body(motor.relative_to), "law": motor.law})
-            })
-            .chain(self.drives.iter().map(|drive| {
-                json!({"name": drive.name,
-                "slider": self.sliders[drive.slider].name, "law": drive.law})
-            }))
-            .chain(self.couplings.iter().map(|Coupling { name, coupled, aim }| match coupled {
-                Coupled::Angle { bar, relative_to } => json!({"name": name, "body": body(Some(*bar)),
-                        "relative_to": body(*relative_to), "law": aim}),
-                Coupled::Travel(slider) => json!({"name": name, "slider": self.sliders[*slider].name,
-                    "law": aim}),
-            }))
-            .collect();
-        let walls: Vec<_> = (self.walls.iter().enumerate())
-            .map(|(i, wall)| {
-                let said = json!({
-                    "name": wall.name,
-                    "body": body(Some(wall.bar)),
-                    "point": wall.point,
-                    "line": with(
-                        json!({"through": wall.through, "normal": wall.normal}),
-                        "body",
-                        &wall.on.map(|bar| body(Some(bar))),
-                    ),
-                    "restitution": wall.restitution,
-                });
-                let said = with(said, "law", &wall.law);
-                let said = with(said, "law", &wall.aim);
-                with(said, "friction", &self.friction((FrictionPart::Wall, i)))
-            })
-            .collect();
-        let mut said = json!({
-            "name": self.name,
-            "description": self.description,
-            "gravity": self.gravity,
-            "bars": bars,
-            "hinges": hinges,
-            "sliders": sliders,
-            "welds": welds,
-            "locks": locks,
-            "springs": springs,
-            "torsion_springs": torsion_springs,
-            "forces": forces,
-            "torques": torques,
-            "motors": motors,
-            "walls": walls,
+            }),
+            "motors": self.motor_objects(),
+            "walls": self.wall_objects(),
             "start": start,
             "until": self.until,
             "every": self.every,
         });
-        self.add_formulas(&mut said, &place, &body);
+        self.add_formulas(&mut said);
         said
     }
 
+    fn body(&self, bar: Option<usize>) -> &str {
+        bar.map_or(GROUND, |bar| self.bars[bar].name.as_str())
+    }
+
+    fn place(&self, place: &Place) -> Value {
+        json!({"body": self.body(place.bar), "point": place.point})
+    }
+
+    /// The hinges with their friction.
+    fn hinge_objects(&self) -> Vec<Value> {
+        let hinges = self.hinges[..self.own_hinges()].iter().enumerate();
+        let object = |(i, hinge): (usize, &Hinge)| {
+            let between = hinge.between.each_ref().map(|place| self.place(place));
+            let said = json!({"name": hinge.name, "between": between});
+            with(said, "friction", &self.friction((FrictionPart::Hinge, i)))
+        };
+        hinges.map(object).collect()
+    }
+
+    /// The sliders with their friction.
+    fn slider_objects(&self) -> Vec<Value> {
+        let object = |(i, Slider { name, point, rail, locked }): (usize, &Slider)| {
+            let said = json!({
+                "name": name,
+                "point": self.place(point),
+                "rail": {"body": self.body(rail.place.bar), "point": rail.place.point,
+                    "direction": rail.direction},
+                "angle": if *locked { "locked" } else { "free" },
+            });
+            with(said, "friction", &self.friction((FrictionPart::Slider, i)))
+        };
+        self.sliders.iter().enumerate().map(object).collect()
+    }
+
+    /// The motors on angles, on sliders, and those whose aims depend on the mechanism.
+    fn motor_objects(&self) -> Vec<Value> {
+        let on_angles = self.motors.iter().map(|motor| {
+            json!({"name": motor.name, "body": self.body(Some(motor.bar)),
+                "relative_to": self.body(motor.relative_to), "law": motor.law})
+        });
+        let on_sliders = self.drives.iter().map(
+            |drive| json!({"name": drive.name, "slider": self.sliders[drive.slider].name, "law": drive.law}),
+        );
+        let coupled = self.couplings.iter().map(|Coupling { name, coupled, aim }| match coupled {
+            Coupled::Angle { bar, relative_to } => json!({"name": name, "body": self.body(Some(*bar)),
+                "relative_to": self.body(*relative_to), "law": aim}),
+            Coupled::Travel(slider) => {
+                json!({"name": name, "slider": self.sliders[*slider].name, "law": aim})
+            }
+        });
+        on_angles.chain(on_sliders).chain(coupled).collect()
+    }
+
+    /// The walls with their laws and their friction.
+    fn wall_objects(&self) -> Vec<Value> {
+        let object = |(i, wall): (usize, &Wall)| {
+            let line = json!({"through": wall.through, "normal": wall.normal});
+            let said = json!({
+                "name": wall.name,
+                "body": self.body(Some(wall.bar)),
+                "point": wall.point,
+                "line": with(line, "body", &wall.on.map(|bar| self.body(Some(bar)))),
+                "restitution": wall.restitution,
+            });
+            let said = with(said, "law", &wall.law);
+            let said = with(said, "law", &wall.aim);
+            with(said, "friction", &self.friction((FrictionPart::Wall, i)))
+        };
+        self.walls.iter().enumerate().map(object).collect()
+    }
+
     /// Adds what is said in formulas, where there is any.
-    fn add_formulas<'a>(
-        &'a self,
-        said: &mut Value,
-        place: &impl Fn(&'a Place) -> Value,
-        body: &impl Fn(Option<usize>) -> &'a str,
-    ) {
+    fn add_formulas(&self, said: &mut Value) {
         let Value::Object(scene) = said else { return };
         let mut put = |key: &str, value: Value, is_any: bool| {
             if is_any {
@@ -172,8 +161,9 @@ impl Scene {
             self.parameters.iter().map(|one| (one.name.clone(), json!(one.value))).collect();
         put("parameters", Value::Object(parameters), !self.parameters.is_empty());
         let points: Vec<Value> = (self.points.iter())
-            .map(|NamedPoint { name,
-                place }| json!({"name": name, "body": body(place.bar), "point": place.point}))
+            .map(|NamedPoint { name, place }| {
+                json!({"name": name, "body": self.body(place.bar), "point": place.point})
+            })
             .collect();
         put("points", points.into(), !self.points.is_empty());
         let tables: Map<String, Value> =
@@ -194,22 +184,23 @@ impl Scene {
             let (list, law) = match load {
                 Load::Force { bar, point, force, follows } => {
                     let frame = if *follows { "body" } else { "ground" };
-                    let law = json!({"name": name, "body": body(Some(*bar)), "point": point, "force": force,
-                        "frame": frame});
+                    let law = json!({"name": name, "body": self.body(Some(*bar)), "point": point,
+                        "force": force, "frame": frame});
                     ("forces", law)
                 }
                 Load::Torque { bar, relative_to, torque } => {
-                    let law = json!({"name": name, "body": body(Some(*bar)),
-                        "relative_to": body(*relative_to), "torque": torque});
+                    let law = json!({"name": name, "body": self.body(Some(*bar)),
+                        "relative_to": self.body(*relative_to), "torque": torque});
                     ("torques", law)
                 }
                 Load::Spring { between, potential, tension } => {
-                    let law = json!({"name": name, "between": between.each_ref().map(place)});
+                    let law =
+                        json!({"name": name, "between": between.each_ref().map(|place| self.place(place))});
                     ("springs", with(with(law, "potential", potential), "tension", tension))
                 }
                 Load::TorsionSpring { bar, relative_to, potential, torque } => {
-                    let law =
-                        json!({"name": name, "body": body(Some(*bar)), "relative_to": body(*relative_to)});
+                    let law = json!({"name": name, "body": self.body(Some(*bar)),
+                        "relative_to": self.body(*relative_to)});
                     ("torsion_springs", with(with(law, "potential", potential), "torque", torque))
                 }
                 Load::Potential { energy } => ("potentials", json!({"name": name, "energy": energy})),
@@ -248,7 +239,6 @@ fn event(event: &SceneEvent) -> Value {
     with(said, "set", &(!set.is_empty()).then_some(set))
 }
 
-/// An object with one key more, where that has a value.
 impl Scene {
     /// The friction of a part, as the input says it.
     fn friction(&self, part: (FrictionPart, usize)) -> Option<Value> {
@@ -266,6 +256,12 @@ impl Scene {
     }
 }
 
+/// The objects of a list of parts.
+fn objects<T>(parts: &[T], object: impl Fn(&T) -> Value) -> Vec<Value> {
+    parts.iter().map(object).collect()
+}
+
+/// An object with one key more, where that has a value.
 fn with(mut object: Value, key: &str, value: &Option<impl Serialize>) -> Value {
     if let (Value::Object(members), Some(value)) = (&mut object, value) {
         members.insert(key.to_owned(), json!(value));

@@ -229,6 +229,16 @@ impl Radau {
         size
     }
 
+    /// Moves the state to the end of an accepted step of `h` \[s\].
+    fn finish_step(&mut self, state: &mut State, h: f64, time: Time) {
+        self.work.last.copy_from_slice(&self.work.z);
+        self.work.length = h;
+        state.y.copy_from_slice(&self.work.next);
+        state.low.copy_from_slice(&self.work.next_low);
+        state.time = time;
+        state.wrap();
+    }
+
     /// Writes the new state.
     fn close(&mut self, state: &State) {
         let d = state.y.len();
@@ -301,7 +311,7 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
         until: Time,
         statistics: &mut Statistics,
     ) -> Result<Option<usize>, StepError> {
-        let (d, left) = (state.y.len(), (until - state.time).hi);
+        let left = (until - state.time).hi;
         field.fine_rate(state.time, &state.y, &state.low, &mut self.work.start);
         statistics.evaluations += 1;
         scales(self.tolerance, &state.y, &self.work.units, &mut self.work.scale);
@@ -313,25 +323,12 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
             let (h, whole) = super::reach(control.wanted, left);
             statistics.check(self.id(), state.time.hi, h)?;
             let is_finest = h < super::finest(state, field.time_unit()) && !whole;
-            if cuts > MOST_CUTS || is_finest && cuts > 0 {
-                let what = format!("{} is not finite", self.culprit(field));
-                return Err(self.stop(Cause::NotFinite, state, h, what, super::NOT_FINITE));
+            if cuts > MOST_CUTS || is_finest {
+                return Err(self.too_short(field, state, h, cuts > 0));
             }
-            if is_finest {
-                let what = format!("{} asks for ever smaller steps", self.culprit(field));
-                let hint = "loosen the tolerance: forces of stiff springs have a rounding of their own";
-                return Err(self.stop(Cause::StepTooSmall, state, h, what, hint));
-            }
-            let is_fresh =
-                control.keeps == 0.0 && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
-            if (is_fresh || self.work.jacobian.is_empty())
-                && !self.differentiate(field, is_fresh.then_some(&*state), statistics)
-            {
+            if !self.linearise(field, state, h, control.keeps == 0.0, statistics) {
                 let what = "this form of the equations has no Jacobian".into();
                 return Err(self.stop(Cause::Unsuited, state, h, what, "use dp8"));
-            }
-            if self.work.factored != h {
-                self.factor(h, d);
             }
             if let Some(shorter) = self.shortened_by_growth(field.may_grow_by_rates(), h) {
                 control.wanted = shorter;
@@ -365,12 +362,7 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
                 continue;
             }
             cuts = 0;
-            let (exponent, most) = (
-                1.0 / (self.tableau.stages() as f64 + 1.0),
-                if self.tableau.stages() == 3 { 7.0 } else { 12.0 },
-            );
-            let factor = SAFE.min(SAFE * (1.0 + 2.0 * most) / (sweeps as f64 + 2.0 * most));
-            let quotient = (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]);
+            let (exponent, quotient) = self.quotient(error, sweeps);
             if error >= 1.0 {
                 statistics.rejected += 1;
                 let is_first = control.accepted == 0.0;
@@ -392,12 +384,8 @@ impl<F: OdeSystem + ?Sized> Integrator<F> for Radau {
             control.accept(h, error, exponent, quotient, theta, self.is_hard);
             self.is_hard = false;
             self.control = control;
-            self.work.last.copy_from_slice(&self.work.z);
-            self.work.length = h;
-            state.y.copy_from_slice(&self.work.next);
-            state.low.copy_from_slice(&self.work.next_low);
-            state.time = if lands { until } else { state.time + DoubleDouble::of(h) };
-            state.wrap();
+            let end = if lands { until } else { state.time + DoubleDouble::of(h) };
+            self.finish_step(state, h, end);
             self.remember(state, &control);
             statistics.steps += 1;
             return Ok(event);

@@ -130,6 +130,60 @@ pub struct Stepper {
     accepted: u64,
 }
 
+impl Stepper {
+    fn stop(&self, cause: Cause, t: f64, step: f64, what: String, hint: &str) -> StepError {
+        StepError { cause, method: self.name.into(), t, step, what, hint: hint.into() }
+    }
+
+    /// Looks for a rate that is not finite, which the crate would take for a step that is too small.
+    fn check_rate<F: OdeSystem + ?Sized>(
+        &self,
+        field: &mut F,
+        state: &State,
+        statistics: &mut Statistics,
+    ) -> Result<(), StepError> {
+        let mut rate = vec![0.0; state.y.len()];
+        field.rhs(state.time, &state.y, &mut rate);
+        statistics.evaluations += 1;
+        let Some(i) = rate.iter().position(|rate| !rate.is_finite()) else { return Ok(()) };
+        let what = format!("the rate of {} is not finite", field.label(i));
+        Err(self.stop(Cause::NotFinite, state.time.hi, 0.0, what, super::NOT_FINITE))
+    }
+
+    /// Counts what a call of the crate evaluated that made so many steps, the length of the first one found
+    /// by itself or not; where it failed at a time \[s\] that `reached` gives, why.
+    fn count(
+        &self,
+        outcome: Result<Stats, IntegrationError>,
+        finds_first: bool,
+        made: usize,
+        reached: impl Fn(f64) -> f64,
+        statistics: &mut Statistics,
+    ) -> Option<StepError> {
+        match outcome {
+            Ok(stats) => {
+                statistics.evaluations += u64::from(stats.num_eval);
+                let begun = if finds_first { 3 } else { 1 };
+                let accepted = u64::from(stats.accepted_steps);
+                let attempts = (u64::from(stats.num_eval) - begun - self.accepted * accepted) / self.attempt;
+                statistics.rejected += attempts - accepted;
+                None
+            }
+            Err(IntegrationError::MaxNumStepReached { x, .. }) => {
+                statistics.evaluations = statistics.max_evaluations;
+                Some(statistics.exhausted(self.name, reached(x), 0.0))
+            }
+            Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
+                // What the crate does not tell: at least its accepted steps were evaluated.
+                statistics.evaluations += (self.attempt + self.accepted) * made as u64;
+                let what = "the step fell below the resolution of time, or a rate became not finite".into();
+                let hint = "loosen the tolerance, or take --method taylor or radau9";
+                Some(self.stop(Cause::StepTooSmall, reached(x), 0.0, what, hint))
+            }
+        }
+    }
+}
+
 /// What integrates one window: it, the unknowns, its length \[s\], the first step \[s\], and most steps.
 type Integrate<'a> = dyn FnMut(Window, &[f64], f64, f64, u32) -> Outcome + 'a;
 
@@ -179,28 +233,8 @@ fn part<F: OdeSystem + ?Sized>(
     let (n, name) = (state.y.len(), stepper.name);
     let span = (until - state.time).hi;
     statistics.check(name, state.time.hi, state.memory.first().copied().unwrap_or(0.0))?;
-    let stop = |cause, t: f64, step, what: String, hint: &str| StepError {
-        cause,
-        method: name.into(),
-        t,
-        step,
-        what,
-        hint: hint.into(),
-    };
     let (before, allowed) = (*statistics, statistics.max_evaluations.saturating_sub(statistics.evaluations));
-    let mut rate = vec![0.0; n];
-    field.rhs(state.time, &state.y, &mut rate);
-    statistics.evaluations += 1;
-    if let Some(i) = rate.iter().position(|rate| !rate.is_finite()) {
-        let hint = super::NOT_FINITE;
-        return Err(stop(
-            Cause::NotFinite,
-            state.time.hi,
-            0.0,
-            format!("the rate of {} is not finite", field.label(i)),
-            hint,
-        ));
-    }
+    stepper.check_rate(field, state, statistics)?;
     let (mut unit, time_unit) = (Vec::new(), field.time_unit());
     super::units(field, n, &mut unit);
     let mut y: Vec<f64> = state.y.iter().zip(&unit).map(|(y, unit)| y / unit).collect();
@@ -224,33 +258,13 @@ fn part<F: OdeSystem + ?Sized>(
         kept.clear();
         return Ok(());
     }
-    match outcome {
-        Ok(stats) => {
-            statistics.evaluations += u64::from(stats.num_eval);
-            let begun = if first == 0.0 { 3 } else { 1 };
-            let attempts =
-                (u64::from(stats.num_eval) - begun - stepper.accepted * u64::from(stats.accepted_steps))
-                    / stepper.attempt;
-            statistics.rejected += attempts - u64::from(stats.accepted_steps);
-        }
-        Err(IntegrationError::MaxNumStepReached { x, .. }) => {
-            statistics.evaluations = statistics.max_evaluations;
-            kept.failure = Some(statistics.exhausted(name, reached_time(x), 0.0));
-        }
-        Err(IntegrationError::StepSizeUnderflow { x } | IntegrationError::StiffnessDetected { x }) => {
-            let what = "the step fell below the resolution of time, or a rate became not finite".into();
-            let hint = "loosen the tolerance, or take --method taylor or radau9";
-            kept.failure = Some(stop(Cause::StepTooSmall, reached_time(x), 0.0, what, hint));
-            // What the crate does not tell: at least its accepted steps were evaluated.
-            let steps = times.len().saturating_sub(1);
-            statistics.evaluations += (stepper.attempt + stepper.accepted) * steps as u64;
-        }
-    }
+    let made = times.len().saturating_sub(1);
+    kept.failure = stepper.count(outcome, first == 0.0, made, reached_time, statistics);
     let finite = rows.chunks(n + 1).take_while(|row| row.iter().all(|y| y.is_finite())).count();
     if let Some(row) = rows.chunks(n + 1).nth(finite) {
         let lost = row.iter().take(n).position(|y| !y.is_finite()).unwrap_or(0);
         let (what, t) = (format!("{} is not finite", field.label(lost)), reached_time(times[finite]));
-        let not_finite = || stop(Cause::NotFinite, t, 0.0, what, "tighten the tolerance");
+        let not_finite = || stepper.stop(Cause::NotFinite, t, 0.0, what, "tighten the tolerance");
         kept.failure = kept.failure.take().or_else(|| Some(not_finite()));
         times.truncate(finite);
         rows.truncate(finite * (n + 1));
@@ -261,7 +275,8 @@ fn part<F: OdeSystem + ?Sized>(
             return Err(failure);
         }
         let what = "the crate made no step".into();
-        return Err(stop(Cause::StepTooSmall, state.time.hi, span, what, "take --method taylor or dp8"));
+        let hint = "take --method taylor or dp8";
+        return Err(stepper.stop(Cause::StepTooSmall, state.time.hi, span, what, hint));
     }
     // A maximum of evaluations ends it as one of rows does: the next part stops, or goes on with more.
     kept.failure = kept.failure.take().filter(|failure| failure.cause != Cause::EffortExhausted);

@@ -99,18 +99,7 @@ impl ContactDriver {
             events,
             extremes,
         } = contact_state;
-        let mut whole = mechanism.whole.clone().map_or(mechanism, |(whole, _)| whole);
-        if !shifts.is_empty() {
-            whole = Arc::new(whole.shifted(&shifts));
-        }
-        if let Some((parameters, modes)) = laws {
-            let sizes = whole.laws.as_ref().map(|laws| (laws.parameters.len(), laws.modes.len()));
-            if sizes != Some((parameters.len(), modes.len())) {
-                return Ok(None);
-            }
-            let Ok(branch) = whole.on_branch(parameters, modes) else { return Ok(None) };
-            whole = Arc::new(branch);
-        }
+        let Some(whole) = whole_again(mechanism, &shifts, laws) else { return Ok(None) };
         let Ok(mechanism) = whole.without(&off).map(Arc::new) else { return Ok(None) };
         let known = |contact: usize| contact < mechanism.contacts.len();
         let once = contacts.iter().enumerate().all(|(i, contact)| !contacts[..i].contains(contact));
@@ -166,4 +155,23 @@ impl ContactDriver {
             ..contact_driver
         }))
     }
+}
+
+/// The mechanism with all its parts, its motors and locks so much further on, by these parameters of its
+/// laws on these branches; `None` where it has other laws.
+fn whole_again(
+    mechanism: Arc<Mechanism>,
+    shifts: &[(usize, f64)],
+    laws: Option<(Vec<f64>, Vec<bool>)>,
+) -> Option<Arc<Mechanism>> {
+    let mut whole = mechanism.whole.clone().map_or(mechanism, |(whole, _)| whole);
+    if !shifts.is_empty() {
+        whole = Arc::new(whole.shifted(shifts));
+    }
+    let Some((parameters, modes)) = laws else { return Some(whole) };
+    let sizes = whole.laws.as_ref().map(|laws| (laws.parameters.len(), laws.modes.len()));
+    if sizes != Some((parameters.len(), modes.len())) {
+        return None;
+    }
+    whole.on_branch(parameters, modes).ok().map(Arc::new)
 }

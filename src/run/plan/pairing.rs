@@ -20,74 +20,51 @@ pub(super) fn pair(
     notes: &mut Vec<String>,
 ) -> Result<Stabilization, RequestRefusal> {
     check_size(mechanism, method, request)?;
-    if !mechanism.contacts.is_empty()
-        && !matches!(method, MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_))
-    {
-        let reason = match method {
-            MethodId::Dopri5 | MethodId::Dop853 => {
-                "ode_solvers does not let an impact be located inside its steps"
-            }
-            _ => "an impact inside a fixed step cannot be located without changing the step",
-        };
-        return Err(mismatch(
-            format!("{method} on a scene with walls"),
-            reason,
-            "--method dp8, taylor for more digits, or dp5 at loose tolerances",
-        ));
-    }
+    check_walls(mechanism, method)?;
     check_friction(mechanism, method, request)?;
-    if let (MethodId::Taylor, Some(row), Some(Stabilization::Elimination)) =
-        (method, mechanism.constraints.iter().find(|row| row.aim.is_some()), request.stabilize)
-    {
-        return Err(mismatch(
-            format!("taylor by elimination on a scene with motor {}", row.name),
-            "its aim depends on where the mechanism is, and its series asks for all angles",
-            "--stabilize projection",
-        ));
-    }
-    if matches!(method, MethodId::Rattle(_)) && mechanism.is_damped() {
-        let by_rates = mechanism.forces.iter().find(|force| force.depends_on_rates());
-        let what = by_rates.map_or("dampers".to_owned(), |force| format!("force or torque {}", force.name));
-        let reason = "RATTLE takes potentials and constant forces, and what depends on rates is neither";
-        return Err(mismatch(
-            format!("{method} on a scene with {what}"),
-            reason,
-            "--method dop853, or gauss16 for a fixed step",
-        ));
-    }
-    let on_branches = || match mechanism.law_without_potential() {
-        Some(name) => Err(NaturalError::WithoutPotential(name.to_owned())),
-        None => Natural::new(std::sync::Arc::new(mechanism.clone())),
-    };
-    if matches!(method, MethodId::Rattle(_))
-        && let Err(error) = on_branches()
-    {
-        return Err(mismatch(
-            format!("{method} on this scene"),
-            &error.to_string(),
-            "--method dp8, or gauss16 for a fixed step",
-        ));
-    }
+    check_aims(mechanism, method, request)?;
+    check_rattle(mechanism, method)?;
     if mechanism.constraints.is_empty() {
         if request.stabilize.is_some_and(|kind| kind != Stabilization::None) {
             notes.push("the scene has no constraint: nothing to stabilize".into());
         }
         return Ok(Stabilization::None);
     }
-    let windowed = matches!(method, MethodId::Dopri5 | MethodId::Dop853);
-    let Some(asked) = request.stabilize else {
-        let usual =
-            if matches!(method, MethodId::Rattle(_)) { Stabilization::Projection } else { usual(mechanism) };
-        if windowed && usual == Stabilization::Projection {
-            let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
-            notes.push(format!(
-                "{method} takes no projection: constraints drift with its tolerance; {own} keeps them"
-            ));
-            return Ok(Stabilization::None);
+    let Some(asked) = request.stabilize else { return Ok(unasked(mechanism, method, notes)) };
+    match against(mechanism, method, asked) {
+        None => Ok(asked),
+        Some((reason, alternative)) => {
+            Err(mismatch(format!("{method} with --stabilize {asked}"), reason, alternative))
         }
-        return Ok(usual);
+    }
+}
+
+/// How constraints are kept where nobody says, with a note where they are not.
+fn unasked(mechanism: &Mechanism, method: MethodId, notes: &mut Vec<String>) -> Stabilization {
+    let own = match method {
+        MethodId::Rattle(_) => return Stabilization::Projection,
+        MethodId::Dopri5 => "dp5",
+        MethodId::Dop853 => "dp8",
+        _ => return usual(mechanism),
     };
-    if asked == Stabilization::Elimination && mechanism.has_multipliers() {
+    let usual = usual(mechanism);
+    if usual != Stabilization::Projection {
+        return usual;
+    }
+    notes.push(format!(
+        "{method} takes no projection: constraints drift with its tolerance; {own} keeps them"
+    ));
+    Stabilization::None
+}
+
+/// Why a method does not take a stabilization, and what to ask for instead.
+fn against(
+    mechanism: &Mechanism,
+    method: MethodId,
+    asked: Stabilization,
+) -> Option<(&'static str, &'static str)> {
+    use Stabilization::{Baumgarte, Elimination, None as Unkept, Projection};
+    if asked == Elimination && mechanism.has_multipliers() {
         let reason = if mechanism.has_closed_loops() {
             "closed loops and sliders have no independent coordinates to be left with"
         } else if mechanism.constraints.iter().any(|row| mechanism.may_be_off(&row.name)) {
@@ -95,60 +72,93 @@ pub(super) fn pair(
         } else {
             "a torsion spring counts the turns of an angle, which elimination takes modulo whole ones"
         };
-        return Err(mismatch(format!("{method} with --stabilize {asked}"), reason, "--stabilize projection"));
+        return Some((reason, "--stabilize projection"));
     }
+    let is_projected = usual(mechanism) == Projection;
+    let by_own_loop = "projection acts after every accepted step, and ode_solvers owns its loop";
     match (method, asked) {
-        (MethodId::Rattle(_), Stabilization::Projection) => Ok(asked),
-        (MethodId::Rattle(_), _) => {
-            let reason = "RATTLE keeps every row at both levels by its own projection";
-            Err(mismatch(
-                format!("{method} with --stabilize {asked}"),
-                reason,
-                "leave --stabilize out, or --method dp8",
-            ))
+        (MethodId::Rattle(_), Unkept | Baumgarte | Elimination) => Some((
+            "RATTLE keeps every row at both levels by its own projection",
+            "leave --stabilize out, or --method dp8",
+        )),
+        (MethodId::Gauss(_), Unkept | Baumgarte) if is_projected => Some((
+            "a Gauss method keeps loops and sliders by symmetric projection, and nothing else keeps its \
+                energy",
+            "--stabilize projection, or --method dp8",
+        )),
+        (MethodId::Gauss(_), Unkept | Baumgarte | Projection) if !is_projected => Some((
+            "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is eliminated",
+            "--stabilize elimination, or --method dp8",
+        )),
+        (MethodId::Taylor, Baumgarte) => Some((
+            "the series is that of the constrained motion, which has nothing to be pulled back from",
+            "--stabilize projection or elimination, or --method dp8",
+        )),
+        (MethodId::Dopri5, Projection) => {
+            Some((by_own_loop, "--method dp5, the same tableau in our own stepper"))
         }
-        (MethodId::Gauss(_), Stabilization::Projection) if usual(mechanism) == Stabilization::Projection => {
-            Ok(asked)
+        (MethodId::Dop853, Projection) => {
+            Some((by_own_loop, "--method dp8, the same tableau in our own stepper"))
         }
-        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte)
-            if usual(mechanism) == Stabilization::Projection =>
-        {
-            let reason = "a Gauss method keeps loops and sliders by symmetric projection, and nothing else \
-                keeps its energy";
-            Err(mismatch(
-                format!("{method} with --stabilize {asked}"),
-                reason,
-                "--stabilize projection, or --method dp8",
-            ))
+        _ => None,
+    }
+}
+
+/// Walls take methods that end their steps at impacts.
+fn check_walls(mechanism: &Mechanism, method: MethodId) -> Result<(), RequestRefusal> {
+    let reason = match method {
+        _ if mechanism.contacts.is_empty() => return Ok(()),
+        MethodId::Dp5 | MethodId::Dp8 | MethodId::Taylor | MethodId::Radau(_) => return Ok(()),
+        MethodId::Dopri5 | MethodId::Dop853 => {
+            "ode_solvers does not let an impact be located inside its steps"
         }
-        (MethodId::Gauss(_), Stabilization::None | Stabilization::Baumgarte | Stabilization::Projection) => {
-            let reason = "Gauss methods are symplectic in coordinates and momenta, where a motor's angle is \
-                eliminated";
-            Err(mismatch(
-                format!("{method} with --stabilize {asked}"),
-                reason,
-                "--stabilize elimination, or --method dp8",
-            ))
-        }
-        (MethodId::Taylor, Stabilization::Baumgarte) => {
-            let reason =
-                "the series is that of the constrained motion, which has nothing to be pulled back from";
-            Err(mismatch(
-                format!("{method} with --stabilize {asked}"),
-                reason,
-                "--stabilize projection or elimination, or --method dp8",
-            ))
-        }
-        (MethodId::Dopri5 | MethodId::Dop853, Stabilization::Projection) => {
-            let own = if method == MethodId::Dopri5 { "dp5" } else { "dp8" };
-            let reason = "projection acts after every accepted step, and ode_solvers owns its loop";
-            Err(mismatch(
-                format!("{method} with --stabilize projection"),
-                reason,
-                &format!("--method {own}, the same tableau in our own stepper"),
-            ))
-        }
-        _ => Ok(asked),
+        _ => "an impact inside a fixed step cannot be located without changing the step",
+    };
+    Err(mismatch(
+        format!("{method} on a scene with walls"),
+        reason,
+        "--method dp8, taylor for more digits, or dp5 at loose tolerances",
+    ))
+}
+
+/// Aims that depend on the mechanism ask for all its angles.
+fn check_aims(mechanism: &Mechanism, method: MethodId, request: &Request) -> Result<(), RequestRefusal> {
+    let aimed = mechanism.constraints.iter().find(|row| row.aim.is_some());
+    match (method, aimed, request.stabilize) {
+        (MethodId::Taylor, Some(row), Some(Stabilization::Elimination)) => Err(mismatch(
+            format!("taylor by elimination on a scene with motor {}", row.name),
+            "its aim depends on where the mechanism is, and its series asks for all angles",
+            "--stabilize projection",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// RATTLE takes potentials, and what its coordinates can hold.
+fn check_rattle(mechanism: &Mechanism, method: MethodId) -> Result<(), RequestRefusal> {
+    if !matches!(method, MethodId::Rattle(_)) {
+        return Ok(());
+    }
+    if mechanism.is_damped() {
+        let by_rates = mechanism.forces.iter().find(|force| force.depends_on_rates());
+        let what = by_rates.map_or("dampers".to_owned(), |force| format!("force or torque {}", force.name));
+        return Err(mismatch(
+            format!("{method} on a scene with {what}"),
+            "RATTLE takes potentials and constant forces, and what depends on rates is neither",
+            "--method dop853, or gauss16 for a fixed step",
+        ));
+    }
+    let on_branches = match mechanism.law_without_potential() {
+        Some(name) => Err(NaturalError::WithoutPotential(name.to_owned())),
+        None => Natural::new(std::sync::Arc::new(mechanism.clone())),
+    };
+    match on_branches {
+        Ok(_) => Ok(()),
+        Err(error) => Err(mismatch(
+            format!("{method} on this scene"),
+            &error.to_string(),
+            "--method dp8, or gauss16 for a fixed step",
+        )),
     }
 }
 

@@ -220,16 +220,14 @@ impl TrustMeasurement {
         self.until = t;
     }
 
-    /// What it has come to at the end of the run, `t` \[s\].
-    pub(super) fn trust(mut self, t: f64) -> Trust {
-        if self.until > t {
-            self.cut(t);
-        }
+    /// How errors grew up to the end of the run, `t` \[s\], as far as that was followed; notes where it was
+    /// not followed far enough.
+    fn growth(&mut self, t: f64) -> Growth {
         let Growth { lyapunov, power: found, why: neither } =
             if self.no_growth.is_some() { Growth::default() } else { self.nature.judge(&self.history) };
         // A power shows over most of the run only: in the beginning it is that of one oscillation.
-        let growth_power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
-        if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, growth_power) {
+        let power = found.filter(|_| self.stopped.is_none_or(|[followed, _]| followed >= 0.5 * t));
+        if let (Some([followed, _]), None, None) = (self.stopped, lyapunov, power) {
             let why = || {
                 let seconds = if followed >= 0.01 { format!("{followed:.2}") } else { estimate(followed) };
                 format!(
@@ -239,8 +237,17 @@ impl TrustMeasurement {
             };
             self.no_growth.get_or_insert_with(why);
         }
-        let is_open = self.no_growth.is_none() && growth_power.is_none() && lyapunov.is_none();
-        let unclear_growth = neither.filter(|_| is_open).map(str::to_owned);
+        let is_open = self.no_growth.is_none() && power.is_none() && lyapunov.is_none();
+        Growth { lyapunov, power, why: neither.filter(|_| is_open) }
+    }
+
+    /// What it has come to at the end of the run, `t` \[s\].
+    pub(super) fn trust(mut self, t: f64) -> Trust {
+        if self.until > t {
+            self.cut(t);
+        }
+        let Growth { lyapunov, power: growth_power, why } = self.growth(t);
+        let unclear_growth = why.map(str::to_owned);
         let input_error =
             self.input_error.or_else(|| self.inputs_at(self.horizon.unwrap_or(t), lyapunov.is_some()));
         let Self {

@@ -120,42 +120,6 @@ impl<'a, C: Decimal> Reader<'a, C> {
 
     pub(super) fn scene(&self, plain: &Scene) -> Result<Scene<C>, SceneError> {
         let bars = 0..plain.own_bars();
-        let slider = |at: &TreeCursor, plain: &Slider| {
-            let missing = || self.refuse(at, "has no rail", "compare with the scene's text");
-            let rail = at.child("rail").ok_or_else(missing)?;
-            let point = at.child("point").ok_or_else(missing)?;
-            Ok(Slider {
-                name: plain.name.clone(),
-                point: self.place(&point, &plain.point)?,
-                rail: Rail {
-                    place: self.place(&rail, &plain.rail.place)?,
-                    direction: self.direction(&rail, "direction", plain.rail.direction)?,
-                },
-                locked: plain.locked,
-            })
-        };
-        let motor = |plain: &Motor| {
-            let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
-            Ok(Motor { name: plain.name.clone(), bar: plain.bar, relative_to: plain.relative_to, law })
-        };
-        let drive = |plain: &Drive| {
-            let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
-            Ok(Drive { name: plain.name.clone(), slider: plain.slider, law })
-        };
-        let wall = |at: &TreeCursor, plain: &Wall| {
-            let line = at.child("line").unwrap_or_else(|| at.clone());
-            Ok(Wall {
-                name: plain.name.clone(),
-                bar: plain.bar,
-                point: self.pair(at, "point", plain.point)?,
-                on: plain.on,
-                law: plain.law.as_ref().map(|law| self.law(at, law)).transpose()?,
-                aim: plain.aim.as_ref().map(|aim| self.formula(at, "law", aim)).transpose()?,
-                through: self.pair(&line, "through", plain.through)?,
-                normal: self.direction(&line, "normal", plain.normal)?,
-                restitution: self.number(at, "restitution", plain.restitution)?,
-            })
-        };
         let scene = Scene {
             name: plain.name.clone(),
             gravity: self.pair(&self.root, "gravity", plain.gravity)?,
@@ -163,7 +127,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
             hinges: self.each("hinges", &plain.hinges, |at, hinge| {
                 Ok(Hinge { name: hinge.name.clone(), between: self.between(at, &hinge.between)? })
             })?,
-            sliders: self.each("sliders", &plain.sliders, slider)?,
+            sliders: self.each("sliders", &plain.sliders, |at, slider| self.slider(at, slider))?,
             welds: self.each("welds", &plain.welds, |at, weld| {
                 Ok(Weld { name: weld.name.clone(), between: self.between(at, &weld.between)? })
             })?,
@@ -192,10 +156,14 @@ impl<'a, C: Decimal> Reader<'a, C> {
                     law: torque.law.as_ref().map(|law| self.law(at, law)).transpose()?,
                 })
             })?,
-            motors: plain.motors.iter().map(motor).collect::<Result<_, SceneError>>()?,
-            drives: plain.drives.iter().map(drive).collect::<Result<_, SceneError>>()?,
+            motors: plain
+                .motors
+                .iter()
+                .map(|motor| self.angle_motor(motor))
+                .collect::<Result<_, SceneError>>()?,
+            drives: plain.drives.iter().map(|drive| self.drive(drive)).collect::<Result<_, SceneError>>()?,
             couplings: self.couplings(plain)?,
-            walls: self.each("walls", &plain.walls, wall)?,
+            walls: self.each("walls", &plain.walls, |at, wall| self.wall(at, wall))?,
             frictions: self.frictions(plain)?,
             start: bars.clone().map(|bar| self.start(plain, bar)).collect::<Result<_, _>>()?,
             given: bars.map(|bar| self.given(plain, bar)).collect::<Result<_, _>>()?,
@@ -214,6 +182,48 @@ impl<'a, C: Decimal> Reader<'a, C> {
             ..Scene::default()
         };
         Ok(scene.with_rotors())
+    }
+
+    fn slider(&self, at: &TreeCursor, plain: &Slider) -> Result<Slider<C>, SceneError> {
+        let missing = || self.refuse(at, "has no rail", "compare with the scene's text");
+        let rail = at.child("rail").ok_or_else(missing)?;
+        let point = at.child("point").ok_or_else(missing)?;
+        Ok(Slider {
+            name: plain.name.clone(),
+            point: self.place(&point, &plain.point)?,
+            rail: Rail {
+                place: self.place(&rail, &plain.rail.place)?,
+                direction: self.direction(&rail, "direction", plain.rail.direction)?,
+            },
+            locked: plain.locked,
+        })
+    }
+
+    /// A motor on an angle.
+    fn angle_motor(&self, plain: &Motor) -> Result<Motor<C>, SceneError> {
+        let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
+        Ok(Motor { name: plain.name.clone(), bar: plain.bar, relative_to: plain.relative_to, law })
+    }
+
+    /// A motor on a slider.
+    fn drive(&self, plain: &Drive) -> Result<Drive<C>, SceneError> {
+        let law = self.law(&self.motor(&plain.name)?, &plain.law)?;
+        Ok(Drive { name: plain.name.clone(), slider: plain.slider, law })
+    }
+
+    fn wall(&self, at: &TreeCursor, plain: &Wall) -> Result<Wall<C>, SceneError> {
+        let line = at.child("line").unwrap_or_else(|| at.clone());
+        Ok(Wall {
+            name: plain.name.clone(),
+            bar: plain.bar,
+            point: self.pair(at, "point", plain.point)?,
+            on: plain.on,
+            law: plain.law.as_ref().map(|law| self.law(at, law)).transpose()?,
+            aim: plain.aim.as_ref().map(|aim| self.formula(at, "law", aim)).transpose()?,
+            through: self.pair(&line, "through", plain.through)?,
+            normal: self.direction(&line, "normal", plain.normal)?,
+            restitution: self.number(at, "restitution", plain.restitution)?,
+        })
     }
 
     fn spring(&self, at: &TreeCursor, spring: &Spring) -> Result<Spring<C>, SceneError> {

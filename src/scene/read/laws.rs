@@ -3,7 +3,7 @@
 use super::at::{At, Fields};
 use super::judge::{check_name, fits, refused};
 use super::loads;
-use super::names::BarNames;
+use super::names::{BarNames, named};
 use super::resolve::Valued;
 use crate::scene::error::SceneError;
 use crate::scene::format::{Field, FieldShape, QuantityRange, SCENE};
@@ -33,6 +33,34 @@ pub(super) fn split<T>(all: Vec<Either<T>>, laws: &mut Vec<LoadLaw>) -> Vec<T> {
         }
     }
     plain
+}
+
+/// The parts that exert forces: the plain ones, and the laws of all others.
+pub(super) struct LoadedParts<'a> {
+    pub springs: Vec<Spring>,
+    /// Places of the plain springs.
+    pub spring_places: Vec<At<'a>>,
+    pub torsion_springs: Vec<TorsionSpring>,
+    pub forces: Vec<Force>,
+    pub torques: Vec<Torque>,
+    pub laws: Vec<LoadLaw>,
+}
+
+/// Those of a scene.
+pub(super) fn loaded_parts<'a>(fields: &Fields<'a>, known: &BarNames) -> Result<LoadedParts<'a>, SceneError> {
+    let (springs, places) = named(fields, "springs", |fields, name| spring(fields, name, known))?;
+    let (torsion_springs, _) =
+        named(fields, "torsion_springs", |fields, name| torsion_spring(fields, name, known))?;
+    let (forces, _) = named(fields, "forces", |fields, name| force(fields, name, known))?;
+    let (torques, _) = named(fields, "torques", |fields, name| torque(fields, name, known))?;
+    let is_plain = |(spring, at): (&Either<_>, _)| matches!(spring, Either::Plain(_)).then_some(at);
+    let spring_places = springs.iter().zip(places).filter_map(is_plain).collect();
+    let mut laws = Vec::new();
+    let springs = split(springs, &mut laws);
+    let torsion_springs = split(torsion_springs, &mut laws);
+    let forces = split(forces, &mut laws);
+    let torques = split(torques, &mut laws);
+    Ok(LoadedParts { springs, spring_places, torsion_springs, forces, torques, laws })
 }
 
 /// A text, or a number as one.

@@ -28,7 +28,7 @@ use super::locate::{Located, Text, Texts};
 use super::set::{Override, put};
 use super::{Coupling, Drive, Motor, Scene};
 use crate::arithmetic::shown::plain;
-use laws::Either;
+use laws::LoadedParts;
 use loads::AnyMotor;
 use names::{BarNames, check_constraint_names, named};
 use resolve::{FormulaConstants, Resolved};
@@ -143,23 +143,12 @@ fn scene(
     let (welds, _) = named(&fields, "welds", |fields, name| joints::weld(fields, name, &known))?;
     let (locks, lock_places) = named(&fields, "locks", |fields, name| joints::lock(fields, name, &known))?;
     let (points, _) = named(&fields, "points", |fields, name| laws::point(fields, name, &known))?;
-    let (springs, spring_places) =
-        named(&fields, "springs", |fields, name| laws::spring(fields, name, &known))?;
-    let is_plain = |(spring, at): (&Either<_>, _)| matches!(spring, Either::Plain(_)).then_some(at);
-    let spring_places: Vec<At> = springs.iter().zip(spring_places).filter_map(is_plain).collect();
-    let (torsion_springs, _) =
-        named(&fields, "torsion_springs", |fields, name| laws::torsion_spring(fields, name, &known))?;
-    let (forces, _) = named(&fields, "forces", |fields, name| laws::force(fields, name, &known))?;
-    let (torques, _) = named(&fields, "torques", |fields, name| laws::torque(fields, name, &known))?;
+    let LoadedParts { springs, spring_places, torsion_springs, forces, torques, mut laws } =
+        laws::loaded_parts(&fields, &known)?;
     let (potentials, _) = named(&fields, "potentials", laws::potential)?;
     let (events, _) = named(&fields, "events", events::event)?;
     let signals = laws::signals(&fields, &parameters)?;
     let integrals = laws::integrals(&fields, &parameters, &signals, &known)?;
-    let mut laws = Vec::new();
-    let springs = laws::split(springs, &mut laws);
-    let torsion_springs = laws::split(torsion_springs, &mut laws);
-    let forces = laws::split(forces, &mut laws);
-    let torques = laws::split(torques, &mut laws);
     laws.extend(potentials);
     let constants = FormulaConstants::new(&parameters, &tables);
     let (any, _) =

@@ -20,6 +20,28 @@ pub enum NewtonEnd {
 }
 
 impl Radau {
+    /// The Jacobian and the factors for a step of `h` \[s\], anew where those at hand do not serve; false
+    /// where the field has none.
+    pub(super) fn linearise<F: OdeSystem + ?Sized>(
+        &mut self,
+        field: &mut F,
+        state: &State,
+        h: f64,
+        may_renew: bool,
+        statistics: &mut Statistics,
+    ) -> bool {
+        let is_fresh = may_renew && !(self.work.place.0 == state.time && self.work.place.1 == state.y);
+        if (is_fresh || self.work.jacobian.is_empty())
+            && !self.differentiate(field, is_fresh.then_some(state), statistics)
+        {
+            return false;
+        }
+        if self.work.factored != h {
+            self.factor(h, state.y.len());
+        }
+        true
+    }
+
     /// The Jacobian at the state, or again where it was taken before.
     pub(super) fn differentiate<F: OdeSystem + ?Sized>(
         &mut self,

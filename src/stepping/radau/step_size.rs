@@ -8,8 +8,9 @@
 //!
 //! Beyond the poles of R a step damps what grows, and the filter of the error estimate hides that it does.
 
-use super::Radau;
-use crate::dynamics::State;
+use super::{QUOTIENT, Radau, SAFE};
+use crate::dynamics::{OdeSystem, State};
+use crate::stepping::{Cause, NOT_FINITE, StepError};
 use nalgebra::linalg::Schur;
 use nalgebra::{DMatrix, linalg::balancing::balance_parlett_reinsch};
 
@@ -26,6 +27,31 @@ impl Radau {
         };
         let guess = 0.01 * norm(&state.y) / norm(&self.work.start);
         if guess.is_finite() && guess > 0.0 { guess.min(span) } else { span.min(short) }
+    }
+
+    /// The exponent of the error, and what that divides the next step by after so many iterations.
+    pub(super) fn quotient(&self, error: f64, sweeps: usize) -> (f64, f64) {
+        let exponent = 1.0 / (self.tableau.stages() as f64 + 1.0);
+        let most = if self.tableau.stages() == 3 { 7.0 } else { 12.0 };
+        let factor = SAFE.min(SAFE * (1.0 + 2.0 * most) / (sweeps as f64 + 2.0 * most));
+        (exponent, (libm::pow(error, exponent) / factor).clamp(QUOTIENT[0], QUOTIENT[1]))
+    }
+
+    /// Why no shorter step is tried: the last ones were not finite, or their errors were too large.
+    pub(super) fn too_short<F: OdeSystem + ?Sized>(
+        &self,
+        field: &F,
+        state: &State,
+        h: f64,
+        is_cut: bool,
+    ) -> StepError {
+        if is_cut {
+            let what = format!("{} is not finite", self.culprit(field));
+            return self.stop(Cause::NotFinite, state, h, what, NOT_FINITE);
+        }
+        let what = format!("{} asks for ever smaller steps", self.culprit(field));
+        let hint = "loosen the tolerance: forces of stiff springs have a rounding of their own";
+        self.stop(Cause::StepTooSmall, state, h, what, hint)
     }
 
     /// The step to take \[s\] where `h` is too long for what grows. All eigenvalues are computed where forces
