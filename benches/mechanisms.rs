@@ -100,72 +100,105 @@ fn evaluations(mechanism: &Arc<Mechanism>, start: &Motion) {
     }
 }
 
+/// What all candidates integrate.
+#[derive(Clone, Copy)]
+struct Problem<'a> {
+    mechanism: &'a Arc<Mechanism>,
+    start: &'a Motion,
+}
+
+fn both(relative: f64) -> Tolerance {
+    Tolerance { relative, absolute: relative }
+}
+
+impl<'a> Problem<'a> {
+    /// In the form for loops.
+    fn looped(self, method: impl Integrator<Looped>, watched: bool) -> Ran {
+        let mut form = Looped::new(Arc::clone(self.mechanism)).expect("a mechanism with loops");
+        integrate(&mut form, self.start, method, watched)
+    }
+
+    /// In angles, with multipliers.
+    fn in_angles(self, method: impl Integrator<Multiplier<0, true>>, watched: bool) -> Ran {
+        integrate(&mut Multiplier::<0, true>::new(Arc::clone(self.mechanism)), self.start, method, watched)
+    }
+
+    /// In natural coordinates.
+    fn natural(self, method: impl Integrator<Natural>, watched: bool) -> Ran {
+        let mut form = Natural::new(Arc::clone(self.mechanism)).expect("a natural form");
+        integrate(&mut form, self.start, method, watched)
+    }
+
+    /// The Dormand–Prince pairs at a tolerance.
+    fn pairs(self, tolerance: f64) -> Vec<Candidate<'a>> {
+        let name = |method: &str| format!("{method} {tolerance:.0e}");
+        let mut candidates: Vec<Candidate> = Vec::new();
+        if tolerance > 1e-9 {
+            candidates.push((
+                name("dp5, projected"),
+                Box::new(move |w| self.looped(Projected::new(Dp5::new(both(tolerance))), w)),
+            ));
+        }
+        candidates.push((
+            name("dp8, projected"),
+            Box::new(move |w| self.looped(Projected::new(Dp8::new(both(tolerance))), w)),
+        ));
+        candidates.push((
+            name("dp8 in angles, projected"),
+            Box::new(move |w| self.in_angles(Projected::new(Dp8::new(both(tolerance))), w)),
+        ));
+        candidates.push((name("dp8"), Box::new(move |w| self.looped(Dp8::new(both(tolerance)), w))));
+        candidates.push((name("dop853"), Box::new(move |w| self.looped(Dop853::new(both(tolerance)), w))));
+        candidates
+    }
+
+    /// The series at a tolerance.
+    fn series(self, tolerance: f64) -> [Candidate<'a>; 3] {
+        let name = |method: &str| format!("{method} {tolerance:.0e}");
+        let taylor = move || Taylor::<f64>::new(both(tolerance));
+        let series = move || {
+            let mut series = taylor();
+            series.kernel = ExpansionKernel::Series;
+            series
+        };
+        [
+            (name("taylor"), Box::new(move |w| self.looped(taylor(), w))),
+            (name("taylor, projected"), Box::new(move |w| self.looped(Projected::new(taylor()), w))),
+            (
+                name("taylor in angles, projected"),
+                Box::new(move |w| self.in_angles(Projected::new(series()), w)),
+            ),
+        ]
+    }
+
+    /// `gauss16` of so many steps.
+    fn gauss(self, steps: f64) -> Candidate<'a> {
+        let gauss = move || SymmetricGauss::new(Gauss::new(8, 0.03 / steps).expect("sound settings"));
+        (format!("gauss16, projected 0.03/{steps}"), Box::new(move |w| self.looped(gauss(), w)))
+    }
+
+    /// RATTLE of so many steps.
+    fn rattle(self, name: &str, composition: Composition, steps: f64) -> Candidate<'a> {
+        let rattle = move || Rattle::new(composition, 0.03 / steps);
+        (format!("{name} 0.03/{steps}"), Box::new(move |w| self.natural(rattle(), w)))
+    }
+}
+
 fn main() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/scenes/andrews.json");
     let scene = read_scene(&path, &[]).expect("a shipped scene");
     let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
     let start = mechanism.start(&scene);
     evaluations(&mechanism, &start);
-    let looped = || Looped::new(Arc::clone(&mechanism)).expect("a mechanism with loops");
-    let multiplier = || Multiplier::<0, true>::new(Arc::clone(&mechanism));
-    let natural = || Natural::new(Arc::clone(&mechanism)).expect("a natural form");
-    let both = |relative| Tolerance { relative, absolute: relative };
+    let problem = Problem { mechanism: &mechanism, start: &start };
     let mut candidates: Vec<Candidate> = Vec::new();
-    let start = &start;
     for tolerance in [1e-6, 1e-8, 1e-9, 1e-11, 1e-13] {
-        let name = |method: &str| format!("{method} {tolerance:.0e}");
-        if tolerance > 1e-9 {
-            candidates.push((
-                name("dp5, projected"),
-                Box::new(move |w| {
-                    integrate(&mut looped(), start, Projected::new(Dp5::new(both(tolerance))), w)
-                }),
-            ));
-        }
-        candidates.push((
-            name("dp8, projected"),
-            Box::new(move |w| integrate(&mut looped(), start, Projected::new(Dp8::new(both(tolerance))), w)),
-        ));
-        candidates.push((
-            name("dp8 in angles, projected"),
-            Box::new(move |w| {
-                integrate(&mut multiplier(), start, Projected::new(Dp8::new(both(tolerance))), w)
-            }),
-        ));
-        candidates.push((
-            name("dp8"),
-            Box::new(move |w| integrate(&mut looped(), start, Dp8::new(both(tolerance)), w)),
-        ));
-        candidates.push((
-            name("dop853"),
-            Box::new(move |w| integrate(&mut looped(), start, Dop853::new(both(tolerance)), w)),
-        ));
+        candidates.extend(problem.pairs(tolerance));
     }
     for tolerance in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12] {
-        let name = |method: &str| format!("{method} {tolerance:.0e}");
-        let taylor = move || Taylor::<f64>::new(both(tolerance));
-        candidates.push((name("taylor"), Box::new(move |w| integrate(&mut looped(), start, taylor(), w))));
-        candidates.push((
-            name("taylor, projected"),
-            Box::new(move |w| integrate(&mut looped(), start, Projected::new(taylor()), w)),
-        ));
-        let series = move || {
-            let mut series = taylor();
-            series.kernel = ExpansionKernel::Series;
-            series
-        };
-        candidates.push((
-            name("taylor in angles, projected"),
-            Box::new(move |w| integrate(&mut multiplier(), start, Projected::new(series()), w)),
-        ));
+        candidates.extend(problem.series(tolerance));
     }
-    for steps in [50.0, 100.0, 200.0] {
-        let gauss = move || SymmetricGauss::new(Gauss::new(8, 0.03 / steps).expect("sound settings"));
-        candidates.push((
-            format!("gauss16, projected 0.03/{steps}"),
-            Box::new(move |w| integrate(&mut looped(), start, gauss(), w)),
-        ));
-    }
+    candidates.extend([50.0, 100.0, 200.0].map(|steps| problem.gauss(steps)));
     let compositions = [
         ("rattle2", Composition::Single),
         ("rattle4", Composition::Suzuki5),
@@ -173,13 +206,7 @@ fn main() {
         ("rattle8", Composition::KahanLi17),
     ];
     for (name, composition) in compositions {
-        for steps in [200.0, 400.0, 800.0] {
-            let rattle = move || Rattle::new(composition, 0.03 / steps);
-            candidates.push((
-                format!("{name} 0.03/{steps}"),
-                Box::new(move |w| integrate(&mut natural(), start, rattle(), w)),
-            ));
-        }
+        candidates.extend([200.0, 400.0, 800.0].map(|steps| problem.rattle(name, composition, steps)));
     }
     let mut times = vec![Vec::new(); candidates.len()];
     for _ in 0..BLOCKS {

@@ -672,26 +672,27 @@ fn left(v: Vector2<f64>) -> Vector2<f64> {
 }
 
 impl Absolute {
-    /// Jacobian (rows × 3n) and what is left of C'' at rest, then forces of friction by the multipliers.
-    fn accelerations(&self, q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, f64) {
+    /// Jacobian (rows × 3n), what is left of C'' at rest, and the directions along the rails.
+    fn linearised(
+        &self,
+        q: &DVector<f64>,
+        v: &DVector<f64>,
+    ) -> (DMatrix<f64>, DVector<f64>, Vec<DVector<f64>>) {
         let n = self.mass.len();
         let rows = 2 * self.pins.len() + self.rails.len();
         let mut g = DMatrix::zeros(rows, 3 * n);
         let mut gamma = DVector::zeros(rows);
         // Arm, velocity and centripetal acceleration of a point.
-        let point = |body: Option<usize>, p: Vector2<f64>| match body {
-            None => (p, Vector2::zeros(), Vector2::zeros(), Vector2::zeros()),
-            Some(k) => {
-                let arm = turned(p, q[3 * k + 2]);
-                let w = v[3 * k + 2];
-                let place = Vector2::new(q[3 * k], q[3 * k + 1]) + arm;
-                (place, arm, Vector2::new(v[3 * k], v[3 * k + 1]) + left(arm) * w, -arm * w * w)
-            }
+        let point = |k: usize, p: Vector2<f64>| {
+            let arm = turned(p, q[3 * k + 2]);
+            let w = v[3 * k + 2];
+            let place = Vector2::new(q[3 * k], q[3 * k + 1]) + arm;
+            (place, arm, Vector2::new(v[3 * k], v[3 * k + 1]) + left(arm) * w, -arm * w * w)
         };
         for (i, pin) in self.pins.iter().enumerate() {
             for (side, sign) in [(0, -1.0), (1, 1.0)] {
                 let Some(k) = pin.bodies[side] else { continue };
-                let (_, arm, _, centripetal) = point(Some(k), pin.points[side]);
+                let (_, arm, _, centripetal) = point(k, pin.points[side]);
                 g[(2 * i, 3 * k)] += sign;
                 g[(2 * i + 1, 3 * k + 1)] += sign;
                 g[(2 * i, 3 * k + 2)] += sign * left(arm).x;
@@ -703,8 +704,8 @@ impl Absolute {
         let mut along = Vec::new();
         for (i, rail) in self.rails.iter().enumerate() {
             let row = 2 * self.pins.len() + i;
-            let (at, arm, speed, centripetal) = point(Some(rail.body), rail.point);
-            let (from, base, base_speed, base_centripetal) = point(Some(rail.rail), rail.origin);
+            let (at, arm, speed, centripetal) = point(rail.body, rail.point);
+            let (from, base, base_speed, base_centripetal) = point(rail.rail, rail.origin);
             let (d, w) = (turned(rail.direction, q[3 * rail.rail + 2]), v[3 * rail.rail + 2]);
             let (normal, span, relative) = (left(d), at - from, speed - base_speed);
             let mut tangent = DVector::zeros(3 * n);
@@ -725,6 +726,34 @@ impl Absolute {
                 - w * w * normal.dot(&span);
             along.push(tangent);
         }
+        (g, gamma, along)
+    }
+
+    /// The forces of friction by the multipliers.
+    fn friction(&self, v: &DVector<f64>, multipliers: &DVector<f64>, along: &[DVector<f64>]) -> DVector<f64> {
+        let mut next = DVector::zeros(v.len());
+        for (i, pin) in self.pins.iter().enumerate() {
+            let force = multipliers[2 * i].hypot(multipliers[2 * i + 1]);
+            let rate = |body: Option<usize>| body.map_or(0.0, |k| v[3 * k + 2]);
+            let spin = rate(pin.bodies[1]) - rate(pin.bodies[0]);
+            for (side, sign) in [(0, 1.0), (1, -1.0)] {
+                if let Some(k) = pin.bodies[side] {
+                    next[3 * k + 2] += sign * spin.signum() * pin.friction * force;
+                }
+            }
+        }
+        for (i, (rail, tangent)) in self.rails.iter().zip(along).enumerate() {
+            let force = multipliers[2 * self.pins.len() + i].abs();
+            next -= tangent * (tangent.dot(v).signum() * rail.friction * force);
+        }
+        next
+    }
+
+    /// Accelerations, and the power lost in friction.
+    fn accelerations(&self, q: &DVector<f64>, v: &DVector<f64>) -> (DVector<f64>, f64) {
+        let n = self.mass.len();
+        let (g, gamma, along) = self.linearised(q, v);
+        let rows = gamma.len();
         let mut kkt = DMatrix::zeros(3 * n + rows, 3 * n + rows);
         for (k, [mass, inertia]) in self.mass.iter().enumerate() {
             kkt[(3 * k, 3 * k)] = *mass;
@@ -748,21 +777,7 @@ impl Absolute {
                 all[k] += friction[k];
             }
             let found = factors.solve(&all).expect("regular");
-            let mut next = DVector::zeros(3 * n);
-            for (i, pin) in self.pins.iter().enumerate() {
-                let force = found[3 * n + 2 * i].hypot(found[3 * n + 2 * i + 1]);
-                let rate = |body: Option<usize>| body.map_or(0.0, |k| v[3 * k + 2]);
-                let spin = rate(pin.bodies[1]) - rate(pin.bodies[0]);
-                for (side, sign) in [(0, 1.0), (1, -1.0)] {
-                    if let Some(k) = pin.bodies[side] {
-                        next[3 * k + 2] += sign * spin.signum() * pin.friction * force;
-                    }
-                }
-            }
-            for (i, (rail, tangent)) in self.rails.iter().zip(&along).enumerate() {
-                let force = found[3 * n + 2 * self.pins.len() + i].abs();
-                next -= tangent * (tangent.dot(v).signum() * rail.friction * force);
-            }
+            let next = self.friction(v, &found.rows(3 * n, rows).into_owned(), &along);
             let change = (&next - &friction).amax();
             friction = next;
             power = -friction.dot(v);
@@ -1001,6 +1016,31 @@ impl Dice {
     pub fn is(&mut self, share: f64) -> bool {
         self.next() < share
     }
+
+    /// A bar of a length.
+    pub fn bar(&mut self, name: &str, length: f64) -> String {
+        format!(
+            r#"{{"name": "{name}", "mass": {}, "centre": [{}, {}], "inertia": {}, "length": {length}}}"#,
+            self.within(0.3, 2.0),
+            0.5 * length,
+            self.within(-0.05, 0.05),
+            self.within(0.01, 0.1)
+        )
+    }
+
+    fn coefficients(&mut self) -> String {
+        let kinetic = self.within(0.05, 0.4);
+        let stiction = kinetic * if self.is(0.5) { 1.0 } else { self.within(1.0, 2.0) };
+        format!(r#""kinetic": {kinetic}, "static": {stiction}"#)
+    }
+
+    /// The friction of a slider or a wall, mostly.
+    fn friction(&mut self) -> String {
+        match self.is(0.7) {
+            true => format!(r#", "friction": {{{}}}"#, self.coefficients()),
+            false => String::new(),
+        }
+    }
 }
 
 /// A chain of one to three bars on the ground or on a cart, with friction here and there, springs, dampers,
@@ -1009,11 +1049,6 @@ pub fn any_scene(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1);
     let count = 1 + (dice.next() * 3.0) as usize;
     let has_cart = dice.is(0.3);
-    let coefficients = |dice: &mut Dice| {
-        let kinetic = dice.within(0.05, 0.4);
-        let stiction = kinetic * if dice.is(0.5) { 1.0 } else { dice.within(1.0, 2.0) };
-        format!(r#""kinetic": {kinetic}, "static": {stiction}"#)
-    };
     let (mut bars, mut hinges, mut starts, mut more) = (vec![], vec![], vec![], String::new());
     if has_cart {
         bars.push(
@@ -1023,11 +1058,7 @@ pub fn any_scene(seed: u64) -> String {
             r#""cart": {{"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [{}, 0]}}"#,
             dice.within(-1.0, 1.0)
         ));
-        let friction = if dice.is(0.7) {
-            format!(r#", "friction": {{{}}}"#, coefficients(&mut dice))
-        } else {
-            String::new()
-        };
+        let friction = dice.friction();
         more += &format!(
             r#""sliders": [{{"name": "S", "point": {{"body": "cart", "point": [0, 0]}}, "angle": "locked",
             "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}{friction}}}],"#
@@ -1038,19 +1069,11 @@ pub fn any_scene(seed: u64) -> String {
     for k in 0..count {
         let name = format!("b{k}");
         let length = dice.within(0.3, 0.8);
-        bars.push(format!(
-            r#"{{"name": "{name}", "mass": {}, "centre": [{}, {}], "inertia": {}, "length": {length}}}"#,
-            dice.within(0.3, 2.0),
-            0.5 * length,
-            dice.within(-0.05, 0.05),
-            dice.within(0.01, 0.1)
-        ));
+        bars.push(dice.bar(&name, length));
         let friction = match dice.is(0.7) {
-            true => format!(
-                r#", "friction": {{"radius": {}, {}}}"#,
-                dice.within(0.01, 0.06),
-                coefficients(&mut dice)
-            ),
+            true => {
+                format!(r#", "friction": {{"radius": {}, {}}}"#, dice.within(0.01, 0.06), dice.coefficients())
+            }
             false => String::new(),
         };
         hinges.push(format!(
@@ -1081,11 +1104,7 @@ pub fn any_scene(seed: u64) -> String {
         let (x, y) = (dice.within(0.3, 0.7), -2.6);
         let (through, normal) =
             if dice.is(0.5) { ([x, 0.0], [-1.0, 0.0]) } else { ([0.0, y + 1.2], [0.1, 1.0]) };
-        let friction = if dice.is(0.7) {
-            format!(r#", "friction": {{{}}}"#, coefficients(&mut dice))
-        } else {
-            String::new()
-        };
+        let friction = dice.friction();
         more += &format!(
             r#""walls": [{{"name": "W", "body": "{}", "point": [{}, 0], "line": {{"through": {through:?}, "normal": {normal:?}}},
             "restitution": {}{friction}}}],"#,

@@ -162,85 +162,98 @@ fn what_a_motor_holds_needs_no_friction_and_slides_as_soon_as_it_is_moved() {
     }
 }
 
+/// The parts of a linkage but what drives it.
+#[derive(Default)]
+struct LinkageParts {
+    bars: Vec<String>,
+    hinges: Vec<String>,
+    slider: String,
+    starts: Vec<String>,
+}
+
+impl LinkageParts {
+    fn bar(&mut self, dice: &mut Dice, name: &str, length: f64) {
+        self.bars.push(dice.bar(name, length));
+    }
+
+    /// A hinge between two points, mostly with friction.
+    fn hinge(&mut self, dice: &mut Dice, name: &str, one: (&str, [f64; 2]), other: (&str, [f64; 2])) {
+        let mut friction = String::new();
+        if dice.is(0.7) {
+            let kinetic = dice.within(0.05, 0.3);
+            let stiction = kinetic * if dice.is(0.5) { 1.0 } else { dice.within(1.0, 1.5) };
+            let radius = dice.within(0.01, 0.04);
+            friction = format!(
+                r#", "friction": {{"radius": {radius}, "kinetic": {kinetic}, "static": {stiction}}}"#
+            );
+        }
+        self.hinges.push(format!(
+            r#"{{"name": "{name}", "between": [{{"body": "{}", "point": {:?}}}, {{"body": "{}", "point": {:?}}}]{friction}}}"#,
+            one.0, one.1, other.0, other.1
+        ));
+    }
+
+    /// A point of a bar on a rail of another one or of the ground.
+    fn slide(&mut self, bar: &str, at: f64, rail: &str) {
+        self.slider = format!(
+            r#""sliders": [{{"name": "S", "point": {{"body": "{bar}", "point": [{at}, 0]}},
+                "rail": {{"body": "{rail}", "point": [0, 0], "direction": [1, 0]}}, "friction": {{"kinetic": 0.15, "static": 0.2}}}}],"#
+        );
+    }
+
+    fn start(&mut self, bar: &str, phi: f64) {
+        self.starts.push(format!(r#""{bar}": {{"phi": {phi}}}"#));
+    }
+
+    /// The end of the crank slides in a rocker.
+    fn slotted_rocker(&mut self, dice: &mut Dice, crank: f64, pin: [f64; 2], base: f64) {
+        self.bar(dice, "b", 1.4);
+        self.hinge(dice, "B", ("ground", [base, 0.0]), ("b", [0.0; 2]));
+        self.slide("a", crank, "b");
+        self.start("b", pin[1].atan2(pin[0] - base));
+    }
+
+    /// The end of the rod slides along the ground.
+    fn slider_crank(&mut self, dice: &mut Dice, crank: f64, pin: [f64; 2], rod: f64) {
+        self.bar(dice, "b", rod);
+        self.hinge(dice, "B", ("a", [crank, 0.0]), ("b", [0.0; 2]));
+        self.slide("b", rod, "ground");
+        self.start("b", (-pin[1] / rod).asin());
+    }
+
+    /// A rocker as long as the rod: the joint is above the middle between the pins.
+    fn four_bar(&mut self, dice: &mut Dice, crank: f64, pin: [f64; 2], [rod, base]: [f64; 2]) {
+        let to = [base - pin[0], -pin[1]];
+        let apart = to[0].hypot(to[1]);
+        let height = (rod * rod - 0.25 * apart * apart).sqrt();
+        let joint =
+            [pin[0] + 0.5 * to[0] - height * to[1] / apart, pin[1] + 0.5 * to[1] + height * to[0] / apart];
+        self.bar(dice, "b", rod);
+        self.bar(dice, "c", rod);
+        self.hinge(dice, "B", ("a", [crank, 0.0]), ("b", [0.0; 2]));
+        self.hinge(dice, "C", ("ground", [base, 0.0]), ("c", [0.0; 2]));
+        self.hinge(dice, "D", ("b", [rod, 0.0]), ("c", [rod, 0.0]));
+        self.start("b", (joint[1] - pin[1]).atan2(joint[0] - pin[0]));
+        self.start("c", joint[1].atan2(joint[0] - base));
+    }
+}
+
 /// A crank with a slotted rocker, a slider-crank or a four-bar, with friction in most joints, springs, torques and
 /// motors, some of which rest for a while, and a stop for the crank.
 pub fn linkage(seed: u64) -> String {
     let mut dice = Dice(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 7);
-    let friction = |dice: &mut Dice, radius: bool| {
-        if !dice.is(0.7) {
-            return String::new();
-        }
-        let kinetic = dice.within(0.05, 0.3);
-        let stiction = kinetic * if dice.is(0.5) { 1.0 } else { dice.within(1.0, 1.5) };
-        let radius =
-            if radius { format!(r#""radius": {}, "#, dice.within(0.01, 0.04)) } else { String::new() };
-        format!(r#", "friction": {{{radius}"kinetic": {kinetic}, "static": {stiction}}}"#)
-    };
     let (crank, rod, base) = (dice.within(0.15, 0.3), dice.within(0.7, 1.0), dice.within(0.6, 0.9));
     let phi = dice.within(-3.0, 3.0);
     let pin = [crank * phi.cos(), crank * phi.sin()];
-    let bar = |dice: &mut Dice, name: &str, length: f64| {
-        format!(
-            r#"{{"name": "{name}", "mass": {}, "centre": [{}, {}], "inertia": {}, "length": {length}}}"#,
-            dice.within(0.3, 2.0),
-            0.5 * length,
-            dice.within(-0.05, 0.05),
-            dice.within(0.01, 0.1)
-        )
-    };
-    let hinge = |dice: &mut Dice, name: &str, one: (&str, [f64; 2]), other: (&str, [f64; 2])| {
-        format!(
-            r#"{{"name": "{name}", "between": [{{"body": "{}", "point": {:?}}}, {{"body": "{}", "point": {:?}}}]{}}}"#,
-            one.0,
-            one.1,
-            other.0,
-            other.1,
-            friction(dice, true)
-        )
-    };
-    let mut bars = vec![bar(&mut dice, "a", crank)];
-    let mut hinges = vec![hinge(&mut dice, "A", ("ground", [0.0; 2]), ("a", [0.0; 2]))];
-    let mut sliders = String::new();
-    let mut starts = Vec::new();
+    let mut parts = LinkageParts::default();
+    parts.bar(&mut dice, "a", crank);
+    parts.hinge(&mut dice, "A", ("ground", [0.0; 2]), ("a", [0.0; 2]));
     match dice.next() {
-        kind if kind < 0.4 => {
-            bars.push(bar(&mut dice, "b", 1.4));
-            hinges.push(hinge(&mut dice, "B", ("ground", [base, 0.0]), ("b", [0.0; 2])));
-            let rubs = r#", "friction": {"kinetic": 0.15, "static": 0.2}"#;
-            sliders = format!(
-                r#""sliders": [{{"name": "S", "point": {{"body": "a", "point": [{crank}, 0]}},
-                "rail": {{"body": "b", "point": [0, 0], "direction": [1, 0]}}{rubs}}}],"#
-            );
-            starts.push(format!(r#""b": {{"phi": {}}}"#, pin[1].atan2(pin[0] - base)));
-        }
-        kind if kind < 0.7 => {
-            bars.push(bar(&mut dice, "b", rod));
-            hinges.push(hinge(&mut dice, "B", ("a", [crank, 0.0]), ("b", [0.0; 2])));
-            let rubs = r#", "friction": {"kinetic": 0.15, "static": 0.2}"#;
-            sliders = format!(
-                r#""sliders": [{{"name": "S", "point": {{"body": "b", "point": [{rod}, 0]}},
-                "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}{rubs}}}],"#
-            );
-            starts.push(format!(r#""b": {{"phi": {}}}"#, (-pin[1] / rod).asin()));
-        }
-        _ => {
-            // A rocker as long as the rod: the joint is above the middle between the pins.
-            let to = [base - pin[0], -pin[1]];
-            let apart = to[0].hypot(to[1]);
-            let height = (rod * rod - 0.25 * apart * apart).sqrt();
-            let joint = [
-                pin[0] + 0.5 * to[0] - height * to[1] / apart,
-                pin[1] + 0.5 * to[1] + height * to[0] / apart,
-            ];
-            bars.push(bar(&mut dice, "b", rod));
-            bars.push(bar(&mut dice, "c", rod));
-            hinges.push(hinge(&mut dice, "B", ("a", [crank, 0.0]), ("b", [0.0; 2])));
-            hinges.push(hinge(&mut dice, "C", ("ground", [base, 0.0]), ("c", [0.0; 2])));
-            hinges.push(hinge(&mut dice, "D", ("b", [rod, 0.0]), ("c", [rod, 0.0])));
-            starts.push(format!(r#""b": {{"phi": {}}}"#, (joint[1] - pin[1]).atan2(joint[0] - pin[0])));
-            starts.push(format!(r#""c": {{"phi": {}}}"#, joint[1].atan2(joint[0] - base)));
-        }
+        kind if kind < 0.4 => parts.slotted_rocker(&mut dice, crank, pin, base),
+        kind if kind < 0.7 => parts.slider_crank(&mut dice, crank, pin, rod),
+        _ => parts.four_bar(&mut dice, crank, pin, [rod, base]),
     }
+    let LinkageParts { bars, hinges, slider, mut starts } = parts;
     let mut more = String::new();
     if dice.is(0.25) {
         let law = match dice.next() {
@@ -277,7 +290,7 @@ pub fn linkage(seed: u64) -> String {
         );
     }
     format!(
-        r#"{{"name": "linkage", "gravity": [0, {}], "bars": [{}], "hinges": [{}], {sliders} {more}
+        r#"{{"name": "linkage", "gravity": [0, {}], "bars": [{}], "hinges": [{}], {slider} {more}
         "start": {{{}}}, "until": 2, "every": 0.5}}"#,
         if dice.is(0.5) { -9.81 } else { -2.0 },
         bars.join(", "),

@@ -264,6 +264,87 @@ impl Law {
     }
 }
 
+/// The bodies that places and joints name.
+struct Known<'a> {
+    bodies: &'a [Body],
+    names: Names,
+}
+
+impl<'a> Known<'a> {
+    fn new(bodies: &'a [Body]) -> Self {
+        let names = bodies.iter().enumerate().map(|(k, body)| (body.name.clone(), k)).collect();
+        Self { bodies, names }
+    }
+
+    fn index(&self, value: &Value) -> Option<usize> {
+        value.as_str().filter(|&name| name != "ground").map(|name| self.names[name])
+    }
+
+    fn place(&self, value: &Value) -> Place {
+        let (body, point) = (self.index(&value["body"]), Vec2::of(pair(&value["point"])));
+        Place { body, point: body.map_or(point, |k| point - self.bodies[k].centre) }
+    }
+
+    fn places(&self, value: &Value) -> [Place; 2] {
+        [self.place(&value["between"][0]), self.place(&value["between"][1])]
+    }
+
+    /// Hinges, welds, sliders with their motors, locks, motors.
+    fn joints(&self, json: &Value) -> Vec<Joint> {
+        let mut joints = Vec::new();
+        let mut add =
+            |name: String, kind, measure, target| joints.push(Joint { name, kind, measure, target });
+        let axes = [("x", [1.0, 0.0]), ("y", [0.0, 1.0])];
+        for hinge in list(json, "hinges") {
+            for (letter, axis) in axes {
+                let measure = Measure::Difference { places: self.places(hinge), axis: Vec2::of(axis) };
+                add(format!("{}.{letter}", name(hinge)), "hinge", measure, Target::Law(Law::default()));
+            }
+        }
+        for weld in list(json, "welds") {
+            let places = self.places(weld);
+            for (letter, axis) in axes {
+                let measure = Measure::Difference { places, axis: Vec2::of(axis) };
+                add(format!("{}.{letter}", name(weld)), "weld", measure, Target::Law(Law::default()));
+            }
+            let measure = Measure::Angle { body: places[1].body, base: places[0].body };
+            add(format!("{}.angle", name(weld)), "weld", measure, Target::AsAtStart);
+        }
+        for slider in list(json, "sliders") {
+            let (point, rail, direction) = (
+                self.place(&slider["point"]),
+                self.place(&slider["rail"]),
+                unit(&slider["rail"]["direction"]),
+            );
+            let measure = Measure::Along { point, rail, direction: direction.left() };
+            add(name(slider), "slider", measure, Target::Law(Law::default()));
+            if slider["angle"] == "locked" {
+                let measure = Measure::Angle { body: point.body, base: rail.body };
+                add(format!("{}.angle", name(slider)), "slider", measure, Target::AsAtStart);
+            }
+            for drive in list(json, "motors").filter(|motor| motor["slider"] == slider["name"]) {
+                let measure = Measure::Along { point, rail, direction };
+                add(name(drive), "slider motor", measure, Target::Law(law(drive).expect("a law")));
+            }
+        }
+        for lock in list(json, "locks") {
+            let measure =
+                Measure::Angle { body: self.index(&lock["body"]), base: self.index(&lock["relative_to"]) };
+            let target = match lock["angle"].as_f64() {
+                Some(angle) => Target::Law(Law { start: angle.into(), ..Law::default() }),
+                None => Target::AsAtStart,
+            };
+            add(name(lock), "lock", measure, target);
+        }
+        for motor in list(json, "motors").filter(|motor| motor.get("body").is_some()) {
+            let measure =
+                Measure::Angle { body: self.index(&motor["body"]), base: self.index(&motor["relative_to"]) };
+            add(name(motor), "motor", measure, Target::Law(law(motor).expect("a law")));
+        }
+        joints
+    }
+}
+
 impl Scene {
     /// Reads a scene that the program accepts, of which nothing is [`unjudged`].
     pub fn read(text: &str) -> Self {
@@ -272,62 +353,11 @@ impl Scene {
         assert!(unjudged.is_empty(), "the auditor does not judge {}", unjudged.join(", "));
         let mut scene = Self { gravity: Vec2::of(pair(&json["gravity"])), ..Self::default() };
         scene.bodies = list(&json, "bars").map(|bar| body(bar, &json["start"])).collect();
-        let names: Names = scene.bodies.iter().enumerate().map(|(k, body)| (body.name.clone(), k)).collect();
-        let index = |value: &Value| value.as_str().filter(|&name| name != "ground").map(|name| names[name]);
-        let bodies = &scene.bodies;
-        let place = |value: &Value| {
-            let (body, point) = (index(&value["body"]), Vec2::of(pair(&value["point"])));
-            Place { body, point: body.map_or(point, |k| point - bodies[k].centre) }
-        };
-        let places = |value: &Value| [place(&value["between"][0]), place(&value["between"][1])];
-        let mut joints = Vec::new();
-        let mut add =
-            |name: String, kind, measure, target| joints.push(Joint { name, kind, measure, target });
-        let axes = [("x", [1.0, 0.0]), ("y", [0.0, 1.0])];
-        for hinge in list(&json, "hinges") {
-            for (letter, axis) in axes {
-                let measure = Measure::Difference { places: places(hinge), axis: Vec2::of(axis) };
-                add(format!("{}.{letter}", name(hinge)), "hinge", measure, Target::Law(Law::default()));
-            }
-        }
-        for weld in list(&json, "welds") {
-            let places = places(weld);
-            for (letter, axis) in axes {
-                let measure = Measure::Difference { places, axis: Vec2::of(axis) };
-                add(format!("{}.{letter}", name(weld)), "weld", measure, Target::Law(Law::default()));
-            }
-            let measure = Measure::Angle { body: places[1].body, base: places[0].body };
-            add(format!("{}.angle", name(weld)), "weld", measure, Target::AsAtStart);
-        }
-        for slider in list(&json, "sliders") {
-            let (point, rail, direction) =
-                (place(&slider["point"]), place(&slider["rail"]), unit(&slider["rail"]["direction"]));
-            let measure = Measure::Along { point, rail, direction: direction.left() };
-            add(name(slider), "slider", measure, Target::Law(Law::default()));
-            if slider["angle"] == "locked" {
-                let measure = Measure::Angle { body: point.body, base: rail.body };
-                add(format!("{}.angle", name(slider)), "slider", measure, Target::AsAtStart);
-            }
-            for drive in list(&json, "motors").filter(|motor| motor["slider"] == slider["name"]) {
-                let measure = Measure::Along { point, rail, direction };
-                add(name(drive), "slider motor", measure, Target::Law(law(drive).expect("a law")));
-            }
-        }
-        for lock in list(&json, "locks") {
-            let measure = Measure::Angle { body: index(&lock["body"]), base: index(&lock["relative_to"]) };
-            let target = match lock["angle"].as_f64() {
-                Some(angle) => Target::Law(Law { start: angle.into(), ..Law::default() }),
-                None => Target::AsAtStart,
-            };
-            add(name(lock), "lock", measure, target);
-        }
-        for motor in list(&json, "motors").filter(|motor| motor.get("body").is_some()) {
-            let measure = Measure::Angle { body: index(&motor["body"]), base: index(&motor["relative_to"]) };
-            add(name(motor), "motor", measure, Target::Law(law(motor).expect("a law")));
-        }
+        let known = Known::new(&scene.bodies);
+        scene.joints = known.joints(&json);
         scene.springs = (list(&json, "springs"))
             .map(|spring| Spring {
-                places: places(spring),
+                places: known.places(spring),
                 stiffness: exact(spring, "stiffness"),
                 free_length: exact(spring, "free_length"),
                 damping: exact(spring, "damping"),
@@ -336,8 +366,8 @@ impl Scene {
             .collect();
         scene.coils = (list(&json, "torsion_springs"))
             .map(|coil| Coil {
-                body: index(&coil["body"]).expect("a bar"),
-                base: index(&coil["relative_to"]),
+                body: known.index(&coil["body"]).expect("a bar"),
+                base: known.index(&coil["relative_to"]),
                 stiffness: exact(coil, "stiffness"),
                 free_angle: exact(coil, "free_angle"),
                 damping: exact(coil, "damping"),
@@ -346,26 +376,26 @@ impl Scene {
         scene.pushes.extend(list(&json, "forces").map(|force| {
             let turns = force["frame"] == "body";
             Push::Force {
-                place: place(force),
+                place: known.place(force),
                 force: Vec2::of(pair(&force["force"])),
                 turns,
                 law: law(force),
             }
         }));
         scene.pushes.extend(list(&json, "torques").map(|torque| {
-            let (body, base) = (index(&torque["body"]).expect("a bar"), index(&torque["relative_to"]));
+            let (body, base) =
+                (known.index(&torque["body"]).expect("a bar"), known.index(&torque["relative_to"]));
             Push::Torque { body, base, torque: exact(torque, "torque"), law: law(torque) }
         }));
         scene.walls = (list(&json, "walls"))
             .map(|wall| Wall {
                 name: name(wall),
-                place: place(wall),
+                place: known.place(wall),
                 through: Vec2::of(pair(&wall["line"]["through"])),
                 normal: unit(&wall["line"]["normal"]),
                 restitution: exact(wall, "restitution"),
             })
             .collect();
-        scene.joints = joints;
         (scene.until, scene.every) = (number(&json, "until"), number(&json, "every"));
         scene.size = scene.reach();
         scene

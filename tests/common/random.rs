@@ -109,6 +109,214 @@ fn place(draw: &mut Draw, spread: Spread, bar: Option<usize>, length: f64) -> Va
     json!({"body": bar.map_or("ground".into(), |k| format!("bar{k}")), "point": point})
 }
 
+/// What the parts of a random scene have in common.
+struct Usual {
+    spread: Spread,
+    /// Of bars, and of each bar \[m\].
+    length: f64,
+    lengths: Vec<f64>,
+    /// Gravity \[m/s²\], and the rate of a pendulum \[rad/s\].
+    pull: f64,
+    rate: f64,
+    /// Of the last bar that has one \[kg\].
+    mass: f64,
+    /// True where hinges may be missing.
+    is_loose: bool,
+}
+
+impl Usual {
+    fn bar(&mut self, draw: &mut Draw) -> Value {
+        let (spread, length) = (self.spread, self.length);
+        let own = if draw.chance(70) { length } else { spread.size(draw, length) };
+        let name = format!("bar{}", self.lengths.len());
+        self.lengths.push(own);
+        if draw.chance(60) {
+            let inertia = *draw.one(&["full", "slender"]);
+            json!({"name": name, "length": own, "width": 0.1 * own, "thickness": 0.01, "density": spread.size(draw, 700.0), "inertia": inertia})
+        } else {
+            self.mass = spread.size(draw, 1.0);
+            let centre = [
+                spread.signed(draw, 0.5 * own),
+                if draw.chance(30) { spread.signed(draw, 0.1 * own) } else { 0.0 },
+            ];
+            let inertia = if draw.chance(20) { 0.0 } else { spread.size(draw, self.mass * own * own / 12.0) };
+            json!({"name": name, "mass": self.mass, "centre": centre, "inertia": inertia, "length": own})
+        }
+    }
+
+    /// A place on a bar, or on the ground, where that is as wide as `base`.
+    fn place(&self, draw: &mut Draw, bar: Option<usize>, base: f64) -> Value {
+        place(draw, self.spread, bar, bar.map_or(base, |bar| self.lengths[bar]))
+    }
+
+    /// A tree, and sometimes a hinge that closes a loop.
+    fn hinges(&self, draw: &mut Draw) -> Vec<Value> {
+        let (mut hinges, n) = (Vec::new(), self.lengths.len());
+        for k in 0..n {
+            if self.is_loose && draw.chance(50) {
+                continue;
+            }
+            let parent = if k == 0 {
+                None
+            } else {
+                [None, Some(k - 1), Some(k - 1), Some(draw.below(k))][draw.below(4)]
+            };
+            let there = self.place(draw, parent, 0.0);
+            hinges.push(json!({"name": format!("h{k}"), "between": [there, {"body": format!("bar{k}"), "point": [0, 0]}]}));
+        }
+        if draw.chance(20) {
+            let ends = [Some(draw.below(n)), [None, Some(draw.below(n))][draw.below(2)]];
+            let ends = ends.map(|bar| self.place(draw, bar, 1.5 * self.length));
+            hinges.push(json!({"name": "loop", "between": ends}));
+        }
+        hinges
+    }
+
+    fn body(&self, draw: &mut Draw) -> String {
+        format!("bar{}", draw.below(self.lengths.len()))
+    }
+
+    /// Lets a part be relative to something in so many per cent of all cases.
+    fn relate(&self, draw: &mut Draw, made: &mut Value, percent: usize) {
+        if draw.chance(percent) {
+            made["relative_to"] = json!([self.body(draw), self.body(draw), "ground".into()][draw.below(3)]);
+        }
+    }
+
+    fn ends(&self, draw: &mut Draw) -> [Value; 2] {
+        let n = self.lengths.len();
+        let bars = [[None, Some(draw.below(n))][draw.below(2)], Some(draw.below(n))];
+        bars.map(|bar| self.place(draw, bar, self.length))
+    }
+
+    fn spring(&self, draw: &mut Draw) -> Value {
+        let Self { spread, length, pull, rate, mass, .. } = *self;
+        let is_rigid = draw.chance(12);
+        let damping = if !is_rigid && draw.chance(30) { spread.size(draw, mass * rate) } else { 0.0 };
+        let is_damper = damping > 0.0 && draw.chance(20);
+        let usual = if is_rigid { 1e6 } else { 5.0 } * (mass * pull / length);
+        let stiffness = if is_damper { 0.0 } else { spread.size(draw, usual) };
+        let free = if !is_rigid && draw.chance(15) { 0.0 } else { spread.size(draw, length) };
+        let mut made = json!({"between": self.ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping});
+        if is_rigid {
+            made["model"] = json!("rigid");
+        }
+        made
+    }
+
+    fn torsion_spring(&self, draw: &mut Draw) -> Value {
+        let Self { spread, length, pull, rate, mass, .. } = *self;
+        let damping = if draw.chance(30) { spread.size(draw, mass * length * length * rate) } else { 0.0 };
+        let stiffness = spread.size(draw, mass * pull / length * length * length);
+        let mut made = json!({"body": self.body(draw), "stiffness": stiffness, "free_angle": angle(draw), "damping": damping});
+        self.relate(draw, &mut made, 40);
+        made
+    }
+
+    fn force(&self, draw: &mut Draw) -> Value {
+        let Self { spread, length, pull, rate, mass, .. } = *self;
+        let force = [spread.signed(draw, mass * pull), spread.signed(draw, mass * pull)];
+        let frame = *draw.one(&["ground", "body"]);
+        let mut made = json!({"body": self.body(draw), "point": [length, 0], "force": force, "frame": frame});
+        if draw.chance(40) {
+            made["law"] = law(draw, spread, rate);
+        }
+        made
+    }
+
+    fn torque(&self, draw: &mut Draw) -> Value {
+        let Self { spread, length, pull, rate, mass, .. } = *self;
+        let mut made = json!({"body": self.body(draw), "torque": spread.signed(draw, mass * pull * length)});
+        self.relate(draw, &mut made, 40);
+        if draw.chance(40) {
+            made["law"] = law(draw, spread, rate);
+        }
+        made
+    }
+
+    fn slider(&self, draw: &mut Draw) -> Value {
+        let [place, point] = self.ends(draw);
+        let mut rail = json!({"body": "ground", "point": [0, self.spread.signed(draw, self.length)], "direction": [1, draw.below(2)]});
+        if draw.chance(40) {
+            rail["body"] = place["body"].clone();
+            rail["point"] = place["point"].clone();
+        }
+        json!({"point": point, "rail": rail, "angle": *draw.one(&["free", "free", "locked"])})
+    }
+
+    fn weld(&self, draw: &mut Draw) -> Value {
+        json!({"between": self.ends(draw)})
+    }
+
+    fn lock(&self, draw: &mut Draw) -> Value {
+        let mut made = json!({"body": self.body(draw)});
+        if draw.chance(30) {
+            made["angle"] = json!(angle(draw));
+        }
+        self.relate(draw, &mut made, 50);
+        made
+    }
+
+    fn wall(&self, draw: &mut Draw) -> Value {
+        let line =
+            json!({"through": [0, -self.spread.size(draw, self.length)], "normal": [draw.below(2), 1]});
+        json!({"body": self.body(draw), "point": [self.length, 0], "line": line, "restitution": *draw.one(&[0.0, 0.3, 0.5, 0.9, 1.0])})
+    }
+
+    /// A motor on a bar and one on the first slider, each sometimes; the driven bar.
+    fn motors(&self, draw: &mut Draw, has_slider: bool) -> (Vec<Value>, Option<usize>) {
+        let Self { spread, length, rate, .. } = *self;
+        let (mut driven, mut motors) = (None, Vec::new());
+        if draw.chance(25) {
+            let k = draw.below(self.lengths.len());
+            driven = Some(k);
+            let mut motor =
+                json!({"name": "motor", "body": format!("bar{k}"), "law": law(draw, spread, rate)});
+            self.relate(draw, &mut motor, 20);
+            motors.push(motor);
+        }
+        if has_slider && draw.chance(50) {
+            let mut law = law(draw, spread, rate * length);
+            law["start"] = json!(spread.signed(draw, length));
+            motors.push(json!({"name": "drive", "slider": "sliders0", "law": law}));
+        }
+        (motors, driven)
+    }
+
+    /// The start of all bars but the driven one.
+    fn start(&self, draw: &mut Draw, driven: Option<usize>) -> Map<String, Value> {
+        let Self { spread, length, rate, is_loose, .. } = *self;
+        let mut start = Map::new();
+        for k in (0..self.lengths.len()).filter(|k| driven != Some(*k)) {
+            if is_loose && draw.chance(10) {
+                continue;
+            }
+            let mut given = json!({"phi": angle(draw), "omega": if draw.chance(50) { 0.0 } else { spread.signed(draw, rate) }});
+            if is_loose {
+                given["origin"] = json!([spread.signed(draw, length), 0]);
+                given["velocity"] = json!([0, spread.signed(draw, length * rate)]);
+            }
+            start.insert(format!("bar{k}"), given);
+        }
+        start
+    }
+}
+
+/// How a part of a random scene is made.
+type Make = fn(&Usual, &mut Draw) -> Value;
+
+/// Lists of parts that a scene may have, in how many per cent of all cases, and how each part is made.
+const PARTS: [(&str, usize, Make); 8] = [
+    ("springs", 25, Usual::spring),
+    ("torsion_springs", 15, Usual::torsion_spring),
+    ("forces", 10, Usual::force),
+    ("torques", 10, Usual::torque),
+    ("sliders", 12, Usual::slider),
+    ("welds", 3, Usual::weld),
+    ("locks", 5, Usual::lock),
+    ("walls", 12, Usual::wall),
+];
+
 /// The text of a scene that is valid as far as single values go; what does not fit together is refused by the
 /// reader or the compiler.
 pub fn scene(draw: &mut Draw) -> String {
@@ -122,152 +330,27 @@ pub fn scene(draw: &mut Draw) -> String {
     let pull = gravity[0].abs().max(gravity[1].abs()).max(1e-30);
     let rate = (pull / length).sqrt();
     let n = *draw.one(&[1, 1, 2, 2, 2, 3, 3, 4, 5, 6]);
-    let mut bars = Vec::new();
-    let mut lengths = Vec::new();
-    let mut mass = 1.0;
-    for k in 0..n {
-        let own = if draw.chance(70) { length } else { spread.size(draw, length) };
-        lengths.push(own);
-        let name = format!("bar{k}");
-        bars.push(if draw.chance(60) {
-            let inertia = *draw.one(&["full", "slender"]);
-            json!({"name": name, "length": own, "width": 0.1 * own, "thickness": 0.01, "density": spread.size(draw, 700.0), "inertia": inertia})
-        } else {
-            mass = spread.size(draw, 1.0);
-            let centre = [spread.signed(draw, 0.5 * own), if draw.chance(30) { spread.signed(draw, 0.1 * own) } else { 0.0 }];
-            let inertia = if draw.chance(20) { 0.0 } else { spread.size(draw, mass * own * own / 12.0) };
-            json!({"name": name, "mass": mass, "centre": centre, "inertia": inertia, "length": own})
-        });
-    }
-    let mut hinges = Vec::new();
-    let is_loose = draw.chance(10);
-    for k in 0..n {
-        if is_loose && draw.chance(50) {
-            continue;
-        }
-        let parent =
-            if k == 0 { None } else { [None, Some(k - 1), Some(k - 1), Some(draw.below(k))][draw.below(4)] };
-        let there = place(draw, spread, parent, parent.map_or(0.0, |parent| lengths[parent]));
-        hinges.push(json!({"name": format!("h{k}"), "between": [there, {"body": format!("bar{k}"), "point": [0, 0]}]}));
-    }
-    if draw.chance(20) {
-        let ends = [Some(draw.below(n)), [None, Some(draw.below(n))][draw.below(2)]];
-        let ends = ends.map(|bar| place(draw, spread, bar, bar.map_or(1.5 * length, |bar| lengths[bar])));
-        hinges.push(json!({"name": "loop", "between": ends}));
-    }
+    let mut usual = Usual { spread, length, lengths: Vec::new(), pull, rate, mass: 1.0, is_loose: false };
+    let bars: Vec<Value> = (0..n).map(|_| usual.bar(draw)).collect();
+    usual.is_loose = draw.chance(10);
+    let hinges = usual.hinges(draw);
     let mut scene = Map::new();
-    let mut some = |name: &str, percent: usize, draw: &mut Draw, make: &mut dyn FnMut(&mut Draw) -> Value| {
+    for (list, percent, make) in PARTS {
         if draw.chance(percent) {
             let count = 1 + usize::from(draw.chance(15));
-            let list: Vec<Value> = (0..count)
-                .map(|number| {
-                    let mut made = make(draw);
-                    made["name"] = json!(format!("{name}{number}"));
-                    made
-                })
-                .collect();
-            scene.insert(name.into(), json!(list));
+            let part = |number| {
+                let mut made = make(&usual, draw);
+                made["name"] = json!(format!("{list}{number}"));
+                made
+            };
+            scene.insert(list.into(), (0..count).map(part).collect());
         }
-    };
-    let body = |draw: &mut Draw| format!("bar{}", draw.below(n));
-    let relative = |draw: &mut Draw, made: &mut Value, percent: usize| {
-        if draw.chance(percent) {
-            made["relative_to"] = json!([body(draw), body(draw), "ground".into()][draw.below(3)]);
-        }
-    };
-    let ends = |draw: &mut Draw| {
-        let bars = [[None, Some(draw.below(n))][draw.below(2)], Some(draw.below(n))];
-        bars.map(|bar| place(draw, spread, bar, bar.map_or(length, |bar| lengths[bar])))
-    };
-    let stiffness = mass * pull / length;
-    some("springs", 25, draw, &mut |draw| {
-        let is_rigid = draw.chance(12);
-        let damping = if !is_rigid && draw.chance(30) { spread.size(draw, mass * rate) } else { 0.0 };
-        let is_damper = damping > 0.0 && draw.chance(20);
-        let stiffness =
-            if is_damper { 0.0 } else { spread.size(draw, if is_rigid { 1e6 } else { 5.0 } * stiffness) };
-        let free = if !is_rigid && draw.chance(15) { 0.0 } else { spread.size(draw, length) };
-        let mut made =
-            json!({"between": ends(draw), "stiffness": stiffness, "free_length": free, "damping": damping});
-        if is_rigid {
-            made["model"] = json!("rigid");
-        }
-        made
-    });
-    some("torsion_springs", 15, draw, &mut |draw| {
-        let damping = if draw.chance(30) { spread.size(draw, mass * length * length * rate) } else { 0.0 };
-        let stiffness = spread.size(draw, stiffness * length * length);
-        let mut made = json!({"body": body(draw), "stiffness": stiffness, "free_angle": angle(draw), "damping": damping});
-        relative(draw, &mut made, 40);
-        made
-    });
-    some("forces", 10, draw, &mut |draw| {
-        let force = [spread.signed(draw, mass * pull), spread.signed(draw, mass * pull)];
-        let frame = *draw.one(&["ground", "body"]);
-        let mut made = json!({"body": body(draw), "point": [length, 0], "force": force, "frame": frame});
-        if draw.chance(40) {
-            made["law"] = law(draw, spread, rate);
-        }
-        made
-    });
-    some("torques", 10, draw, &mut |draw| {
-        let mut made = json!({"body": body(draw), "torque": spread.signed(draw, mass * pull * length)});
-        relative(draw, &mut made, 40);
-        if draw.chance(40) {
-            made["law"] = law(draw, spread, rate);
-        }
-        made
-    });
-    some("sliders", 12, draw, &mut |draw| {
-        let [place, point] = ends(draw);
-        let mut rail = json!({"body": "ground", "point": [0, spread.signed(draw, length)], "direction": [1, draw.below(2)]});
-        if draw.chance(40) {
-            rail["body"] = place["body"].clone();
-            rail["point"] = place["point"].clone();
-        }
-        json!({"point": point, "rail": rail, "angle": *draw.one(&["free", "free", "locked"])})
-    });
-    some("welds", 3, draw, &mut |draw| json!({"between": ends(draw)}));
-    some("locks", 5, draw, &mut |draw| {
-        let mut made = json!({"body": body(draw)});
-        if draw.chance(30) {
-            made["angle"] = json!(angle(draw));
-        }
-        relative(draw, &mut made, 50);
-        made
-    });
-    some("walls", 12, draw, &mut |draw| {
-        let line = json!({"through": [0, -spread.size(draw, length)], "normal": [draw.below(2), 1]});
-        json!({"body": body(draw), "point": [length, 0], "line": line, "restitution": *draw.one(&[0.0, 0.3, 0.5, 0.9, 1.0])})
-    });
-    let (mut driven, mut motors) = (Vec::new(), Vec::new());
-    if draw.chance(25) {
-        let k = draw.below(n);
-        driven.push(k);
-        let mut motor = json!({"name": "motor", "body": format!("bar{k}"), "law": law(draw, spread, rate)});
-        relative(draw, &mut motor, 20);
-        motors.push(motor);
     }
-    if scene.contains_key("sliders") && draw.chance(50) {
-        let mut law = law(draw, spread, rate * length);
-        law["start"] = json!(spread.signed(draw, length));
-        motors.push(json!({"name": "drive", "slider": "sliders0", "law": law}));
-    }
+    let (motors, driven) = usual.motors(draw, scene.contains_key("sliders"));
     if !motors.is_empty() {
         scene.insert("motors".into(), json!(motors));
     }
-    let mut start = Map::new();
-    for k in (0..n).filter(|k| !driven.contains(k)) {
-        if is_loose && draw.chance(10) {
-            continue;
-        }
-        let mut given = json!({"phi": angle(draw), "omega": if draw.chance(50) { 0.0 } else { spread.signed(draw, rate) }});
-        if is_loose {
-            given["origin"] = json!([spread.signed(draw, length), 0]);
-            given["velocity"] = json!([0, spread.signed(draw, length * rate)]);
-        }
-        start.insert(format!("bar{k}"), given);
-    }
+    let start = usual.start(draw, driven);
     let until = spread.size(draw, 1.0 / rate).clamp(1e-20, 1e12);
     let rows = *draw.one(&[1.0, 2.0, 5.0, 16.0]);
     scene.insert("name".into(), json!("random"));
