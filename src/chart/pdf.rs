@@ -78,10 +78,12 @@ impl NamedResources {
         })
     }
 
+    /// Where a state of opacity stands in the file.
     fn state_reference(k: usize) -> Ref {
         Ref::new(FREE + k as i32)
     }
 
+    /// Where pixels stand in the file.
     fn raster_reference(&self, k: usize) -> Ref {
         Ref::new(FREE + (self.opacities.len() + 1 + k) as i32)
     }

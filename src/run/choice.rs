@@ -321,6 +321,7 @@ impl Situation<'_> {
     }
 }
 
+/// The method and why, by the first reason that there is.
 fn chosen(
     mechanism: &Mechanism,
     request: &Request,

@@ -197,6 +197,7 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
+    /// A refusal at the path so far.
     fn refused(&self, problem: &str, allowed: &str, hint: &str) -> SceneError {
         self.source.refusal(self.span, &self.path, problem, allowed, hint)
     }

@@ -78,10 +78,12 @@ impl Scene {
         said
     }
 
+    /// The name of a bar, or of the ground.
     fn body(&self, bar: Option<usize>) -> &str {
         bar.map_or(GROUND, |bar| self.bars[bar].name.as_str())
     }
 
+    /// A point of a bar or of the ground.
     fn place(&self, place: &Place) -> Value {
         json!({"body": self.body(place.bar), "point": place.point})
     }

@@ -131,6 +131,7 @@ pub struct Stepper {
 }
 
 impl Stepper {
+    /// Why it stops at `t` \[s\].
     fn stop(&self, cause: Cause, t: f64, step: f64, what: String, hint: &str) -> StepError {
         StepError { cause, method: self.name.into(), t, step, what, hint: hint.into() }
     }

@@ -184,6 +184,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         Ok(scene.with_rotors())
     }
 
+    /// A slider on its rail.
     fn slider(&self, at: &TreeCursor, plain: &Slider) -> Result<Slider<C>, SceneError> {
         let missing = || self.refuse(at, "has no rail", "compare with the scene's text");
         let rail = at.child("rail").ok_or_else(missing)?;
@@ -211,6 +212,7 @@ impl<'a, C: Decimal> Reader<'a, C> {
         Ok(Drive { name: plain.name.clone(), slider: plain.slider, law })
     }
 
+    /// A wall with its law or aim.
     fn wall(&self, at: &TreeCursor, plain: &Wall) -> Result<Wall<C>, SceneError> {
         let line = at.child("line").unwrap_or_else(|| at.clone());
         Ok(Wall {
