@@ -56,7 +56,7 @@ pub struct TorquePower {
 }
 
 /// What one panel shows.
-struct Quantity {
+struct MotorQuantity {
     /// A line for each motor, empty where it is shown elsewhere.
     lines: Vec<Vec<Point>>,
     /// Name of the axis.
@@ -81,7 +81,7 @@ impl TorquePower {
     }
 
     /// Torques, forces and powers, of the first two those that motors have.
-    fn quantities(&self) -> Vec<Quantity> {
+    fn quantities(&self) -> Vec<MotorQuantity> {
         let motors = || 0..self.motors.len();
         let pushes = |motor: usize| self.sliders.contains(&motor);
         let loads = |of_sliders: bool| {
@@ -90,13 +90,13 @@ impl TorquePower {
         };
         let mut quantities = Vec::with_capacity(3);
         if self.sliders.is_empty() || motors().any(|motor| !pushes(motor)) {
-            quantities.push(Quantity { lines: loads(false), name: "torque [N·m]", unit: "N·m" });
+            quantities.push(MotorQuantity { lines: loads(false), name: "torque [N·m]", unit: "N·m" });
         }
         if !self.sliders.is_empty() {
-            quantities.push(Quantity { lines: loads(true), name: "force [N]", unit: "N" });
+            quantities.push(MotorQuantity { lines: loads(true), name: "force [N]", unit: "N" });
         }
         let powers = motors().map(|motor| self.line(motor, true)).collect();
-        quantities.push(Quantity { lines: powers, name: "power [W]", unit: "W" });
+        quantities.push(MotorQuantity { lines: powers, name: "power [W]", unit: "W" });
         quantities
     }
 }
@@ -120,7 +120,7 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     let all = quantities.iter().flat_map(|quantity| &quantity.lines);
     let x = Axis::tight("time [s]", all.flatten().filter(|p| p[1].is_finite()).map(|p| p[0]));
     // Zero belongs to both: its line parts driving from braking.
-    let y = |Quantity { lines, name, .. }: &Quantity| {
+    let y = |MotorQuantity { lines, name, .. }: &MotorQuantity| {
         Axis::fit(name, lines.iter().flatten().map(|p| p[1]).chain(zero(lines)))
     };
     let mut caption = chart.caption.clone();
@@ -145,7 +145,7 @@ pub fn torque_power(chart: &TorquePower, px_per_pt: f64) -> Result<Picture, Char
     let right = if several { label_room(&sheet, labels.iter().map(String::as_str), false) } else { 20.0 };
     let panels = stacked(&sheet, under, &x, quantities.iter().map(y).collect(), right)?;
     let label = chart.horizon.map(|horizon| format!("{} s", figure(horizon)));
-    for (k, (panel, Quantity { lines, unit, .. })) in panels.iter().zip(&quantities).enumerate() {
+    for (k, (panel, MotorQuantity { lines, unit, .. })) in panels.iter().zip(&quantities).enumerate() {
         panel.series(&[[panel.x.from, 0.0], [panel.x.to, 0.0]], &Pen::new(SPINE, 0.75))?;
         let own = MarkStyle {
             colour: if *unit == "W" { VERMILLION } else { BLUE },
