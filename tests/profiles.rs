@@ -191,6 +191,8 @@ fn tables_come_from_files_beside_the_scene() {
         ("blank.txt", format!("# seconds, radians\n\n{}", rows("  ")), r#""blank.txt""#),
         ("header.csv", format!("\u{feff}\"t\";\"phi\"\r\n{}", rows(";")), r#""header.csv""#),
         ("wide.csv", format!("no,t,phi,note\n{wide}"), r#"{"file": "wide.csv", "x": "t", "y": "phi"}"#),
+        // A million points are longer than 16 MiB.
+        ("long.csv", format!("#{}\n{}", " ".repeat(17 << 20), rows(",")), r#""long.csv""#),
     ] {
         write(name, &text);
         let more = format!(r#""tables": {{"ramp": {said}}},"#);
@@ -213,6 +215,12 @@ fn tables_come_from_files_beside_the_scene() {
         let error = read_scene(&folder.join("scene.json"), &[]).expect_err("no scene").to_string();
         assert!(error.contains(part) && error.contains("tables.ramp"), "{said}: {error}");
     }
+    // What is too long is refused, not cut.
+    let long = std::fs::File::create(folder.join("bad.csv")).expect("a file");
+    long.set_len((256 << 20) + 1).expect("room");
+    write("scene.json", &carried("ramp(t)", r#""tables": {"ramp": "bad.csv"},"#, false));
+    let error = read_scene(&folder.join("scene.json"), &[]).expect_err("no scene").to_string();
+    assert!(error.contains("bad.csv, which is longer than 256 MiB"), "{error}");
     std::fs::remove_dir_all(&folder).expect("removed");
 }
 

@@ -11,8 +11,8 @@ use std::io::Read;
 use std::path::Path;
 
 const HINT: &str = "for example {\"gust\": [[0, 0], [1, 2.5]]} or {\"gust\": \"gust.csv\"}";
-/// The longest file \[bytes\].
-const LONGEST: u64 = 1 << 24;
+/// The longest file \[bytes\]: the most points, with many columns beside theirs.
+const LONGEST: u64 = 256 << 20;
 
 /// The tables of a scene.
 pub(super) fn tables(root: &At) -> Result<Vec<PointTable>, SceneError> {
@@ -94,14 +94,10 @@ fn from_file(table: &At, name: &str, columns: Option<[&str; 2]>) -> Result<Vec<[
     let refuse = |problem: String, hint: &str| {
         Err(table.refuse(&problem, "must be a CSV file of numbers, x ascending", hint))
     };
-    let mut text = String::new();
-    let read = std::fs::File::open(&path).and_then(|file| file.take(LONGEST).read_to_string(&mut text));
-    if let Err(error) = read {
-        return refuse(
-            format!("cannot be read from {shown}: {error}"),
-            "names count from the scene's folder",
-        );
-    }
+    let text = match contents(&path) {
+        Ok(text) => text,
+        Err((problem, hint)) => return refuse(problem, hint),
+    };
     let hint = "two columns with commas, semicolons, tabs or blanks between; lines with # are comments";
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim).enumerate();
     let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#')).peekable();
@@ -144,6 +140,21 @@ fn from_file(table: &At, name: &str, columns: Option<[&str; 2]>) -> Result<Vec<[
     }
     counted(table, points.len(), &format!(" in {shown}"))?;
     Ok(points)
+}
+
+/// The text of a file; else what is wrong with it, and a hint.
+fn contents(path: &Path) -> Result<String, (String, &'static str)> {
+    let shown = path.display();
+    let mut bytes = Vec::new();
+    std::fs::File::open(path).and_then(|file| file.take(LONGEST + 1).read_to_end(&mut bytes)).map_err(
+        |error| (format!("cannot be read from {shown}: {error}"), "names count from the scene's folder"),
+    )?;
+    if bytes.len() as u64 > LONGEST {
+        let hint = "thin it out, or keep the two columns alone";
+        return Err((format!("is read from {shown}, which is longer than {} MiB", LONGEST >> 20), hint));
+    }
+    String::from_utf8(bytes)
+        .map_err(|_| (format!("is read from {shown}, which is not UTF-8"), "save the file as UTF-8"))
 }
 
 /// The cells of a line.
