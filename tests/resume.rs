@@ -724,4 +724,60 @@ mod command {
         parts.run(&format!("merge {PLACE} -q")).exits(0);
         assert!(of_sweep(&parts) == of_sweep(&whole));
     }
+
+    /// The points of a CSV table are in checkpoints and parts of sweeps: the file may change or go meanwhile.
+    #[test]
+    fn files_of_tables_are_not_needed_again() {
+        const BESIDE: &str = r#", "tables": {"gust": "gust.csv"},
+            "torques": [{"name": "wind", "body": "bar1", "torque": "0.02*gust(t/(1 s))"}]}"#;
+        let gusty = || {
+            let program = Program::with_scenes(&["free"]);
+            let text = program.read("free.json");
+            let text = text.trim_end().strip_suffix('}').expect("an object").to_owned() + BESIDE;
+            program.write("gusty.json", &text);
+            program.write("gust.csv", "0,0\n0.7,0.3\n1.1,-0.2\n3000,0.1\n");
+            program
+        };
+        let sweep =
+            "sweep gusty.json --vary bar1.phi=-pi..pi:20 --vary bar2.phi=-pi..pi:20 --rtol 1e-9 --until 10";
+        let place = "free/sweep-start.bar1.phi-start.bar2.phi-taylor-1e-9";
+        let whole = gusty();
+        for (command, folder, table, record) in [
+            (
+                "run gusty.json --method taylor --rtol 1e-9 --until 25 --every 0.1 --trust off",
+                "free/taylor-1e-9",
+                "trajectory.csv",
+                "run.json",
+            ),
+            (
+                "run gusty.json --digits 30 --until 20 --every 0.1",
+                "free/taylor-digits-30",
+                "trajectory.csv",
+                "run.json",
+            ),
+            (sweep, place, "sweep.csv", "sweep.json"),
+        ] {
+            let program = gusty();
+            let command = format!("{command} --no-charts --checkpoint-every 0.01");
+            let mut child = started(&program, &command);
+            await_checkpoint(&program.path(&format!("output/{folder}")), &mut child);
+            signal(&child, "-KILL");
+            ended(child);
+            std::fs::remove_file(program.path("gust.csv")).expect("removed");
+            program.run("resume output -q").exits(0);
+            whole.run(&format!("{command} -q")).exits(0);
+            let [resumed, whole] = [&program, &whole]
+                .map(|program| results(program, &format!("output/{folder}"), table, record));
+            assert!(resumed == whole, "{command}");
+        }
+        let parts = gusty();
+        for number in 1..=2 {
+            parts.run(&format!("{sweep} --no-charts --shard {number}/2 -q")).exits(0);
+        }
+        parts.write("gust.csv", "0,0\n1,5\n");
+        parts.run("merge output --out merged -q").exits(0);
+        let [merged, whole] = [(&parts, "merged".to_owned()), (&whole, format!("output/{place}"))]
+            .map(|(program, folder)| results(program, &folder, "sweep.csv", "sweep.json"));
+        assert!(merged == whole);
+    }
 }

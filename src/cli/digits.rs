@@ -14,7 +14,7 @@ use crate::run::digits::{
 };
 use crate::run::files::{EVENTS, RECORD, TRAJECTORY};
 use crate::run::{Checkpoints, Folder, RequestRefusal, Stream};
-use crate::scene::{Template, read_text, source_name};
+use crate::scene::read_text;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::Instant;
@@ -57,7 +57,9 @@ struct DigitsTask<'a> {
 pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
     refuse_others(flags)?;
     let text = read_text(&flags.scene.scene)?;
-    let mut task = DigitsTask::new(flags, &text, arguments)?;
+    let mut flags = flags.clone();
+    flags.scene.read_tables(&text);
+    let mut task = DigitsTask::new(&flags, &text, arguments)?;
     if !task.source.scene.outputs.is_empty() && !flags.scene.tell.quiet {
         super::output::message(
             "note: outputs are not written in many digits, whose table has the coordinates alone",
@@ -135,7 +137,7 @@ impl<'a> DigitsTask<'a> {
     fn new(flags: &'a RunFlags, text: &'a str, arguments: &'a [String]) -> Result<Self, Failure> {
         let (scene, mechanism) = super::compile(&flags.scene, text)?;
         let typed = super::simulate::typed(arguments, &flags.scene.set);
-        let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
+        let template = flags.scene.template(text);
         let until = match flags.digits.trusted_until {
             Some(until) => Some(shortest("--trusted-until", until)?),
             None => flags.plan.until.map(|until| shortest("--until", until)).transpose()?,
@@ -358,6 +360,7 @@ impl<'a> DigitsTask<'a> {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
             scene: self.text.to_owned(),
+            tables: self.flags.scene.tables.to_vec(),
             cursor: stream.cursor().map_err(failed)?,
             work: PendingWork::Digits(Box::new(snapshot)),
         })?;

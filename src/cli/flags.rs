@@ -22,7 +22,7 @@ use crate::run::kinematics::KinematicDrive;
 use crate::run::stress::MAX_EVALUATIONS;
 use crate::run::trust::Level;
 use crate::run::{Limits, MethodId, Prefer, Request, Shard, Stabilization, Vary};
-use crate::scene::Override;
+use crate::scene::{Override, TableFiles, Template, source_name, table_files};
 use clap::error::ErrorKind;
 use clap::{Args, Parser, Subcommand};
 use std::ffi::OsString;
@@ -109,6 +109,9 @@ pub struct SceneFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
     pub tell: TellFlags,
+    /// Files of the scene's tables that were read before.
+    #[arg(skip)]
+    pub tables: TableFiles,
 }
 
 /// How to run it.
@@ -203,7 +206,7 @@ pub struct InspectFlags {
 }
 
 /// `driftless run`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct RunFlags {
     #[allow(missing_docs)]
     #[command(flatten)]
@@ -335,6 +338,16 @@ impl SceneFlags {
     /// Says something on stderr where that is wanted.
     pub(super) fn remark(&self, text: &str) {
         self.tell.remark(text);
+    }
+
+    /// The scene of this text.
+    pub(super) fn template(&self, text: &str) -> Template {
+        Template::new(text.to_owned(), source_name(&self.scene), &self.set).with_tables(self.tables.clone())
+    }
+
+    /// Reads the files of its tables, for as often as the scene is read and for checkpoints.
+    pub(super) fn read_tables(&mut self, text: &str) {
+        self.tables = table_files(text, &source_name(&self.scene), &self.set);
     }
 
     /// The entry `given` of `run.json`: the file, and what is changed and added, as typed.

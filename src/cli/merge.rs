@@ -147,8 +147,9 @@ fn read(folder: PathBuf) -> Result<ReadPart, Failure> {
     let part: SweepPart = checkpoint::opened(&bytes, &file)?;
     let damaged = || CheckpointError::Damaged { file: file.clone(), why: "its command line cannot be read" };
     match Flags::try_parse_from(&part.arguments).map_err(|_| damaged())?.command {
-        Command::Sweep(flags) => {
+        Command::Sweep(mut flags) => {
             let shard = flags.shard.ok_or_else(damaged)?;
+            flags.scene.tables = part.tables.clone().into();
             Ok(ReadPart { folder, shard, part, flags })
         }
         _ => Err(damaged().into()),
@@ -181,6 +182,9 @@ fn agree(found: &[ReadPart], plan: &Sweep) -> Result<(), Failure> {
         }
         if first.part.scene != other.part.scene {
             return differs(other, "the text of its scene is another");
+        }
+        if first.part.tables != other.part.tables {
+            return differs(other, "the files of its tables are others");
         }
         let mut flags = other.flags.clone();
         flags.shard = None;

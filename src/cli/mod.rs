@@ -79,7 +79,7 @@ pub fn run(flags: &Flags) -> Result<(), Failure> {
 fn load_template(flags: &SceneFlags) -> Result<Template, Failure> {
     let text = scene::read_text(&flags.scene)?;
     compile(flags, &text)?;
-    let template = Template::new(text, scene::source_name(&flags.scene), &flags.set);
+    let template = flags.template(&text);
     let outputs = flags.output.iter().map(|text| scene::Output::parse(text)).collect();
     Ok(template.with_outputs(outputs))
 }
@@ -91,7 +91,7 @@ fn load(flags: &SceneFlags) -> Result<(Scene, Arc<Mechanism>), Failure> {
 
 /// Compiles the scene of this text.
 fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Failure> {
-    let scene = scene::parse_scene(text, &scene::source_name(&flags.scene), &flags.set)?;
+    let scene = flags.template(text).scene()?;
     let scene = with_outputs(scene, &flags.output)?;
     flags.remark(&format!(
         "read {}: scene {}, {}",
@@ -114,7 +114,7 @@ fn compile(flags: &SceneFlags, text: &str) -> Result<(Scene, Arc<Mechanism>), Fa
 
 /// Why the scene of this text has no equations, and where the part at fault is written.
 fn placed(flags: &SceneFlags, text: &str, error: &CompileError) -> Failure {
-    let template = Template::new(text.to_owned(), scene::source_name(&flags.scene), &flags.set);
+    let template = flags.template(text);
     let place = error.part().and_then(|(lists, name)| template.place_of(lists, name));
     let place = place.map_or_else(|| format!("{}: ", scene::source_name(&flags.scene)), |place| place + ": ");
     Failure::new(Exit::Scene, format!("{place}{error}"))
@@ -139,7 +139,7 @@ fn stays(flags: &SceneFlags, text: &str, scene: &Scene) -> Vec<String> {
     if flags.set.is_empty() {
         return Vec::new();
     }
-    let template = Template::new(text.to_owned(), scene::source_name(&flags.scene), &flags.set);
+    let template = flags.template(text);
     let note = |set: &Override| {
         let path = template.variable(&set.path).ok()?.path;
         scene::points_that_stay(scene, &path, set.number())

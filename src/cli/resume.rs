@@ -20,6 +20,8 @@ pub struct SavedWork {
     /// The command line, and the text of the scene it names.
     pub arguments: Vec<String>,
     pub scene: String,
+    /// The files of its tables.
+    pub tables: Vec<(String, String)>,
     /// How far the table was written.
     pub cursor: StreamPosition,
     pub work: PendingWork,
@@ -73,9 +75,10 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
         let hint = "begin again with the first command and --force";
         Failure::new(Exit::Io, format!("the command line in the checkpoint cannot be read\nhint: {hint}"))
     };
+    let tables = std::mem::take(&mut saved.tables).into();
     match (Flags::try_parse_from(&saved.arguments).map_err(|_| damaged())?.command, &saved.work) {
         (Command::Run(mut run), PendingWork::Run(_)) => {
-            run.scene.tell = flags.tell.clone();
+            (run.scene.tell, run.scene.tables) = (flags.tell.clone(), tables);
             run.checkpoints = flags.checkpoints.clone();
             simulate::resume(&run, saved, flags.until, folder, checkpoints)
         }
@@ -86,7 +89,7 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
                     begun\nhint: leave them out";
                 return Err(Failure::new(Exit::Usage, text));
             }
-            run.scene.tell = flags.tell.clone();
+            (run.scene.tell, run.scene.tables) = (flags.tell.clone(), tables);
             run.checkpoints = flags.checkpoints.clone();
             super::digits::resume(&run, saved, folder, checkpoints)
         }
@@ -99,7 +102,7 @@ pub fn run(flags: &ResumeFlags) -> Result<(), Failure> {
             "--max-evaluations: the points of a sweep have one limit\nhint: a new sweep",
         )),
         (Command::Sweep(mut sweep), PendingWork::Sweep(..)) => {
-            sweep.scene.tell = flags.tell.clone();
+            (sweep.scene.tell, sweep.scene.tables) = (flags.tell.clone(), tables);
             sweep.checkpoints = flags.checkpoints.clone();
             sweep::resume(&sweep, saved, folder, checkpoints)
         }

@@ -24,7 +24,7 @@ use crate::run::{
     Checkpoints, Folder, Outcome, Plan, Request, ResumeError, Run, RunError, Running, Sample, Stream,
     wall_clock,
 };
-use crate::scene::{Override, Scene, Template, read_text, source_name};
+use crate::scene::{Override, Scene, read_text};
 use crate::stepping::Cause;
 use std::sync::Arc;
 use std::time::Instant;
@@ -93,6 +93,9 @@ pub fn run(flags: &RunFlags, arguments: &[String]) -> Result<(), Failure> {
         return Err(Failure::new(Exit::Usage, text));
     }
     let text = read_text(&flags.scene.scene)?;
+    let mut flags = flags.clone();
+    flags.scene.read_tables(&text);
+    let flags = &flags;
     let (scene, mechanism) = super::compile(&flags.scene, &text)?;
     check(&mechanism, flags)?;
     // All plans stand before the first run: a pairing that is refused costs nothing.
@@ -288,6 +291,7 @@ impl SimulateTask<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
             scene: self.text.to_owned(),
+            tables: self.flags.scene.tables.to_vec(),
             cursor: stream.cursor().map_err(failed)?,
             work: PendingWork::Run(Box::new(running.snapshot())),
         })?;
@@ -299,7 +303,7 @@ impl SimulateTask<'_> {
     fn with_inputs(&self, mut outcome: Outcome) -> Result<Outcome, Failure> {
         let flags = &self.flags.scene;
         if let Some(trust) = outcome.trust.take_if(|_| self.flags.inputs) {
-            let template = Template::new(self.text.to_owned(), source_name(&flags.scene), &flags.set);
+            let template = flags.template(self.text);
             flags.remark("running neighbouring scenes, for what the digits of the numbers come to");
             let begin = Instant::now();
             let found = trust.with_inputs(

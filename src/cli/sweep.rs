@@ -16,7 +16,7 @@ use crate::run::{
     Checkpoints, Folder, Limits, PointObserver, Request, ResumeError, Stream, Sweep, SweepError, SweepPoint,
     SweepTable, Totals, sweep_on,
 };
-use crate::scene::{Template, points_that_stay, read_text, source_name};
+use crate::scene::{points_that_stay, read_text};
 use serde::{Deserialize, Serialize};
 
 /// Every file a sweep may leave; those of an earlier one in the same folder go with it.
@@ -31,6 +31,9 @@ const LONGEST: usize = 120;
 pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
     interrupt::listen()?;
     let text = read_text(&flags.scene.scene)?;
+    let mut flags = flags.clone();
+    flags.scene.read_tables(&text);
+    let flags = &flags;
     let plan = prepared(flags, &text)?;
     for (axis, variable) in plan.grid().axes().iter().zip(plan.variables()) {
         flags.scene.remark(&format!(
@@ -60,6 +63,7 @@ pub fn run(flags: &SweepFlags, arguments: &[String]) -> Result<(), Failure> {
         checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints: Checkpoints::none(&path),
         text: &text,
+        tables: &flags.scene.tables,
         arguments,
         trouble: None,
         folder,
@@ -101,6 +105,7 @@ pub fn resume(
         checkpoint_timer: CheckpointTimer::new(flags.checkpoints.checkpoint_every),
         checkpoints,
         text: &text,
+        tables: &flags.scene.tables,
         arguments: &arguments,
         trouble: None,
         folder,
@@ -137,6 +142,8 @@ pub struct SweepPart {
     /// The command line, and the text of the scene it names.
     pub arguments: Vec<String>,
     pub scene: String,
+    /// The files of its tables.
+    pub tables: Vec<(String, String)>,
     pub table_sha256: String,
     pub totals: Totals,
     /// The chart of its points.
@@ -166,6 +173,7 @@ fn publish(plan: &Sweep, writer: Writer, totals: Totals, flags: &SweepFlags) -> 
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: arguments.to_vec(),
             scene: text.to_owned(),
+            tables: flags.scene.tables.to_vec(),
             table_sha256: hash.clone(),
             totals: totals.clone(),
             drawn,
@@ -222,7 +230,7 @@ pub fn prepared(flags: &SweepFlags, text: &str) -> Result<Sweep, Failure> {
             "--stabilize: a sweep keeps its constraints in one way\nhint: name one, or sweep several times",
         )
     })?;
-    let template = Template::new(text.to_owned(), source_name(&flags.scene.scene), &flags.scene.set);
+    let template = flags.scene.template(text);
     let outputs = super::with_outputs(template.scene()?, &flags.scene.output)?.outputs;
     let template = template.with_outputs(outputs);
     let limits = Limits { energy: flags.max_energy_drift, constraint: flags.max_constraint_drift };
@@ -262,6 +270,7 @@ struct Writer<'a> {
     folder: Folder,
     /// The scene's text and the command line, for checkpoints.
     text: &'a str,
+    tables: &'a [(String, String)],
     arguments: &'a [String],
     /// What ended the sweep, where it was no point.
     trouble: Option<Failure>,
@@ -287,6 +296,7 @@ impl Writer<'_> {
             version: env!("CARGO_PKG_VERSION").into(),
             arguments: self.arguments.to_vec(),
             scene: self.text.to_owned(),
+            tables: self.tables.to_vec(),
             cursor: stream.cursor().map_err(failed)?,
             work: PendingWork::Sweep(seen.clone(), drawn),
         })?;

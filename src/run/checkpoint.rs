@@ -27,7 +27,7 @@ pub const PREVIOUS: &str = "checkpoint.previous";
 /// What the first bytes are.
 const MAGIC: &[u8] = b"driftless checkpoint\n";
 /// The layout of the content; a program reads its own only.
-pub const FORMAT: u32 = 24;
+pub const FORMAT: u32 = 25;
 const HEAD: usize = MAGIC.len() + 4 + 8;
 const DIGEST: usize = 32;
 

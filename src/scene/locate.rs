@@ -6,6 +6,7 @@
 //! may be put together from several of them.
 
 use super::error::{Excerpt, Refusal, SceneError};
+use super::read::TableFiles;
 use serde::de::IgnoredAny;
 use std::collections::HashMap;
 use std::fmt::Write;
@@ -25,6 +26,8 @@ pub(super) struct Texts {
     pub file: String,
     /// Text 0 is the file.
     pub texts: Vec<Text>,
+    /// Files of its tables that were read before.
+    pub tables: TableFiles,
 }
 
 /// One JSON text.

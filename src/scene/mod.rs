@@ -40,9 +40,9 @@ pub(crate) use number::Decimal;
 pub use number::{number, range};
 pub use output::{BoundOutput, Component, Output, OutputNames, Quantity, Source};
 pub use profile::Profile;
+pub use read::{TableFiles, parse_scene, read_scene, read_text, source_name, table_files};
 #[cfg(feature = "charts")]
 pub(crate) use read::{listed, nearest};
-pub use read::{parse_scene, read_scene, read_text, source_name};
 pub use schema::schema;
 pub use set::{Override, OverrideError};
 pub use stays::points_that_stay;

@@ -14,7 +14,7 @@ use super::format::{FieldShape, KeyTable, LAW, SCENE, START, TRAVEL_LAW, kind};
 use super::formula::Formula;
 use super::formula::unit::Dimension;
 use super::locate::{Located, Value};
-use super::read::{listed, nearest, parse_scene, put_together, read_text, source_name};
+use super::read::{TableFiles, listed, nearest, parse_beside, put_together, read_text, source_name};
 use super::set::{Override, hint, name};
 use super::{Output, Scene};
 use std::path::Path;
@@ -26,6 +26,7 @@ pub struct Template {
     source: String,
     overrides: Vec<Override>,
     outputs: Vec<Output>,
+    tables: TableFiles,
 }
 
 /// A number of a scene that can be varied.
@@ -78,7 +79,15 @@ impl Template {
 
     /// Takes the text of a scene; `source` is the name of its file in messages.
     pub fn new(text: String, source: String, overrides: &[Override]) -> Self {
-        Self { text, source, overrides: overrides.to_vec(), outputs: Vec::new() }
+        let (outputs, tables) = (Vec::new(), TableFiles::default());
+        Self { text, source, overrides: overrides.to_vec(), outputs, tables }
+    }
+
+    /// The same with files of its tables that were read before; it reads them again each time otherwise.
+    #[must_use]
+    pub fn with_tables(mut self, tables: TableFiles) -> Self {
+        self.tables = tables;
+        self
     }
 
     /// The same with outputs beside those there are, of the scene or from a call before, or in place of those
@@ -92,13 +101,13 @@ impl Template {
     /// The scene as it stands.
     ///
     /// # Errors
-    /// As [`parse_scene`].
+    /// As [`parse_scene`](super::parse_scene).
     pub fn scene(&self) -> Result<Scene, SceneError> {
         self.parsed(&self.overrides)
     }
 
     fn parsed(&self, overrides: &[Override]) -> Result<Scene, SceneError> {
-        let mut scene = parse_scene(&self.text, &self.source, overrides)?;
+        let mut scene = parse_beside(&self.text, &self.source, overrides, &self.tables)?;
         self.outputs.iter().cloned().for_each(|output| output.put(&mut scene.outputs));
         Ok(scene)
     }
@@ -106,7 +115,7 @@ impl Template {
     /// The scene with these values of these variables.
     ///
     /// # Errors
-    /// As [`parse_scene`]: a value out of its range, or one that does not go with the rest of the scene.
+    /// As [`parse_scene`](super::parse_scene): a value out of its range, or one that does not go with the rest of the scene.
     pub fn filled(&self, variables: &[Variable], values: &[f64]) -> Result<Scene, SceneError> {
         let filled = variables
             .iter()
@@ -196,7 +205,7 @@ impl Template {
     /// `None` where it is left to its default, or follows from other numbers.
     ///
     /// # Errors
-    /// As [`parse_scene`] where the text is no JSON or an override does not fit it.
+    /// As [`parse_scene`](super::parse_scene) where the text is no JSON or an override does not fit it.
     pub fn value(&self, variable: &Variable) -> Result<Option<f64>, SceneError> {
         let (_, tree) = put_together(&self.text, &self.source, &self.overrides)?;
         Ok(tree.at(&variable.path).and_then(|node| match &node.value {

@@ -20,6 +20,7 @@ mod tables;
 pub(super) use at::{At, Fields};
 pub(crate) use at::{is_name, listed, nearest};
 pub(super) use start::GivenStart;
+pub use tables::{TableFiles, table_files};
 
 use super::error::SceneError;
 use super::fit;
@@ -34,6 +35,7 @@ use names::{BarNames, check_constraint_names, named};
 use resolve::{FormulaConstants, Resolved};
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Reads the scene in the file `path`, with `overrides` put in from left to right before anything is judged.
 ///
@@ -64,7 +66,8 @@ pub fn read_text(path: &Path) -> Result<String, SceneError> {
     String::from_utf8(bytes).map_err(|error| {
         let good = error.utf8_error().valid_up_to();
         let json = String::from_utf8_lossy(error.as_bytes()).into_owned();
-        let source = Texts { file, texts: vec![Text { set: None, json: without_mark(&json).to_owned() }] };
+        let texts = vec![Text { set: None, json: without_mark(&json).to_owned() }];
+        let source = Texts { file, texts, tables: TableFiles::default() };
         let good = good.saturating_sub(json.len() - source.texts[0].json.len());
         let span = source.span(0, good, good + char::REPLACEMENT_CHARACTER.len_utf8());
         let hint = "save the file as UTF-8; names of bars and hinges are plain ASCII anyway";
@@ -86,11 +89,22 @@ fn is_stdin(path: &Path) -> bool {
 /// # Errors
 /// As [`read_scene`], never an I/O error.
 pub fn parse_scene(text: &str, source: &str, overrides: &[Override]) -> Result<Scene, SceneError> {
+    parse_beside(text, source, overrides, &TableFiles::default())
+}
+
+/// The same where files of its tables were read before.
+pub(super) fn parse_beside(
+    text: &str,
+    source: &str,
+    overrides: &[Override],
+    tables: &TableFiles,
+) -> Result<Scene, SceneError> {
     if text.len() as u64 > LONGEST_FILE {
         let hint = "a scene of 10 000 bars fits well into this; is this the right file?";
         return Err(SceneError::whole_file(source, "is too long", "must be at most 16 MiB", hint));
     }
-    let (source, mut tree) = put_together(text, source, overrides)?;
+    let (mut source, mut tree) = put_together(text, source, overrides)?;
+    source.tables = Arc::clone(tables);
     let resolved = resolve::resolve(&source, &mut tree)?;
     scene(&At { source: &source, node: &tree, path: String::new() }, resolved, fit::fitted)
 }
@@ -111,7 +125,7 @@ pub(super) fn put_together(
 ) -> Result<(Texts, Located), SceneError> {
     let mut texts = vec![Text { set: None, json: without_mark(text).to_owned() }];
     texts.extend(overrides.iter().map(Override::text));
-    let source = Texts { file: source.to_owned(), texts };
+    let source = Texts { file: source.to_owned(), texts, tables: TableFiles::default() };
     let mut tree = source.tree(0)?;
     for (number, set) in overrides.iter().enumerate() {
         put(&source, &mut tree, set, source.tree(number + 1)?)?;

@@ -6,13 +6,48 @@ use crate::scene::PointTable;
 use crate::scene::error::SceneError;
 use crate::scene::format::FieldShape;
 use crate::scene::formula::POINTS;
-use crate::scene::locate::{Located, Value};
+use crate::scene::locate::{Located, Texts, Value};
+use crate::scene::set::Override;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 const HINT: &str = "for example {\"gust\": [[0, 0], [1, 2.5]]} or {\"gust\": \"gust.csv\"}";
 /// The longest file \[bytes\]: the most points, with many columns beside theirs.
 const LONGEST: u64 = 256 << 20;
+
+/// The texts of the CSV files that the tables of a scene name, by these names as they are written.
+pub type TableFiles = Arc<Vec<(String, String)>>;
+
+/// Reads the files that the tables of a scene name, once for all the times it is judged; those that cannot be
+/// read are left out, and the judge says why.
+pub fn table_files(text: &str, source: &str, overrides: &[Override]) -> TableFiles {
+    let Ok((source, tree)) = super::put_together(text, source, overrides) else {
+        return TableFiles::default();
+    };
+    let Some(Value::Object(members)) = tree.at("tables").map(|node| &node.value) else {
+        return TableFiles::default();
+    };
+    let mut files: Vec<(String, String)> = Vec::new();
+    for member in members {
+        let name = match &member.node.value {
+            Value::Object(_) => member.node.at("file").map(|node| &node.value),
+            value => Some(value),
+        };
+        let Some(Value::Text(name)) = name else { continue };
+        if files.iter().all(|(known, _)| known != name)
+            && let Ok(text) = contents(&beside(&source, name))
+        {
+            files.push((name.clone(), text));
+        }
+    }
+    Arc::new(files)
+}
+
+/// Where a file is whose name counts from the folder of the scene.
+fn beside(source: &Texts, name: &str) -> PathBuf {
+    Path::new(&source.file).parent().unwrap_or(Path::new("")).join(name)
+}
 
 /// The tables of a scene.
 pub(super) fn tables(root: &At) -> Result<Vec<PointTable>, SceneError> {
@@ -89,14 +124,21 @@ fn listed(table: &At, nodes: &[Located]) -> Result<Vec<[f64; 2]>, SceneError> {
 
 /// Points of a CSV file, whose name counts from the folder of the scene.
 fn from_file(table: &At, name: &str, columns: Option<[&str; 2]>) -> Result<Vec<[f64; 2]>, SceneError> {
-    let path = Path::new(&table.source.file).parent().unwrap_or(Path::new("")).join(name);
+    let path = beside(table.source, name);
     let shown = path.display();
     let refuse = |problem: String, hint: &str| {
         Err(table.refuse(&problem, "must be a CSV file of numbers, x ascending", hint))
     };
-    let text = match contents(&path) {
-        Ok(text) => text,
-        Err((problem, hint)) => return refuse(problem, hint),
+    let read;
+    let text = match table.source.tables.iter().find(|(known, _)| known == name) {
+        Some((_, text)) => text,
+        None => match contents(&path) {
+            Ok(text) => {
+                read = text;
+                &read
+            }
+            Err((problem, hint)) => return refuse(problem, hint),
+        },
     };
     let hint = "two columns with commas, semicolons, tabs or blanks between; lines with # are comments";
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim).enumerate();
