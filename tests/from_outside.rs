@@ -306,3 +306,102 @@ fn the_ground_is_a_body_for_sites() {
     let simulation = Simulation::new(&scene("free")).expect("equations");
     assert_eq!(simulation.site("ground", [0.3, -0.2]).expect("the ground"), Site::ground([0.3, -0.2]));
 }
+
+/// Two bars on hinges, with more parts.
+fn two_bars(more: &str) -> Scene {
+    let text = format!(
+        r#"{{"name": "two", "gravity": [0, -9.81],
+        "bars": [{{"name": "b0", "mass": 1, "centre": [0.25, 0.01], "inertia": 0.03, "length": 0.5}},
+            {{"name": "b1", "mass": 1.3, "centre": [0.25, 0], "inertia": 0.03, "length": 0.5}}],
+        "hinges": [
+            {{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}}, {{"body": "b0", "point": [0, 0]}}]}},
+            {{"name": "B", "between": [{{"body": "b0", "point": [0.5, 0]}}, {{"body": "b1", "point": [0, 0]}}]}}],
+        "start": {{"b0": {{"phi": -0.4, "omega": 0.5}}, "b1": {{"phi": 0.3, "omega": 1}}}},
+        "until": 2, "every": 0.5 {more}}}"#
+    );
+    driftless::parse_scene(&text, "two.json", &[]).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A wall below the second bar's end.
+fn floor(restitution: f64, height: f64, more: &str) -> String {
+    format!(
+        r#", "walls": [{{"name": "W", "body": "b1", "point": [0.5, 0], "restitution": {restitution},
+        "line": {{"through": [0, {height}], "normal": [0.1, 1]}} {more}}}]"#
+    )
+}
+
+/// A torque by a law of time, 3 sin(w t).
+struct Shaken(f64);
+
+impl Force for Shaken {
+    fn name(&self) -> &str {
+        "shaken"
+    }
+
+    fn apply<S: Scalar>(&self, at: &Configuration<S>, loads: &mut Loads<S>) {
+        loads.torque(1, at.time().scale(self.0).sin_cos().0.scale(3.0));
+    }
+}
+
+/// What does not act at the moment counts as well: all that is written in the scene, and every operation of a
+/// force.
+#[test]
+fn a_snapshot_of_another_mechanism_is_refused_whatever_acts_at_the_moment() {
+    let event = |more: &str| format!(r#", "events": [{{"name": "e", {more}}}]"#);
+    let set = |k: f64| {
+        let events = event(&format!(r#""when": "b0.phi + 1", "set": {{"k": {k}}}"#));
+        format!(
+            r#", "parameters": {{"k": 1}}, "torques": [{{"name": "q", "body": "b0", "torque": "k"}}] {events}"#
+        )
+    };
+    let spring = |k: f64| {
+        format!(
+            r#", "springs": [{{"name": "S", "tension": "if(length > 0.75, {k}*(length - 0.75), 0)",
+            "between": [{{"body": "b1", "point": [0.5, 0]}}, {{"body": "ground", "point": [0.6, 0.2]}}]}}]"#
+        )
+    };
+    let table = |y: f64| {
+        format!(
+            r#", "tables": {{"g": [[0, 0], [0.5, 0], [1, {y}], [2, 0]]}},
+            "torques": [{{"name": "q", "body": "b0", "torque": "if(t < 1, 0, g(t))"}}]"#
+        )
+    };
+    let integral = |k: f64| format!(r#", "integrals": {{"i": "{k}*max(0, t - 1)"}}"#);
+    let motor = |k: f64| {
+        format!(r#", "motors": [{{"name": "M", "body": "b0", "law": "-0.4 + 0.5*t + {k}*max(0, t - 1)^3"}}]"#)
+    };
+    let friction = |k: f64| floor(0.3, -0.5, &format!(r#", "friction": {{"kinetic": {k}}}"#));
+    let pairs = [
+        ("restitution", [floor(0.5, -0.5, ""), floor(0.9, -0.5, "")]),
+        ("place of a wall", [floor(0.5, -0.5, ""), floor(0.5, -0.6, "")]),
+        ("friction", [friction(0.2), friction(0.6)]),
+        ("event", [event(r#""when": "b0.phi + 1""#), event(r#""when": "b0.phi + 0.9""#)]),
+        ("set", [set(2.0), set(5.0)]),
+        ("one-sided spring", [spring(30.0), spring(60.0)]),
+        ("later points", [table(2.0), table(4.0)]),
+        ("integral", [integral(1.0), integral(3.0)]),
+        ("later law", [motor(1.0), motor(2.0)]),
+    ];
+    let resumed = |snapshot: &Snapshot, other: &Simulation| {
+        Running::resume(Arc::clone(other.mechanism()), &other.start(), snapshot.clone()).err()
+    };
+    let begun = |scene: &Scene| {
+        Simulation::new(scene).expect("equations").method(MethodId::Dp8).tolerance(1e-9, 1e-9)
+    };
+    for (what, texts) in pairs {
+        let [one, other] = texts.map(|text| two_bars(&text));
+        let snapshot = paused(begun(&one), 1);
+        assert_eq!(resumed(&snapshot, &begun(&one)), None, "{what}");
+        assert_eq!(resumed(&snapshot, &begun(&other)), Some(ResumeError::Misfit), "{what}");
+    }
+    // Both are zero at t = 0.
+    let shaken = |w: f64| begun(&two_bars("")).force(&Shaken(w)).expect("a force");
+    let snapshot = paused(shaken(5.0), 1);
+    assert_eq!(resumed(&snapshot, &shaken(5.0)), None);
+    assert_eq!(resumed(&snapshot, &shaken(9.0)), Some(ResumeError::Misfit));
+    // How long it goes on and what it is called are no part of it.
+    let mut renamed = two_bars("");
+    (renamed.name, renamed.until) = ("other".into(), 3.0);
+    let snapshot = paused(begun(&two_bars("")), 1);
+    assert_eq!(resumed(&snapshot, &begun(&renamed)), None);
+}

@@ -108,6 +108,30 @@ impl Operation {
         }
     }
 
+    /// What tells it from others: its kind, its operands from 1 on, and its number.
+    pub fn signature(&self) -> ([u32; 4], f64) {
+        let (kind, number) = match *self {
+            Self::Input(input) => return ([0, input, 0, 0], 0.0),
+            Self::Constant(value) => (1, value),
+            Self::Add(..) => (2, 0.0),
+            Self::Subtract(..) => (3, 0.0),
+            Self::Multiply(..) => (4, 0.0),
+            Self::Divide(..) => (5, 0.0),
+            Self::Negate(_) => (6, 0.0),
+            Self::Scale(_, factor) => (7, factor),
+            Self::Root(_) => (8, 0.0),
+            Self::Sine(_) => (9, 0.0),
+            Self::Exponential(_) => (10, 0.0),
+            Self::Logarithm(_) => (11, 0.0),
+            Self::HyperbolicTangent(_) => (12, 0.0),
+            Self::Angle(..) => (13, 0.0),
+            Self::Power(..) => (14, 0.0),
+            Self::Beside => (15, 0.0),
+        };
+        let [a, b, c] = self.operands().map(|slot| slot.map_or(0, |slot| slot + 1));
+        ([kind, a, b, c], number)
+    }
+
     /// True for operations with a second result.
     pub fn has_two_results(&self) -> bool {
         matches!(self, Self::Sine(_) | Self::HyperbolicTangent(_))

@@ -15,6 +15,7 @@ use crate::arithmetic::tape::{Slot, Tape};
 use crate::arithmetic::{Complex, Over, Real, Scalar};
 use crate::dynamics::configuration::Configuration;
 use crate::dynamics::constraint::{ConstraintArguments, Site};
+use crate::dynamics::fingerprint::Hash;
 use crate::dynamics::point::Point;
 
 /// A force or torque that acts on a mechanism, beside those a scene knows.
@@ -213,6 +214,41 @@ impl<C: Real> UserForce<C> {
                 ForceInput::Rate(_) | ForceInput::XRate(_) | ForceInput::YRate(_)
             )
         })
+    }
+
+    /// Adds its tapes to a hash: inputs, operations, and on what their results act.
+    pub(in crate::dynamics) fn hash_tapes(&self, hash: &mut Hash) {
+        hash.count(self.inputs.len());
+        for input in &self.inputs {
+            let (kind, of) = match *input {
+                ForceInput::Number(number) => (0, number),
+                ForceInput::Time => (1, 0),
+                ForceInput::Angle(body) => (2, body),
+                ForceInput::Rate(body) => (3, body),
+                ForceInput::Cosine(body) => (4, body),
+                ForceInput::Sine(body) => (5, body),
+                ForceInput::X(site) => (6, site),
+                ForceInput::Y(site) => (7, site),
+                ForceInput::XRate(site) => (8, site),
+                ForceInput::YRate(site) => (9, site),
+            };
+            [kind, of].iter().for_each(|&count| hash.count(count));
+        }
+        for ForceTape { tape, forces, torques, power } in &self.parts {
+            hash.tape(tape);
+            hash.count(forces.len());
+            for &(site, [x, y]) in forces {
+                [site, x as usize, y as usize].iter().for_each(|&count| hash.count(count));
+            }
+            for &(body, torque) in torques {
+                [body, torque as usize].iter().for_each(|&count| hash.count(count));
+            }
+            hash.count(power.map_or(0, |slot| slot as usize + 1));
+        }
+        if let Some((tape, value)) = &self.potential {
+            hash.tape(tape);
+            hash.count(*value as usize);
+        }
     }
 
     /// True for a potential of positions and directions alone.
