@@ -405,3 +405,33 @@ fn a_snapshot_of_another_mechanism_is_refused_whatever_acts_at_the_moment() {
     let snapshot = paused(begun(&two_bars("")), 1);
     assert_eq!(resumed(&snapshot, &begun(&renamed)), None);
 }
+
+#[test]
+fn an_integral_is_no_body() {
+    let scene = two_bars(r#", "integrals": {"int": "b0.phi"}"#);
+    let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.5);
+    let refused = [
+        simulation().body("int").expect_err("a refusal"),
+        simulation().site("int", [0.0; 2]).expect_err("a refusal"),
+    ];
+    for refused in refused {
+        assert!(refused.to_string().contains("no bar is called `int`"), "{refused}");
+    }
+    // Nor is it one for forces and events that go by number; its name is taken all the same.
+    struct Twist(&'static str, usize);
+    impl Force for Twist {
+        fn name(&self) -> &str {
+            self.0
+        }
+        fn apply<S: Scalar>(&self, _: &Configuration<S>, loads: &mut Loads<S>) {
+            loads.torque(self.1, S::of(1.0));
+        }
+    }
+    let refused = simulation().force(&Twist("twist", 2)).err().expect("a refusal");
+    assert!(refused.to_string().contains("names a body that is not there"), "{refused}");
+    let refused = simulation().force(&Twist("int", 1)).err().expect("a refusal");
+    assert!(refused.to_string().contains("has the name of"), "{refused}");
+    assert!(simulation().force(&Twist("twist", 1)).is_ok());
+    let refused = simulation().event(Passes("e", |at: &Configuration<f64>| at.angle(2))).run().err();
+    assert!(refused.expect("a refusal").to_string().contains("names a body that is not there"));
+}

@@ -224,7 +224,7 @@ impl Mechanism {
         if let Some(broken) = scene.broken_reference() {
             return Err(CompileError::Unsound(broken));
         }
-        if let Some(foreign) = forces.iter().find(|force| force.last_body() >= Some(scene.bars.len())) {
+        if let Some(foreign) = forces.iter().find(|force| force.last_body() >= Some(scene.own_bars())) {
             return Err(CompileError::ForeignForce(foreign.name.clone()));
         }
         let forest = Forest::new(scene);

@@ -190,7 +190,7 @@ impl Mechanism {
         at: &Configuration<f64>,
         then: impl FnOnce(&Configuration<f64>) -> R,
     ) -> (R, bool) {
-        let (bodies, coordinates) = (self.bodies.len(), self.coordinates());
+        let (bodies, coordinates) = (self.own_bodies().len(), self.coordinates());
         let checked = Checked { at, bodies, coordinates, is_foreign: Cell::new(false) };
         let found = then(&Configuration::new(&checked));
         (found, checked.is_foreign.get())
@@ -216,7 +216,7 @@ impl Mechanism {
     /// # Errors
     /// No bar has this name.
     pub fn body(&self, name: &str) -> Result<usize, CompileError> {
-        self.bodies
+        self.own_bodies()
             .iter()
             .position(|body| body.name == name)
             .ok_or_else(|| CompileError::NoSuchBar(name.into()))

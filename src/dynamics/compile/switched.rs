@@ -91,6 +91,7 @@ impl Mechanism {
         let held: Vec<&String> = joints.chain(rows).collect();
         let is_taken = |name: &String| {
             held.contains(&name)
+                || self.bodies.iter().any(|body| body.name == *name)
                 || self.site(name, [0.0; 2]).is_ok()
                 || self.acting_names().filter(|other| *other == name).count() > 1
         };
