@@ -5,7 +5,7 @@ use crate::many_digits::{shipped, source};
 use driftless::arithmetic::Scalar;
 use driftless::dynamics::OdeSystem;
 use driftless::run::digits::{Precision, long_run};
-use driftless::run::{Action, Direction, Event, ResumeError};
+use driftless::run::{Action, Change, Direction, Event, ResumeError};
 use driftless::stepping::Cause;
 use driftless::{
     Configuration, Custom, Force, Integrator, Loads, MethodId, Motion, Request, Running, Scene, Simulation,
@@ -434,4 +434,38 @@ fn an_integral_is_no_body() {
     assert!(simulation().force(&Twist("twist", 1)).is_ok());
     let refused = simulation().event(Passes("e", |at: &Configuration<f64>| at.angle(2))).run().err();
     assert!(refused.expect("a refusal").to_string().contains("names a body that is not there"));
+}
+
+/// An event at a time, and what it does.
+struct Acts<A>(&'static str, f64, A);
+
+impl<A: FnMut(&Motion) -> Change + Send + Sync> Event for Acts<A> {
+    fn name(&self) -> &str {
+        self.0
+    }
+
+    fn value(&self, at: &Configuration<f64>) -> f64 {
+        at.time() - self.1
+    }
+
+    fn action(&mut self, _at: &Configuration<f64>, motion: &Motion) -> Action {
+        Action::Change(self.2(motion))
+    }
+}
+
+#[test]
+fn a_part_that_cannot_be_switched_is_refused_on_and_off() {
+    let scene = two_bars(&floor(0.5, -5.0, ""));
+    for on in [true, false] {
+        let stop = |part: &'static str| {
+            let switch = move |_: &Motion| Change::default().switch(part, on);
+            let simulation = Simulation::new(&scene).expect("equations").until(0.5).every(0.5);
+            simulation.event(Acts("x", 0.25, switch)).run().expect("a run").stop.map(|stop| stop.to_string())
+        };
+        for part in ["nothing", "A", "b0"] {
+            let stop = stop(part).expect("a stop");
+            assert!(stop.contains(&format!("event `x` switches `{part}`")), "{stop}");
+        }
+        assert_eq!(stop("W"), None, "{on}");
+    }
 }

@@ -191,7 +191,8 @@ impl ContactDriver {
     fn switch_parts(&mut self, switches: Vec<(String, bool)>) {
         for (part, on) in switches {
             self.off.retain(|off| *off != part);
-            if !on {
+            // What cannot be switched is refused when the parts that act are put together, whichever way.
+            if !on || !self.whole.may_be_switched(&part) {
                 self.off.push(part);
             }
         }
