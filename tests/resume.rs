@@ -337,6 +337,22 @@ fn the_horizon_can_be_put_off() {
     }
 }
 
+/// A spring's periods, and the steps that follow them, go with the horizon.
+#[test]
+fn a_later_horizon_has_as_many_more_periods() {
+    let scene = shipped("spring", &["spring.stiffness=1e6", "spring.damping=0"]);
+    let mode = |plan: &Plan| plan.stiffness.clone().expect("a mode");
+    let short = begun(&scene, &request(MethodId::Dp8, None)).expect("a run");
+    let mut snapshot = short.snapshot();
+    assert!(snapshot.extend(3.0));
+    let later = Request { until: Some(3.0), ..request(MethodId::Dp8, None) };
+    let (extended, whole) = (mode(snapshot.plan()), mode(begun(&scene, &later).expect("a run").plan()));
+    assert!(whole.periods > 300.0 && whole.steps > 300.0, "{whole:?}");
+    for [extended, whole] in [[extended.periods, whole.periods], [extended.steps, whole.steps]] {
+        assert!((extended / whole - 1.0).abs() < 1e-12, "{extended} and {whole}");
+    }
+}
+
 /// Whatever bytes a snapshot is made of, it is refused or integrated; nothing panics, and nothing takes for
 /// ever.
 mod bytes {

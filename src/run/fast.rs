@@ -54,6 +54,12 @@ impl FastMode {
         }
     }
 
+    /// The same to a horizon so many times as late.
+    pub(super) fn extend(&mut self, times: f64) {
+        self.periods *= times;
+        self.steps *= times;
+    }
+
     /// True where it is so much faster than all else that it decides what a run costs.
     pub fn is_stiff(&self) -> bool {
         self.rate > STIFF * self.slow

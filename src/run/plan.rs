@@ -242,6 +242,9 @@ impl Plan {
             if self.max_evaluations == usual_max_evaluations(self.method, self.until) {
                 self.max_evaluations = usual_max_evaluations(self.method, until);
             }
+            if let Some(mode) = &mut self.stiffness {
+                mode.extend(until / self.until);
+            }
             (self.until, self.rows) = (until, rows as u64);
         }
         is_possible
