@@ -202,8 +202,8 @@ impl Simulation {
     /// The run as it would be carried out.
     ///
     /// # Errors
-    /// A request that makes no sense for the scene, an event of another mechanism, or a method that cannot
-    /// begin there.
+    /// A request that makes no sense for the scene, an event of another mechanism or with the name of one of
+    /// the scene, or a method that cannot begin there.
     pub fn prepare(self) -> Result<Run, Error> {
         if self.integrator.is_some() {
             check_integrator(&self.request)?;
@@ -213,13 +213,24 @@ impl Simulation {
             method: if self.integrator.is_some() { Some(MethodId::Dp8) } else { self.request.method },
             ..self.request
         };
-        let mut plan = Plan::new(&self.scene, &self.mechanism, &stand_in)?;
+        let mut plan = Plan::new(&self.scene, &self.mechanism, &stand_in).map_err(|mut refusal| {
+            if let Some(integrator) = &self.integrator
+                && let Some(rest) = refusal.what.strip_prefix("dp8 ")
+            {
+                refusal.what = format!("{} {rest}", integrator.name());
+            }
+            refusal
+        })?;
         if let Some(integrator) = self.integrator {
             plan = plan.integrated_by(integrator);
         }
         let start = self.mechanism.start(&self.scene);
         if let Some(event) = foreign_event(&self.mechanism, &start, &self.events) {
             return Err(CompileError::ForeignEvent(event.into()).into());
+        }
+        let is_taken = |name: &str| self.scene.events.iter().any(|event| event.name == name);
+        if let Some(event) = self.events.iter().map(|event| event.name()).find(|name| is_taken(name)) {
+            return Err(CompileError::EventNameTaken(event.into()).into());
         }
         let run = Run::new(Arc::clone(&self.mechanism), plan, self.limits, &start)?;
         Ok(run.trusted(self.level, &start).with_events(self.events))

@@ -469,3 +469,42 @@ fn a_part_that_cannot_be_switched_is_refused_on_and_off() {
         assert_eq!(stop("W"), None, "{on}");
     }
 }
+
+#[test]
+fn a_motion_moved_behind_a_wall_is_told_as_that_of_its_event() {
+    let scene = two_bars(&floor(0.5, -0.5, ""));
+    // The height over the wall by its formula.
+    let depth = |phi: [f64; 2]| {
+        let tip = phi.map(|phi| [0.5 * phi.cos(), 0.5 * phi.sin()]);
+        -((tip[0][0] + tip[1][0]) * 0.1 + tip[0][1] + tip[1][1] + 0.5) / 1.01_f64.sqrt()
+    };
+    for method in [MethodId::Dp8, MethodId::Taylor] {
+        let turned = |motion: &Motion| {
+            let mut after = motion.clone();
+            after.phi.iter_mut().zip([-0.9, -0.9]).for_each(|(phi, to)| *phi = to.into());
+            after.turns.iter_mut().for_each(|turns| *turns = Default::default());
+            Change::default().to(after)
+        };
+        let simulation = Simulation::new(&scene).expect("equations").method(method);
+        let outcome = simulation.event(Acts("k", 0.02, turned)).run().expect("a run");
+        let stop = outcome.stop.expect("a stop");
+        let told = format!("event `k` puts the point of wall W {:.4} m behind it", depth([-0.9; 2]));
+        assert!(stop.cause == Cause::Unsuited && stop.to_string().contains(&told), "{told}: {stop}");
+    }
+}
+
+#[test]
+fn an_integrator_is_refused_by_its_own_name_and_an_event_by_that_of_another() {
+    let loop_of_bars = scene("crank_rocker");
+    let custom = Custom::new("rk4", || Rk4::boxed(1e-3));
+    let simulation = Simulation::new(&loop_of_bars).expect("equations").integrator(custom);
+    let refused = simulation.stabilize(driftless::run::Stabilization::Elimination).run().err();
+    let refused = refused.expect("a refusal").to_string();
+    assert!(refused.contains("rk4 with --stabilize elimination") && !refused.contains("dp8"), "{refused}");
+    let scene = two_bars(r#", "events": [{"name": "turns", "when": "b0.omega"}]"#);
+    let simulation = || Simulation::new(&scene).expect("equations").until(0.5).every(0.5);
+    let event = |name| Passes(name, |at: &Configuration<f64>| at.time() - 0.25);
+    let refused = simulation().event(event("turns")).run().expect_err("a refusal");
+    assert!(refused.to_string().contains("event `turns` has the name of an event of the scene"), "{refused}");
+    assert!(simulation().event(event("passes")).run().is_ok());
+}

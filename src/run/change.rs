@@ -153,6 +153,9 @@ impl ContactDriver {
         self.changes += 1;
         self.engage(&after);
         let (free, held) = self.acting_parts(&before, &mut after).map_err(refused)?;
+        if !keeps_motion && let Some(what) = behind(&free, [&before, &after]) {
+            return Err(refused((what, "move it to the side of the wall's normal")));
+        }
         if held != self.mechanism.held {
             self.record(&held, after.time.hi, outcome);
         }
@@ -305,6 +308,22 @@ fn stays(free: &Mechanism, contact: usize, motion: &Motion) -> bool {
     let speed = contact.step_size(&omega).max(contact.length / free.units.time);
     contact.gap(motion.time, &phi, &z).abs() <= SATISFIED
         && contact.gap_rate(motion.time, &phi, &z, &omega).abs() <= SATISFIED * speed
+}
+
+/// The wall behind which a changed motion is, by more than the one before was.
+fn behind(mechanism: &Mechanism, [before, after]: [&Motion; 2]) -> Option<String> {
+    let at = |motion: &Motion| {
+        let [phi, _] = motion.rounded();
+        (mechanism.elements(&phi), phi)
+    };
+    let [(z, phi), (next_z, next)] = [before, after].map(at);
+    mechanism.contacts.iter().find_map(|contact| {
+        let [was, gap] = [(&phi, &z), (&next, &next_z)].map(|(phi, z)| contact.gap(after.time, phi, z));
+        let is_behind = gap < -SATISFIED.max(-DRIFTED * was);
+        let name = &contact.row.name;
+        is_behind
+            .then(|| format!("puts the point of wall {name} {} m behind it", about(-gap * contact.length)))
+    })
 }
 
 /// Violations of every constraint at both levels: over its unit and over the speeds of the motion, and as

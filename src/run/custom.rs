@@ -88,6 +88,11 @@ impl Custom {
         Self { name: name.into(), make: Arc::new(make) }
     }
 
+    /// What it is called.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
     pub(super) fn make(&self) -> Outside {
         Outside { inner: (self.make)(), make: Arc::clone(&self.make), spare: None }
     }

@@ -141,6 +141,12 @@ pub enum CompileError {
     /// An event asks for a body the mechanism does not have.
     #[error("event `{0}` is one of another mechanism: it names a body that is not there")]
     ForeignEvent(String),
+    /// An event from outside shares its name with one of the scene.
+    #[error(
+        "event `{0}` has the name of an event of the scene\nhint: give it a name of its own; records tell \
+            events by name"
+    )]
+    EventNameTaken(String),
     /// No bar has the name asked for.
     #[error("no bar is called `{0}`")]
     NoSuchBar(String),
