@@ -94,7 +94,7 @@ impl Hash {
 }
 
 impl Mechanism {
-    /// A hash of its scene and of the forces from outside, and of its energies, accelerations, multipliers and
+    /// A hash of its scene and of forces from outside, and of its energies, accelerations, multipliers and
     /// formulas' forces at a motion.
     ///
     /// Another one is all but certain where anything is another, whether it acts there or not.
