@@ -701,3 +701,99 @@ proptest! {
         }
     }
 }
+
+/// The integral from 0 to t of `exp(-((s - at)/width)^2)`, and the integral of that.
+fn pulse([at, width]: [f64; 2], t: f64) -> [f64; 2] {
+    let primitive = |x: f64| {
+        let root = std::f64::consts::PI.sqrt();
+        [0.5 * root * libm::erf(x), 0.5 * (x * root * libm::erf(x) + (-x * x).exp())]
+    };
+    let ([first, second], [from, from_second]) = (primitive((t - at) / width), primitive(-at / width));
+    [width * (first - from), width * width * (second - from_second) - width * t * from]
+}
+
+/// Blows of 30 ms to 1 ms, which no power at a step's beginning and no stage of a long step tells of.
+#[test]
+fn narrow_pulses_are_not_stepped_over() {
+    let pulses = [[2.3, 0.03], [4.711, 0.003], [7.0931, 0.001]];
+    let text =
+        |name: &str| pulses.map(|[at, width]| format!("30*exp(-(({name} - {at})/{width})^2)")).join(" + ");
+    let torque = |law: &str| format!(r#""torques": [{{"name": "k", "body": "bar", "torque": "{law}"}}]"#);
+    let [speed, angle] = pulses
+        .map(|of| pulse(of, 10.0))
+        .iter()
+        .fold([1.0, 10.0], |sum, [v, x]| [sum[0] + 20.0 * v, sum[1] + 20.0 * x]);
+    let in_time = scene(&rotor([0.0, 1.0], 10.0, &torque(&text("t"))));
+    // By the angle: energy.
+    let energy = pulses.map(|[_, width]| 40.0 * width * std::f64::consts::PI.sqrt());
+    let by_angle = scene(&rotor([0.0, 1.0], 10.0, &torque(&text("bar.phi"))));
+    for request in &methods()[2..] {
+        let last = run(&in_time, request).last;
+        assert!((last.omega[0] - speed).abs() < 1e-7, "{:?}: {} {speed}", request.method, last.omega[0]);
+        assert!((last.phi[0] - angle).abs() < 1e-6, "{:?}: {} {angle}", request.method, last.phi[0]);
+        let (last, all) = (run(&by_angle, request).last, energy.iter().sum::<f64>());
+        let expected = (1.0 + all).sqrt();
+        assert!(
+            (last.omega[0] - expected).abs() < 1e-7,
+            "{:?}: {} {expected}",
+            request.method,
+            last.omega[0]
+        );
+    }
+}
+
+/// ∫ exp(50 (cos 2πt - 1)) over a period, by the trapezoidal rule, which is exact for it.
+#[test]
+fn pulses_of_a_period_and_between_tangents_are_not_stepped_over() {
+    let more = r#""torques": [{"name": "k", "body": "bar", "torque": "15*exp(50*(cos(2*pi*t)-1))"}],
+        "integrals": {"I": "tanh((t-2.3)/(0.01 s)) - tanh((t-2.4)/(0.01 s))"}"#;
+    let scene = scene(&rotor([0.0, 1.0], 5.0, more));
+    let count = 1000;
+    let value =
+        |k: i32| (50.0 * ((std::f64::consts::TAU * f64::from(k) / f64::from(count)).cos() - 1.0)).exp();
+    let speed = 1.0 + 5.0 * 10.0 * (0..count).map(value).sum::<f64>() / f64::from(count);
+    for request in &methods()[2..] {
+        let last = run(&scene, request).last;
+        assert!((last.omega[0] - speed).abs() < 1e-6, "{:?}: {} {speed}", request.method, last.omega[0]);
+        let area = last.omega.last().copied().unwrap_or_default();
+        assert!((area - 0.2).abs() < 1e-6, "{:?}: {area}", request.method);
+    }
+}
+
+/// Events and outputs on a free rotor, and a wall that hits a ball at rest.
+#[test]
+fn narrow_events_outputs_and_blows_of_walls_are_found() {
+    let more = r#""events": [{"name": "t", "when": "exp(-((t-2.3)/(0.001 s))^2) - 0.5"},
+        {"name": "phi", "when": "exp(-((bar.phi-3.1)/0.001)^2) - 0.5"}],
+        "outputs": {"o": "2*exp(-((bar.phi-4.3)/0.001)^2)"}"#;
+    let rotor = scene(&rotor([0.0, 1.0], 5.0, more));
+    let wall = scene(
+        r#"{"name": "wall", "gravity": [0, 0],
+        "bars": [{"name": "ball", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+        "walls": [{"name": "hammer", "body": "ball", "point": [0, 0], "restitution": 0.5,
+            "line": {"through": [0, 0], "normal": [0, 1]}, "law": "0.5*exp(-((t-2.3)/(0.03 s))^2)"}],
+        "start": {"ball": {"phi": 0, "omega": 0, "origin": [0, 0.2], "velocity": [0, 0]}},
+        "until": 5, "every": 5}"#,
+    );
+    let half = 0.001 * std::f64::consts::LN_2.sqrt();
+    // It is hit at x widths before the middle, where the wall is 0.2 m high, and leaves at 1.5 of its speed.
+    let x = 2.5_f64.ln().sqrt();
+    let (hit, speed) = (2.3 - 0.03 * x, 1.5 * 0.2 * 2.0 * x / 0.03);
+    for request in &methods()[2..] {
+        let outcome = run(&rotor, request);
+        for (name, at) in [("t", 2.3), ("phi", 3.1)] {
+            let found: Vec<f64> =
+                outcome.events.iter().filter(|one| one.name == name).map(|one| one.t).collect();
+            assert_eq!(found.len(), 2, "{:?}: {name} at {found:?}", request.method);
+            assert!((found[0] - at + half).abs().max((found[1] - at - half).abs()) < 1e-9, "{found:?}");
+        }
+        let output = &outcome.extremes[0];
+        assert!((output.max[0] - 2.0).abs() < 1e-9 && (output.max[1] - 4.3).abs() < 1e-6, "{output:?}");
+        let mean = 2e-3 * std::f64::consts::PI.sqrt() / 5.0;
+        assert!((output.mean - mean).abs() < 1e-9, "{} {mean}", output.mean);
+        let outcome = run(&wall, request);
+        assert_eq!(outcome.impact_count, 1, "{:?}", request.method);
+        let (y, expected) = (outcome.last.centre[0][1], 0.2 + speed * (5.0 - hit));
+        assert!((y - expected).abs() < 1e-6, "{:?}: {y} {expected}", request.method);
+    }
+}

@@ -89,6 +89,14 @@ fn what_is_flat_where_a_step_begins_is_seen_inside_it() {
     near(&number(row.bodies[0][1]), &root(&(one() - fixed("0.2") / 7 * 10)), 30);
 }
 
+/// A blow of 10 ms in a flight of 5 s: 0.7 (w - 1) = ∫ exp(-((t - 2.3)/0.01)²) dt.
+#[test]
+fn a_narrow_pulse_is_not_stepped_over() {
+    let blow = r#""torques": [{"name": "blow", "body": "rotor", "torque": "1*exp(-((t - 2.3)/0.01)^2)"}]"#;
+    let row = last(&source(&rotor(blow, "0", "1"), &[], "5", "5"), 34);
+    near(&number(row.bodies[0][1]), &(one() + root(&pi()) / 70), 30);
+}
+
 /// Every function, in a law of time and in one of the state: 30 digits more make no difference, the balance of
 /// energy, whose work is the motor's, is kept, and doubles agree.
 #[test]

@@ -12,7 +12,7 @@ use driftless::run::trust::Level;
 use driftless::run::{
     Limits, METHODS, MethodId, Outcome, Plan, Problem, Request, Run, Running, Sample, Snapshot, Stabilization,
 };
-use driftless::scene::Scene;
+use driftless::scene::{Scene, parse_scene};
 use driftless::stepping::composition::Composition::Single;
 use driftless::stepping::{Cause, Dp8, Integrator, Reached, Seen, Statistics, Taylor, Tolerance};
 use std::sync::Arc;
@@ -185,6 +185,20 @@ fn so_do_the_first_orders_in_double_double() {
             let has_rows = name == "motor_sine";
             assert!(check(&shipped(name, &[]), &request) || (stabilize.is_some() && !has_rows), "{name}");
         }
+    }
+}
+
+/// Each step goes on from how far the one before was limited.
+#[test]
+fn so_do_steps_that_narrow_pulses_limit() {
+    let text = r#"{"name": "pulse", "gravity": [0, -9.81], "until": 1, "every": 1,
+        "bars": [{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}],
+        "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "torques": [{"name": "k", "body": "b", "torque": "9*exp(-((t - 0.4)/0.01)^2) + tanh(40*(b.phi + 1))"}],
+        "start": {"b": {"phi": 0, "omega": 1}}}"#;
+    let scene = parse_scene(text, "pulse", &[]).expect("a scene");
+    for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Dopri5, MethodId::Radau(5)] {
+        assert!(check(&scene, &request(method, None)), "{method}");
     }
 }
 

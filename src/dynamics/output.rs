@@ -1,5 +1,7 @@
 //! The outputs of a scene, evaluated: formulas of the state and of what parts carry.
 
+mod active;
+
 use super::compile::CompileError;
 use super::configuration::{Configuration, Values};
 use super::constraint::{Aim, ConstraintArguments, ConstraintEquation, Site};
@@ -87,7 +89,8 @@ impl Outputs {
         }
         let names = OutputNames::of(scene);
         let unsound = |error| CompileError::Unsound(format!("outputs: {error}"));
-        let place = |BoundOutput { formula, sources, .. }| {
+        let place = |BoundOutput { mut formula, sources, .. }| {
+            active::note(&mut formula, &sources);
             let site = |place| forest.site(&place);
             let placed = |source| match source {
                 Source::State(meaning) => Source::State(Meaning::with_points(meaning, site)),

@@ -4,7 +4,9 @@
 //! [`contact`](super::contact) takes a driver through impacts, [`running`](super::running) to output times.
 
 mod inside;
+pub(super) mod limit;
 
+use self::limit::{Limited, StepLimit};
 use super::flip::{self, FlipDetector};
 use super::monitor::Monitor;
 use super::observer::StepWatcher;
@@ -106,6 +108,8 @@ pub(super) struct DriverState {
     goes_on: bool,
     /// What the method knows beside.
     known: Vec<f64>,
+    /// How long its steps may be.
+    limit: StepLimit,
 }
 
 struct StepLoop<P: ?Sized, M> {
@@ -133,6 +137,8 @@ struct StepLoop<P: ?Sized, M> {
     guard: Option<WallGuard>,
     /// Watches the springs, where any can lose its length.
     springs: Option<SpringGuard>,
+    /// Limits the steps, where formulas ask for it.
+    limited: Option<Limited>,
 }
 
 impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M> {
@@ -163,8 +169,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             }
             self.method.save(&mut self.state);
             self.from.clone_from(&self.state);
-            let step = self.method.step(&mut self.problem, &mut self.state, target, &mut self.statistics);
-            let mut event = step.map_err(|stop| turned_too_often(stop, &self.state))?;
+            let mut event = self.make_step(target).map_err(|stop| turned_too_often(stop, &self.state))?;
             if event.is_none() && self.state.time <= self.from.time {
                 // Interrupted: nothing was done.
                 if pause() {
@@ -257,6 +262,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             is_cut: self.is_cut,
             goes_on: self.goes_on,
             known: self.method.internal_state(),
+            limit: self.limited.as_ref().map(|limited| limited.limit).unwrap_or_default(),
         }
     }
 
@@ -280,10 +286,14 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Driver for StepLoop<P, M>
             // What the method knows of the inside of its last step it finds again by repeating it.
             let mut state = place.from.clone();
             self.method.begin(&mut self.problem, &mut state, horizon)?;
-            self.method.step(&mut self.problem, &mut state, horizon, &mut Statistics::default())?;
+            let until = place.limit.until.unwrap_or(horizon);
+            self.method.step(&mut self.problem, &mut state, until, &mut Statistics::default())?;
         }
         (self.state, self.statistics, self.from) = (place.state, place.statistics, place.from);
         (self.ahead, self.goes_on, self.is_cut) = (place.ahead, steps_back, place.is_cut);
+        if let Some(limited) = &mut self.limited {
+            limited.limit = place.limit;
+        }
         Ok(self.method.restore_internal_state(&place.known))
     }
 }
@@ -392,20 +402,6 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
         });
         flips.conclude(start + span, &ends, found);
     }
-
-    /// Shows the motion of the last step to a monitor where it is due.
-    fn show(&mut self, monitor: &mut dyn Monitor) {
-        let Self { problem, method, state, from, inside, observed, statistics, is_dense, .. } = self;
-        while monitor.due() <= state.time.hi {
-            if *is_dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
-                method.interpolate(problem, from, Time::from(monitor.due()), inside);
-                problem.read(inside, observed);
-            } else {
-                problem.read(state, observed);
-            }
-            monitor.observe(observed, *statistics);
-        }
-    }
 }
 
 /// The loop for a problem in some form and a method, from a motion on.
@@ -416,6 +412,7 @@ pub(super) fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send 
 ) -> Box<dyn Driver> {
     let (state, is_dense) = (problem.state(start), method.is_dense());
     let (springs, idle) = (SpringGuard::new(problem.mechanism()), State::default);
+    let limited = Limited::of(problem.mechanism()).filter(|_| is_dense);
     Box::new(StepLoop {
         problem,
         method,
@@ -431,6 +428,7 @@ pub(super) fn driver<P: Form + Send + ?Sized + 'static, M: Integrator<P> + Send 
         is_dense,
         guard: None,
         springs,
+        limited,
     })
 }
 

@@ -2,6 +2,7 @@
 
 use super::StepLoop;
 use crate::dynamics::{Form, Motion, MotionPowers, Time};
+use crate::run::monitor::Monitor;
 use crate::run::observer::Inside;
 use crate::stepping::Integrator;
 
@@ -41,5 +42,21 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> Inside for StepLoop<P, M>
 
     fn powers(&self, powers: &mut MotionPowers) -> bool {
         self.method.powers(powers)
+    }
+}
+
+impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
+    /// Shows the motion of the last step to a monitor where it is due.
+    pub(super) fn show(&mut self, monitor: &mut dyn Monitor) {
+        let Self { problem, method, state, from, inside, observed, statistics, is_dense, .. } = self;
+        while monitor.due() <= state.time.hi {
+            if *is_dense && monitor.due() > from.time.hi && monitor.due() < state.time.hi {
+                method.interpolate(problem, from, Time::from(monitor.due()), inside);
+                problem.read(inside, observed);
+            } else {
+                problem.read(state, observed);
+            }
+            monitor.observe(observed, *statistics);
+        }
     }
 }

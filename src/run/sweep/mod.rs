@@ -334,9 +334,11 @@ impl Sweep {
         &self.variables
     }
 
-    /// True where a mechanism of the points can be in lanes.
+    /// True where a mechanism of the points can be in lanes, whose steps no formula limits.
     fn has_lanes_for(&self, mechanism: &Mechanism) -> bool {
-        Batch::takes_with_stops(mechanism) || self.is_many && Batch::takes_alike_with_stops(mechanism)
+        !mechanism.has_active_arguments()
+            && (Batch::takes_with_stops(mechanism)
+                || self.is_many && Batch::takes_alike_with_stops(mechanism))
     }
 
     /// Points integrated as one task: enough to fill lanes, few enough to spread over the threads.

@@ -8,6 +8,7 @@
 //! [`conditions`](Formula::conditions) changes sign.  Which branches hold is said from outside, so that a
 //! method never steps across a corner unawares.
 
+pub(crate) mod active;
 mod branches;
 mod error;
 mod exact;
@@ -138,6 +139,8 @@ pub struct Formula {
     fixed: Vec<usize>,
     /// The tables in it.
     tables: Vec<Interpolant>,
+    /// The arguments of functions that change in a window of them alone.
+    active: Vec<active::ActiveArgument>,
 }
 
 impl Formula {

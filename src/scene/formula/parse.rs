@@ -40,6 +40,7 @@ impl<'a> Parser<'a> {
             held: Vec::new(),
             fixed: Vec::new(),
             tables: Vec::new(),
+            active: Vec::new(),
         };
         Self { text, at: 0, depth: 0, formula, tables }
     }

@@ -31,6 +31,7 @@ impl<C: Decimal> Binder<'_, C> {
         formula.note_exponents(
             |name| matches!(meanings[name], Meaning::Parameter(parameter) if is_positive(parameter)),
         );
+        formula.note_active_arguments(|name| matches!(meanings[name], Meaning::Parameter(_)));
         let first = self.conditions.len();
         self.conditions.extend(std::iter::repeat_n(owner.to_owned(), formula.conditions()));
         let site = |place| self.forest.site(&place);

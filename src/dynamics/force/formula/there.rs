@@ -84,4 +84,30 @@ impl Formulas {
         });
         next
     }
+
+    /// The formulas that have [active arguments](Formula::note_active_arguments).
+    fn with_active_arguments(&self) -> impl Iterator<Item = &Expression> {
+        let laws = self.signals.iter().chain(self.acting());
+        let all = laws.chain(self.events.iter().map(|event| &event.when));
+        all.filter(|expression| expression.formula.has_active_arguments())
+    }
+
+    /// True where there is one.
+    pub fn has_active_arguments(&self) -> bool {
+        self.with_active_arguments().next().is_some()
+    }
+
+    /// Appends these arguments.
+    pub fn append_active_arguments(&self, at: &Configuration<f64>, parameters: &[f64], all: &mut Vec<f64>) {
+        if !self.has_active_arguments() {
+            return;
+        }
+        self.with_signals_there(at, parameters, |signals| {
+            for expression in self.with_active_arguments() {
+                expression.with_values(at, parameters, signals, |values| {
+                    expression.formula.append_active_arguments(values, all);
+                });
+            }
+        });
+    }
 }
