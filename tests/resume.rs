@@ -194,7 +194,7 @@ fn so_do_steps_that_narrow_pulses_limit() {
     let text = r#"{"name": "pulse", "gravity": [0, -9.81], "until": 1, "every": 1,
         "bars": [{"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1}],
         "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
-        "torques": [{"name": "k", "body": "b", "torque": "9*exp(-((t - 0.4)/0.01)^2) + tanh(40*(b.phi + 1))"}],
+        "torques": [{"name": "k", "body": "b", "torque": "9*exp(-((t - 0.4)/0.01)^2) + 1*tanh(40*(b.phi + 1))"}],
         "start": {"b": {"phi": 0, "omega": 1}}}"#;
     let scene = parse_scene(text, "pulse", &[]).expect("a scene");
     for method in [MethodId::Taylor, MethodId::Dp8, MethodId::Dopri5, MethodId::Radau(5)] {
