@@ -3,6 +3,7 @@
 //! Nothing is decided here: every function calls the crate and hands arrays, words and JSON over.  The
 //! global lock is released while anything is integrated.
 
+mod beside;
 mod errors;
 mod event;
 mod request;

@@ -3,7 +3,7 @@
 use crate::errors::refused;
 use driftless::Level;
 use driftless::run::{Limits, Request};
-use pyo3::exceptions::PyTypeError;
+use pyo3::exceptions::{PyOverflowError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -28,7 +28,14 @@ pub fn asked(py: Python<'_>, options: &Bound<'_, PyDict>, trust: Level) -> PyRes
             PyTypeError::new_err(format!("{name} is {kind}, not of type {given}"))
         };
         let word = || value.extract::<String>().map_err(|_| named("a word"));
-        let number = || value.extract::<f64>().map_err(|_| named("a number"));
+        let number = || {
+            value.extract::<f64>().map_err(|error| {
+                if error.is_instance_of::<PyOverflowError>(py) {
+                    return refused(py, &format!("{name} is too large: a number is at most {:e}", f64::MAX));
+                }
+                named("a number")
+            })
+        };
         let limit = || match number()? {
             limit if limit >= 0.0 => Ok(limit),
             limit => Err(refused(py, &format!("{name} = {limit}: a limit is a number from 0 up"))),

@@ -1,5 +1,6 @@
 //! Runs: integrated without the global lock, looked at now and then for Ctrl-C.
 
+use crate::beside::{LOOK, go_beside, is_windowed};
 use crate::errors::{Interrupted, of_plan, of_run, refused};
 use crate::event::{Failed, Raised, events};
 use crate::request::asked;
@@ -7,7 +8,6 @@ use crate::scene::Scene;
 use driftless::report::charts::{Chart, draw, motion};
 use driftless::report::result::record;
 use driftless::run::checkpoint::{opened, sealed};
-use driftless::run::methods::MethodId;
 use driftless::run::table::Shown;
 use driftless::run::{
     Event, Limits, Observer, Plan, Recorder, Run, Running, Sample, Snapshot, Step, wall_clock,
@@ -21,12 +21,8 @@ use pyo3::types::{PyBytes, PyDict};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
-use std::time::{Duration, Instant};
-
-/// Longest time of computing between two looks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(20);
+use std::time::Instant;
 
 /// A run that has ended, as the crate has it.
 #[pyclass(frozen, module = "pydriftless._core")]
@@ -191,11 +187,14 @@ fn carry(
     let (recorder, end) = (dense.map(|_| Recorder::default()), dense.unwrap_or(f64::INFINITY));
     let raised = Failed::clone(failed);
     let mut watch = Watch { shown, numbers, recorder, callback, end, failed: None, raised };
-    // The windows of these are integrated in one call each, which cannot pause.
-    let is_windowed = matches!(running.plan().method, MethodId::Dopri5 | MethodId::Dop853);
+    let is_windowed = is_windowed(&running);
     loop {
         let looked = if is_windowed {
-            go_beside(py, &mut running, &mut watch, failed)
+            let is_due = &mut || interruption::is_asked() || has_failed(failed);
+            match go_beside(py, || running.go_observed(&mut watch, is_due)) {
+                (Some(error), false) => Err(error),
+                (_, is_over) => Ok(is_over),
+            }
         } else {
             let is_over = py.detach(|| {
                 let (mut begin, mut asked) = (Instant::now(), 0_u32);
@@ -237,34 +236,6 @@ fn carry(
     Ok(Raw { scene, outcome, rows, trajectory })
 }
 
-/// Takes a run on, on a thread of its own, while this one looks for Ctrl-C; true where it is over.
-fn go_beside(py: Python<'_>, running: &mut Running, watch: &mut Watch, failed: &Failed) -> PyResult<bool> {
-    let (waiting, is_done) = (std::thread::current(), AtomicBool::new(false));
-    std::thread::scope(|scope| {
-        let worker = scope.spawn(|| {
-            let is_over = running.go_observed(watch, &mut || interruption::is_asked() || has_failed(failed));
-            is_done.store(true, Ordering::Release);
-            waiting.unpark();
-            is_over
-        });
-        let mut signal = None;
-        while !is_done.load(Ordering::Acquire) && !worker.is_finished() {
-            py.detach(|| std::thread::park_timeout(LOOK));
-            if let Err(error) = py.check_signals() {
-                interruption::flag().store(true, Ordering::Relaxed);
-                signal = Some(error);
-            }
-        }
-        let is_over = py.detach(|| worker.join());
-        interruption::flag().store(false, Ordering::Relaxed);
-        match (signal, is_over) {
-            (_, Err(panic)) => std::panic::resume_unwind(panic),
-            (Some(error), Ok(false)) => Err(error),
-            (_, Ok(is_over)) => Ok(is_over),
-        }
-    })
-}
-
 fn has_failed(failed: &Failed) -> bool {
     let raised = failed.lock().unwrap_or_else(PoisonError::into_inner);
     raised.error.is_some() || raised.interrupt.is_some()
@@ -293,6 +264,16 @@ fn interrupted(
     match told.value(py).setattr("checkpoint", PyBytes::new(py, &bytes)) {
         Ok(()) => told,
         Err(other) => other,
+    }
+}
+
+impl Raw {
+    /// Numbers of the coordinates of bodies: those after them that carry integrals are neither angles nor
+    /// positions.
+    fn kept(&self) -> Vec<usize> {
+        let mechanism = &self.scene.get().mechanism;
+        let (own, bodies) = (mechanism.own_bodies().len(), mechanism.bodies.len());
+        (0..own).chain(bodies..mechanism.coordinates()).collect()
     }
 }
 
@@ -352,7 +333,7 @@ impl Raw {
         let Some(trajectory) = &self.trajectory else {
             return Err(PyValueError::new_err("the run was made without dense=True"));
         };
-        let mut numbers = Vec::new();
+        let (mut numbers, kept) = (Vec::new(), self.kept());
         let times = times.as_array();
         for &t in times {
             let Some((phi, omega)) = trajectory.at(t) else {
@@ -361,7 +342,7 @@ impl Raw {
                     "t = {t} s lies outside of the run, 0 to {end} s"
                 )));
             };
-            numbers.extend(phi.into_iter().chain(omega));
+            numbers.extend(kept.iter().map(|&k| phi[k]).chain(kept.iter().map(|&k| omega[k])));
         }
         let width = numbers.len() / times.len().max(1);
         PyArray1::from_vec(py, numbers).reshape([times.len(), width])
@@ -369,15 +350,15 @@ impl Raw {
 
     /// Events in their order.
     fn events<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        let names = self.coordinates();
+        let (names, kept) = (self.coordinates(), self.kept());
         let dict = |record: &driftless::EventRecord| {
             let dict = PyDict::new(py);
             dict.set_item("name", &record.name)?;
             dict.set_item("t", record.t)?;
             for (key, values) in [("phi", &record.phi), ("omega", &record.omega)] {
                 let of = PyDict::new(py);
-                for (name, value) in names.iter().zip(values) {
-                    of.set_item(name, value)?;
+                for (name, &k) in names.iter().zip(&kept) {
+                    of.set_item(name, values[k])?;
                 }
                 dict.set_item(key, of)?;
             }
@@ -397,7 +378,7 @@ impl Raw {
                 None => name,
             }
         };
-        (0..mechanism.coordinates()).map(name).collect()
+        self.kept().into_iter().map(name).collect()
     }
 
     /// Names of the charts the run has.
@@ -412,7 +393,7 @@ impl Raw {
         let scene = self.scene.get();
         let failed = |error: chart::ChartError| refused(py, &error.to_string());
         let bytes = match format {
-            "gif" | "apng" => {
+            "gif" | "apng" if name == Chart::Mechanism.name() => {
                 let motion = motion(&scene.scene, &scene.mechanism, &self.outcome);
                 let animation =
                     if format == "gif" { chart::motion_gif(&motion) } else { chart::motion_apng(&motion) };
@@ -425,8 +406,8 @@ impl Raw {
                     let there = self.charts().join(", ");
                     let kinds: Vec<_> = chart::Format::ALL.into_iter().map(|kind| kind.extension()).collect();
                     return Err(PyValueError::new_err(format!(
-                        "there is no chart `{name}` as `{format}`; there are {there}, as {}, and the motion as \
-                        gif or apng",
+                        "there is no chart `{name}` as `{format}`; there are {there}, as {}, and the mechanism \
+                        in motion as gif or apng",
                         kinds.join(", ")
                     )));
                 };

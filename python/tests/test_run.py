@@ -492,3 +492,39 @@ def test_the_program_is_interrupted_without_a_traceback(tmp_path, scenes):
     child.send_signal(signal.SIGINT)
     _, said = child.communicate(timeout=60)
     assert child.returncode == 130 and "Traceback" not in said and "driftless resume" in said
+
+
+def test_integrals_are_no_angles(scenes):
+    pid = dl.load(scenes / "pid.json")
+    run = pid.run(trust="off")
+    bodies = {bar["name"] for bar in pid.to_dict()["bars"]}
+    at = run(0.5 * run.t[-1])
+    assert set(at.phi) == set(at.omega) == bodies
+    half = run(run.t[3])
+    assert all(half.omega[name] == pytest.approx(run[f"{name}.omega"][3], abs=1e-9) for name in bodies)
+    described = [dl.Event("third", lambda at: at.t - 0.1)]
+    event = pid.run(trust="off", events=described).events[0]
+    assert set(event["phi"]) == set(event["omega"]) == bodies
+
+
+def test_charts_and_numbers_that_are_none_are_refused(free):
+    run = free.run(until=0.1, trust="off")
+    for name in ("zzz", "angles"):
+        with pytest.raises(ValueError, match="there is no chart"):
+            run.chart(name, "gif")
+    with pytest.raises(dl.RequestRefused, match="until is too large"):
+        free.run(until=10**400)
+    with pytest.raises(dl.RequestRefused, match="tells no report"):
+        free.check(help=True)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+@pytest.mark.parametrize("method", ["taylor", "dopri5"])
+def test_a_stream_is_interrupted_within_a_row(free, method):
+    rows = free.stream(until=1e5, every=1e5, method=method)
+    next(rows)
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        next(rows)
+    assert time.monotonic() - begin < 10

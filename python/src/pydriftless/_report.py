@@ -102,7 +102,10 @@ def command(name: str, arguments: list[str], text: str | None, writes: bool) -> 
         if writes:
             words += ["--out", folder]
         done = subprocess.run(words, input=text, capture_output=True, text=True, encoding="utf-8", check=False)
-        found = json.loads(done.stdout) if done.stdout.strip() else {}
+        try:
+            found = json.loads(done.stdout) if done.stdout.strip() else {}
+        except json.JSONDecodeError:
+            raise RequestRefused(f"{name} tells no report with {' '.join(arguments[1:])}") from None
         if done.returncode and set(found) <= {"error"}:
             raise _exception(done.returncode, found.get("error", {}), done.stderr)
         if writes:

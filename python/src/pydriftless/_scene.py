@@ -233,7 +233,9 @@ class Scene:
     def stream(self, **options: Any) -> Iterator[np.ndarray]:
         """The rows of a run as an iterator, integrated as they are asked for.
 
-        Takes the options of :meth:`run`; a stop before the horizon is an exception after the last row.
+        Takes the options of :meth:`run` but ``dense``, ``callback``, ``events`` and ``progress``; ``trust`` is
+        ``"off"`` by default.  A stop before the horizon is an exception after the last row.  After Ctrl-C, which is
+        a ``KeyboardInterrupt``, the rows go on where they were.
         """
         return _core.stream(self._core, **{"trust": "off", **options})
 

@@ -205,6 +205,8 @@ def _points(vary: Mapping[str, Any]) -> tuple[list[tuple[str, float, float, int]
     for name, value in vary.items():
         if np.iscomplexobj(value):
             raise ValueError(f"{name}: a list of points has real numbers, not complex ones")
+        if np.ma.is_masked(value):
+            raise ValueError(f"{name}: a list of points has no masked values; leave these points out")
     try:
         arrays = [np.asarray(value, dtype=float) for value in vary.values()]
     except (TypeError, ValueError) as error:
