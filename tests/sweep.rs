@@ -934,6 +934,10 @@ mod command {
             .exits(0)
             .shows(&["trust", "in doubt"]);
         program.run("sweep free.json --vary bar1.phi=-2..2:5 --until 0.1 --out d --trust maybe").exits(2);
+        for twice in ["until=1..2:2 --until 0.5", "every=0.1..0.2:2 --every 0.1"] {
+            let refused = program.run(&format!("sweep free.json --vary {twice} --out d"));
+            refused.exits(2).says(&["it is varied, and"]);
+        }
     }
 
     #[test]

@@ -272,6 +272,7 @@ def test_files_tell_of_refused_points(free, tmp_path):
         ({"bar1.phi": (0, "pi", 3)}, {}, "a range is"),
         ({"bar1.phi": (0, 1)}, {}, "a range is"),
         ({"bar1.phi": ["a", "b"]}, {}, "array of numbers"),
+        ({"bar1.phi": np.ma.array([1.0, 2.0], mask=[0, 1])}, {}, "masked"),
         (SMALL, {"shard": (0, 4)}, "first of shard"),
         (SMALL, {"shard": (5, 4)}, "from 1 to 4"),
         (SMALL, {"shard": (1, 0)}, "second of shard"),
@@ -297,3 +298,8 @@ def test_a_share_of_nothing_has_columns_alone(free, tmp_path):
     empty = free.sweep({"bar1.phi": [0.1, 0.2]}, until=0.1, shard=(1, 9))
     assert empty.rows.shape == (0, len(header) - 3) and empty.success
     assert len(free.sweep({"bar1.phi": [0.1, 0.2]}, until=0.1, threads=1024)) == 2
+
+
+def test_what_is_varied_is_not_asked_for_as_well(free):
+    with pytest.raises(dl.RequestRefused, match="it is varied, and until"):
+        free.sweep({"until": [1.0, 2.0]}, until=0.5)

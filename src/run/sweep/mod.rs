@@ -164,6 +164,7 @@ impl Sweep {
         let scene = template.scene()?;
         let mechanism = Arc::new(Mechanism::new(&scene)?);
         let variables = names.iter().map(|name| template.variable(name)).collect::<Result<Vec<_>, _>>()?;
+        unrequested(&variables, request)?;
         let grid = grid(&variables)?;
         let is_chosen = request.method.is_none();
         let mut request = request.clone();
@@ -385,6 +386,22 @@ fn distinct(variables: &[Variable]) -> Result<(), RequestRefusal> {
             is_usage: true,
             what: format!("--vary {}", variable.path),
             reason: "it is varied twice".into(),
+            alternative: "leave one of the two out".into(),
+        })
+    })
+}
+
+/// Whether nothing is varied that the request has a value of.
+fn unrequested(variables: &[Variable], request: &Request) -> Result<(), RequestRefusal> {
+    let requested = [("until", request.until), ("every", request.every)];
+    let is_varied = |path: &str| variables.iter().any(|variable| variable.path == path);
+    let twice =
+        requested.into_iter().find_map(|(path, value)| value.filter(|_| is_varied(path)).map(|v| (path, v)));
+    twice.map_or(Ok(()), |(path, value)| {
+        Err(RequestRefusal {
+            is_usage: true,
+            what: format!("--vary {path}"),
+            reason: format!("it is varied, and {path} = {value} s is asked for as well"),
             alternative: "leave one of the two out".into(),
         })
     })
