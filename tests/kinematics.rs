@@ -853,3 +853,31 @@ fn what_a_motor_drives_goes_at_its_rate() {
     let refused = kinematics(&scene, &drive("boom=0..1"), 4).expect_err("no force of a turning motor");
     assert!(refused.to_string().starts_with("with motor `H` driving `boom`: "), "{refused}");
 }
+
+/// The rocker of a crank-rocker as the drive turns evenly about a hinge of the ground: its acceleration is zero,
+/// that of its points a cosine, up to limits at which crank and coupler are infinitely fast.
+#[test]
+fn what_stays_finite_at_a_limit_is_no_rounding() {
+    let mut scene = example("crank_rocker");
+    let output = |name: &str| Output { name: name.replace('.', "_"), formula: name.to_owned() };
+    scene.outputs = vec![output("rocker.alpha"), output("rocker.ax"), output("crank.alpha")];
+    let body = scene.bars.iter().find(|bar| bar.name == "rocker").expect("the rocker");
+    let [x, y] = body.centre;
+    for count in [24, 131] {
+        let swung = kinematics(&scene, &KinematicDrive { rate: Some(1.0), ..drive("rocker=0..3") }, count)
+            .expect("kinematics");
+        let range = |name: &str| swung.ranges.iter().find(|range| range.name == name).expect("a column");
+        let alpha = range("rocker_alpha");
+        assert!(alpha.min[0].abs() < 1e-7 && alpha.max[0].abs() < 1e-7, "{count}: {alpha:?}");
+        let ax = range("rocker_ax");
+        let [low, high] = [0, 1].map(|k| swung.limits[k].drive);
+        let at = |phi: f64| -(x * phi.cos() - y * phi.sin());
+        let ends = [at(low), at(high)];
+        let [least, most] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+        assert!(
+            (ax.min[0] - least).abs() < 1e-6 && (ax.max[0] - most).abs() < 1e-6,
+            "{count}: {ax:?} {ends:?}"
+        );
+        assert!(range("crank_alpha").max[0].is_infinite(), "{count}: {:?}", range("crank_alpha"));
+    }
+}

@@ -39,6 +39,15 @@ impl SolvedRange {
         Self { positions, rows, limits, singular: Vec::new() }
     }
 
+    /// The positions but those beside limits that rounding hides.
+    fn exact(&self, is_rounded: impl Fn(&SolvedPosition) -> bool) -> &[SolvedPosition] {
+        let [is_limit_below, is_limit_above] = self.limits.each_ref().map(Option::is_some);
+        let all = &self.positions[..];
+        let first = all.iter().position(|one| !(is_limit_below && is_rounded(one)));
+        let last = all.iter().rposition(|one| !(is_limit_above && is_rounded(one)));
+        first.zip(last).map_or(all, |(first, last)| all.get(first..=last).unwrap_or(all))
+    }
+
     /// A column at a value of the drive where the state tells `plain`: beside singular positions what
     /// polynomials tell.
     fn value(&self, column: usize, drive: f64, plain: f64) -> f64 {
@@ -56,11 +65,12 @@ impl DriveWalk {
         if range.singular.iter().any(|one| one.is_unknown(column)) {
             return Some([f64::NAN; 2]);
         }
-        let all = &range.positions;
+        let all = range.exact(|one| self.is_rounded(one));
         let value = |drive: f64, plain: f64| sign * range.value(column, drive, plain);
         let at = |one: &SolvedPosition| value(one.position.drive, one.position.column(column));
         let values: Vec<f64> = all.iter().map(at).collect();
-        let size = usual_size(&values[range.rows.clone()]);
+        let rows = &range.positions[range.rows.clone()];
+        let size = usual_size(&rows.iter().map(at).collect::<Vec<f64>>());
         let beside = |k: usize| [k.saturating_sub(1), (k + 1).min(all.len() - 1)];
         // As far below a position as a neighbour is above it, at most.
         let hidden =

@@ -13,14 +13,18 @@ use crate::run::kinematics::Limit;
 const BETWEEN: usize = 8;
 /// Nodes of the extrapolation, s halved from one to the next, and how far the fastest coordinate is from its
 /// value at the limit at the first \[rad, units of length\].
-const NODES: usize = 11;
-const FIRST: f64 = 0.02;
+const NODES: usize = 14;
+const FIRST: f64 = 0.16;
 /// Nodes of one polynomial, and differences of the last nodes that tell growth.
 const DEGREE: usize = 5;
 const GROWING: usize = 4;
-/// Without bound each difference is larger than the one before by this at least, and the last is no rounding.
+/// Without bound each difference is larger than the one before by this at least, all by the same but for a
+/// share of it, as s^-p has it; and the last is no rounding.  Rounding grows as s^-3, but by no even ratios.
 const GROWTH: f64 = 1.2;
+const EVEN: f64 = 0.2;
 const ROUNDING: f64 = 1e-9;
+/// See [`DriveWalk::is_rounded`].
+const ROUNDED: f64 = 1e-10;
 /// Two polynomials that differ by a larger share of a column's values do not tell its value at the limit.
 const ALIKE: f64 = 1e-7;
 
@@ -35,6 +39,13 @@ pub(in crate::run::kinematics) struct LimitApproach {
 }
 
 impl DriveWalk {
+    /// True where the rounding of the largest acceleration, which is in all of them, is more than a share of
+    /// the drive's rate squared: beside a limit it hides there what stays finite.
+    pub fn is_rounded(&self, at: &SolvedPosition) -> bool {
+        let sizes = at.position.alpha.iter().enumerate().map(|(k, alpha)| (alpha / self.size(k)).abs());
+        f64::EPSILON * sizes.fold(0.0, f64::max) > ROUNDED * self.drive_rate().powi(2)
+    }
+
     /// The way from `last` to a limit, at whose near side this stands.
     pub fn approach(&mut self, last: &SolvedPosition, limit: &Limit) -> LimitApproach {
         let is_node = true;
@@ -82,13 +93,18 @@ impl LimitApproach {
     pub fn column(&self, column: usize) -> Option<f64> {
         let points: Vec<[f64; 2]> =
             self.nodes.iter().map(|(s, at)| [*s, at.position.column(column)]).collect();
-        let size = points.iter().fold(0.0, |size: f64, point| size.max(point[1].abs()));
+        let mut sizes: Vec<f64> = points.iter().map(|point| point[1].abs()).collect();
+        sizes.sort_by(f64::total_cmp);
+        // That of most nodes: at the last ones it may be rounding.
+        let (size, largest) = (*sizes.get(sizes.len() / 2)?, sizes.last().copied()?);
         let steps: Vec<f64> = points.windows(2).map(|pair| pair[1][1] - pair[0][1]).collect();
         let last = &steps[steps.len().saturating_sub(GROWING)..];
+        let ratios: Vec<f64> = last.windows(2).map(|pair| pair[1] / pair[0]).collect();
+        let is_even = |ratio: &f64| (ratio - ratios[0]).abs() < EVEN * ratios[0];
         if let [.., step] = *last
             && last.len() == GROWING
-            && last.windows(2).all(|pair| pair[1] / pair[0] > GROWTH)
-            && step.abs() > ROUNDING * size
+            && ratios.iter().all(|ratio| *ratio > GROWTH && is_even(ratio))
+            && step.abs() > ROUNDING * largest
         {
             return Some(f64::INFINITY.copysign(step));
         }
