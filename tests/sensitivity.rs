@@ -1141,3 +1141,45 @@ fn extremes_of_fast_wheels_keep_their_digits() {
         }
     }
 }
+
+/// A ball let fall from h above a floor, asked about at the impact itself, t = sqrt(2 h/g): before it dy/dh = 1 and
+/// after it dy/dh = 1 + (1 + e), dv/dh = (1 + e) sqrt(g/(2 h)); sideways it has one derivative, v = 1.
+#[test]
+fn outputs_at_the_time_of_an_impact_have_two_derivatives() {
+    let ball = template(
+        r#"{"name": "at", "gravity": [0, -10],
+            "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 0.1}],
+            "walls": [{"name": "W", "body": "b", "point": [0, 0], "line": {"through": [0, 0], "normal": [0, 1]},
+                       "restitution": 0.8}],
+            "start": {"b": {"phi": 0, "omega": 0, "origin": [0, 1.25], "velocity": [1, 0]}}, "until": 0.5, "every": 0.5}"#,
+    );
+    let found = derived(&ball, &["b.y", "b.vy"], &["start.b.origin[1]"], 0.5);
+    for measure in &found.measures {
+        let why = measure.why.as_deref().unwrap_or_default();
+        assert!(measure.slopes.is_empty() && why.contains("one derivative before"), "{measure:?}");
+    }
+    let beside = derived(&ball, &["b.y", "b.vy"], &["start.b.origin[1]"], 0.49);
+    [1.0, 0.0]
+        .iter()
+        .zip(&beside.measures)
+        .for_each(|(slope, measure)| assert_near(measure.slopes[0], *slope, 1e-9, "y"));
+    // What does not move the impact has one.
+    let sideways = derived(&ball, &["b.x"], &["start.b.velocity[0]"], 0.5);
+    assert_near(sideways.measures[0].slopes[0], 0.5, 1e-9, "x");
+}
+
+/// A zero of the third order and a plateau are told as what they are.
+#[test]
+fn what_has_no_known_derivative_is_told() {
+    let wheel = template(
+        r#"{"name": "wheel", "gravity": [0, 0],
+            "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+            "hinges": [{"name": "A", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+            "events": [{"name": "cubed", "when": "b.phi^3"}], "outputs": {"flat": "max(b.phi, 0.2)"},
+            "start": {"b": {"phi": -0.5, "omega": 1}}, "until": 2, "every": 1}"#,
+    );
+    let found = derived(&wheel, &["event:cubed", "min:flat"], &["start.b.omega"], 2.0);
+    let why = |k: usize| found.measures[k].why.as_deref().unwrap_or_default();
+    assert!(why(0).is_empty() || why(0).contains("higher power"), "{:?}", found.measures[0]);
+    assert!(why(1).is_empty() || why(1).contains("constant but for rounding"), "{:?}", found.measures[1]);
+}

@@ -286,7 +286,8 @@ pub fn spectrum_text(found: &Spectrum) -> String {
         "sum",
         &format!(
             "{} 1/s; by the dissipation of the scene {} 1/s",
-            magnitude(found.sum),
+            // A sum that is rounding has no more digits.
+            if found.sum.abs() < 1e-9 { magnitude(found.sum) } else { figure(found.sum) },
             if found.expected_sum == 0.0 { "0".into() } else { figure(found.expected_sum) }
         ),
     );

@@ -100,7 +100,12 @@ impl Side {
     }
 
     /// The rate of the gap of a wall \[m/s\], and its derivatives by the coordinates, zero on entry.
-    pub(super) fn gap_rate(&self, mechanism: &Mechanism, contact: usize, gradient: &mut [f64]) -> f64 {
+    pub(in crate::run) fn gap_rate(
+        &self,
+        mechanism: &Mechanism,
+        contact: usize,
+        gradient: &mut [f64],
+    ) -> f64 {
         let z = mechanism.elements(&self.phi);
         let at = ConstraintArguments { phi: &self.phi, z: &z, omega: &self.omega };
         let here = mechanism.contacts[contact].row.linearise(self.motion.time, at, gradient);
@@ -109,7 +114,7 @@ impl Side {
 
     /// How much later \[s\] a column meets a wall whose gap has these derivatives by the coordinates and by
     /// time.
-    pub(super) fn late(
+    pub(in crate::run) fn late(
         &self,
         mechanism: &Mechanism,
         contact: usize,

@@ -176,6 +176,33 @@ pub(super) fn flip_slopes(variation: &Variation, motion: &Motion, bar: usize) ->
     variation.columns.iter().map(|column| -column[bar] / motion.omega[bar].hi).collect()
 }
 
+/// Share of the time of a run within which an impact happens just then.
+const AT_ONCE: f64 = 1e-12;
+
+/// How the time of an impact moves that is about to happen at a motion, if one is.
+pub(super) fn impact_slopes(variation: &Variation, motion: &Motion) -> Option<Vec<f64>> {
+    let (mechanism, side) = (&variation.mechanism, Side::resting(motion));
+    let z = mechanism.elements(&side.phi);
+    let mut gradient = vec![0.0; side.phi.len()];
+    let mut rate = 0.0;
+    let contact = (0..mechanism.contacts.len()).find(|&k| {
+        let contact = &mechanism.contacts[k];
+        if contact.is_off || mechanism.held.contains(&k) {
+            return false;
+        }
+        gradient.fill(0.0);
+        rate = side.gap_rate(mechanism, k, &mut gradient);
+        let gap = contact.distance(motion.time, &side.phi, &z);
+        rate < 0.0 && gap.abs() <= -rate * AT_ONCE * motion.time.hi
+    })?;
+    let late = |(column, neighbours): (&Vec<f64>, &Option<super::Neighbours>)| {
+        let neighbours = neighbours.as_ref().map_or_else(Vec::new, super::Neighbours::weighted);
+        let delta = Delta { entries: &mut column.clone(), neighbours };
+        side.late(mechanism, contact, (&gradient, rate), &delta)
+    };
+    Some(variation.columns.iter().zip(&variation.neighbours).map(late).collect())
+}
+
 /// How the time of an event of the scene moves.
 pub(super) fn event_slopes(variation: &Variation, motion: &Motion, event: usize) -> Option<Vec<f64>> {
     let side = Side::new(&variation.mechanism, motion);

@@ -1,7 +1,7 @@
 //! Values and derivatives of outputs, and derivatives of times, at the times that are asked for.
 
 use super::extreme::ExtremeTurn;
-use super::measure::{Derived, Measure, event_slopes, flip_slopes, outputs, outputs_beside};
+use super::measure::{Derived, Measure, event_slopes, flip_slopes, impact_slopes, outputs, outputs_beside};
 use super::variation::plain;
 use super::{Look, Query, SensitivityError, Variation, refused};
 use crate::dynamics::Motion;
@@ -26,6 +26,10 @@ pub(super) fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, Sensitiv
 const NO_JUMP: f64 = 1e-6;
 const OFF: f64 = 1e-3;
 
+/// What is said of a zero that is no simple one.
+const UNKNOWN: &str =
+    " at its zero, which it touches or passes as a higher power: how that time moves is not known";
+
 /// Share of the weakest constraint below which forces are those of a singular position.
 const BESIDE: f64 = 1e-6;
 
@@ -38,7 +42,7 @@ pub(super) struct RecordedTime {
     pub after: Option<Derived>,
     /// On the branches that hold just before that time and just after it, where an extreme is taken then.
     pub sides: Option<[Derived; 2]>,
-    /// How that time moves, where the columns were taken through it.
+    /// How that time moves, where the columns were taken through it or an impact is about to happen.
     pub moves: Option<Vec<f64>>,
     /// Derivatives of times, by the number of their measure.
     pub times: Vec<(usize, Vec<f64>)>,
@@ -88,7 +92,7 @@ impl Look for SensitivityRecorder<'_> {
             derived: outputs(variation, motion),
             after: None,
             sides,
-            moves: None,
+            moves: impact_slopes(variation, motion),
             times,
             turns,
             is_singular: self.asks_for_forces(variation, time) && is_singular(variation, motion),
@@ -129,6 +133,19 @@ impl RecordedTime {
     pub fn shown(&self) -> &Derived {
         self.after.as_ref().unwrap_or(&self.derived)
     }
+
+    /// True where an output has other derivatives before that time than after it, and the numbers move it.
+    fn is_split(&self, output: usize) -> bool {
+        let late = self.moves.as_ref().filter(|late| late.iter().any(|late| *late != 0.0));
+        let (Some(late), before) = (late, &self.derived) else { return false };
+        // The impact is about to happen: nothing is known of what comes after it.
+        let Some(after) = &self.after else { return true };
+        let differ = |a: f64, b: f64, size: f64| (a - b).abs() > NO_JUMP * (a.abs().max(b.abs()) + size);
+        let rate = before.rates[output].abs().max(after.rates[output].abs());
+        let mut slopes = before.slopes[output].iter().zip(&after.slopes[output]).zip(late);
+        differ(before.values[output], after.values[output], rate * self.t)
+            || slopes.any(|((before, after), late)| differ(*before, *after, rate * late.abs()))
+    }
 }
 
 /// When a measure was taken, its value and derivatives; or why not, empty where the run ended before.
@@ -155,11 +172,17 @@ pub(super) fn taken(
             return Ok((t, t, slopes.clone()));
         }
         let slopes = at.times.iter().find(|(measure, _)| *measure == number);
-        let slopes = slopes.ok_or("the event function only touches zero")?.1.clone();
+        let slopes = slopes.ok_or(format!("the event function has a rate of zero{UNKNOWN}"))?.1.clone();
         return Ok((t, t, slopes));
     };
     if asked.is_extreme() {
         return extreme(number, asked, t, at).map(|(value, slopes)| (t, value, slopes));
+    }
+    if at.is_split(output) {
+        return Err(format!(
+            "{t} s is the time of an impact or an event that the numbers move: it has one derivative before \
+             and another one after it"
+        ));
     }
     let Derived { values, slopes, .. } = at.shown();
     Ok((t, values[output], slopes[output].clone()))
@@ -182,14 +205,21 @@ fn extreme(number: usize, asked: &Query, t: f64, at: &RecordedTime) -> Result<(f
             "the extreme at {t} s is at a singular position, where the state does not tell it"
         ));
     }
-    let corner = || format!("the extreme at {t} s is a corner of the curve, at an impact or an event");
+    let corner = || {
+        format!(
+            "the extreme at {t} s is none of a smooth curve: it is at a corner, an impact or an event, or where \
+             the output is constant but for rounding"
+        )
+    };
     let (side, late) = match &at.moves {
         // A jump or a corner moves in time.
         Some(late) if at.after.is_some() => (nearer(before, after), Some(late)),
         _ if asked.ended_by.is_some() => {
             // So does the end, with the event.
             let late = at.times.iter().find(|(measure, _)| *measure == number);
-            (before, Some(&late.ok_or("the function of the event that ends the run only touches zero")?.1))
+            let unknown =
+                || format!("the rate of the function of the event that ends the run is zero{UNKNOWN}");
+            (before, Some(&late.ok_or_else(unknown)?.1))
         }
         _ if asked.is_end => (before, None),
         _ if t == 0.0 => (nearer(&at.derived, after), None),
