@@ -26,6 +26,9 @@ pub(super) fn times(until: f64, every: Option<f64>) -> Result<Vec<f64>, Sensitiv
 const NO_JUMP: f64 = 1e-6;
 const OFF: f64 = 1e-3;
 
+/// Derivative of a time \[s per unit of the number\], over that time, that is rounding.
+const STILL: f64 = 1e-9;
+
 /// What is said of a zero that is no simple one.
 const UNKNOWN: &str =
     " at its zero, which it touches or passes as a higher power: how that time moves is not known";
@@ -136,7 +139,7 @@ impl RecordedTime {
 
     /// True where an output has other derivatives before that time than after it, and the numbers move it.
     fn is_split(&self, output: usize) -> bool {
-        let late = self.moves.as_ref().filter(|late| late.iter().any(|late| *late != 0.0));
+        let late = self.moves.as_ref().filter(|late| late.iter().any(|late| late.abs() > STILL * self.t));
         let (Some(late), before) = (late, &self.derived) else { return false };
         // The impact is about to happen: nothing is known of what comes after it.
         let Some(after) = &self.after else { return true };

@@ -26,7 +26,7 @@ const ROUNDING: f64 = 1e-9;
 /// See [`DriveWalk::is_rounded`].
 const ROUNDED: f64 = 1e-10;
 /// Two polynomials that differ by a larger share of a column's values do not tell its value at the limit.
-const ALIKE: f64 = 1e-7;
+const ALIKE: f64 = 1e-6;
 
 /// Positions on the way to a limit.
 pub(in crate::run::kinematics) struct LimitApproach {
