@@ -476,6 +476,12 @@ fn moving_walls_are_drives() {
     let motion = one.motions.first().expect("a motion");
     let [[a, b], [c, d]] = motion.multipliers[..] else { panic!("{motion:?}") };
     assert!((a * c - b * d - 0.64).abs() < 1e-7, "{motion:?}");
+    // With no period given it is that of the wall; there is no equilibrium.
+    let scene = table(sines, "");
+    assert_eq!(found(&scene, 0, None).map(|found| found.period), Ok(TAU / 20.0));
+    let mechanism = Arc::new(Mechanism::new(&scene).expect("equations"));
+    let resting = driftless::run::modes::modes(&scene, &mechanism, 0);
+    assert_eq!(resting.err(), Some(ModesError::Moving("w".into())));
     for law in [sines, r#""0.01*sin(20*t)""#, r#""max(0.01*sin(20*t), -1)""#] {
         for period in [0.25, 0.2, 0.4, 0.5, 0.0123] {
             let refused = found(&table(law, ""), 0, Some(period));

@@ -66,9 +66,10 @@ fn walls(mechanism: &Mechanism) -> impl Iterator<Item = &ConstraintEquation> {
     mechanism.contacts.iter().filter(|contact| !contact.is_off).map(|contact| &contact.row)
 }
 
-/// A motor that moves with time, if there is one.
+/// A motor or a wall that moves with time, if there is one.
 pub(super) fn moving(mechanism: &Mechanism) -> Option<&str> {
-    moved_by_time(mechanism, mechanism.constraints.iter()).next().map(ConstraintEquation::name)
+    let rows = mechanism.constraints.iter().chain(walls(mechanism));
+    moved_by_time(mechanism, rows).next().map(ConstraintEquation::name)
 }
 
 /// True where forces or torques change with time.
@@ -81,8 +82,7 @@ pub(super) fn is_forced(mechanism: &Mechanism) -> bool {
 
 /// True where anything changes with time.
 pub(super) fn is_driven(mechanism: &Mechanism) -> bool {
-    let has_moving_walls = moved_by_time(mechanism, walls(mechanism)).next().is_some();
-    has_moving_walls || moving(mechanism).is_some() || is_forced(mechanism)
+    moving(mechanism).is_some() || is_forced(mechanism)
 }
 
 /// The least common period of the drives, of moving walls and of forces that are laws of time \[s\].
