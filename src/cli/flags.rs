@@ -154,8 +154,7 @@ pub struct PlanFlags {
     /// 1e8, and 1e7 a simulated second, at most 1e10; at most 1e9 expansions of taylor's series]
     #[arg(long, alias = "effort", value_name = "N", value_parser = count, allow_hyphen_values = true)]
     pub max_evaluations: Option<u64>,
-    /// What a method is chosen for where none is named [default: the path, and invariants over a minute or
-    /// more]
+    /// What a method is chosen for where none is named [default: neither, the least time for the accuracy]
     #[arg(long, value_name = "WHAT", value_parser = preferences(), conflicts_with = "method")]
     pub prefer: Option<Prefer>,
 }

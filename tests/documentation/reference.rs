@@ -12,7 +12,8 @@ The same description as JSON Schema, for editors: `driftless schema`.
 
 - Units are SI; angles are in radians, absolute, measured from +x, counter-clockwise.
 - Unknown keys are refused.  A key in **bold** is required.
-- A *name* has 1 to 64 letters `a` to `z` or `A` to `Z`, digits, `_` and `-`.
+- A *name* has 1 to 64 letters `a` to `z` or `A` to `Z`, digits, `_` and `-`; that of the scene does not
+  begin with `-`.
 - Every number may be written as a [formula](formulas.md) of parameters, in quotes.
 - A *number* without a stated range lies between -1e30 and 1e30.
 ";
