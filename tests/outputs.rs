@@ -1034,6 +1034,58 @@ fn extremes_beside_a_pole_are_found() {
     );
 }
 
+/// A bar that turns evenly through zero: its angle t - 0.7 tells what is without bound there and what is not.
+#[test]
+fn poles_and_ends_of_roots_have_their_limits() {
+    let text = r#"{"name": "poles", "gravity": [0, 0],
+        "bars": [{"name": "b", "mass": 1, "centre": [0, 0], "inertia": 1}],
+        "hinges": [{"name": "H", "between": [{"body": "ground", "point": [0, 0]}, {"body": "b", "point": [0, 0]}]}],
+        "signals": {"x": "b.phi - 0.2"},
+        "outputs": {"inverse": "1/b.phi", "faint": "5 + 1e-9/b.phi", "tan": "tan(b.phi + pi/2)", "square": "1/x^2",
+            "touch": "1/(1 - b.cos)", "root": "1/sqrt(abs(b.phi))", "log": "log(b.phi)", "end": "1 + sqrt(0.2 - b.phi)",
+            "whole": "b.sin/b.phi", "chosen": "if(b.phi > 0.1, 1/b.phi, 3)"},
+        "start": {"b": {"phi": -0.7, "omega": 1}}, "until": 2, "every": 2}"#;
+    let (inf, free) = (f64::INFINITY, f64::NAN);
+    // Least and largest value, when, mean and rms; what is not a number here is not looked at.
+    let expected = [
+        ("inverse", [-inf, inf], [0.7, 0.7], [f64::NAN, inf]),
+        ("faint", [-inf, inf], [0.7, 0.7], [f64::NAN, inf]),
+        ("tan", [-inf, inf], [0.7, 0.7], [f64::NAN, inf]),
+        ("square", [1.0 / 1.1_f64.powi(2), inf], [2.0, 0.9], [inf, inf]),
+        ("touch", [1.0 / (1.0 - 1.3_f64.cos()), inf], [2.0, 0.7], [inf, inf]),
+        ("root", [1.0 / 1.3_f64.sqrt(), inf], [2.0, 0.7], [f64::NAN, inf]),
+        ("log", [-inf, 1.3_f64.ln()], [0.7, 2.0], [f64::NAN; 2]),
+        ("end", [1.0, 1.0 + 0.9_f64.sqrt()], [0.9, 0.0], [f64::NAN; 2]),
+        ("whole", [1.3_f64.sin() / 1.3, 1.0], [2.0, free], [free; 2]),
+        ("chosen", [1.0 / 1.3, 10.0], [2.0, 0.8], [free; 2]),
+    ];
+    let is_near = |told: f64, expected: f64| told == expected || (told - expected).abs() < 1e-9;
+    for method in [MethodId::Taylor, MethodId::Dp8] {
+        let outcome = run(&scene(text), &adaptive(method, 1e-12));
+        for (name, values, times, means) in expected {
+            let one = found(&outcome.extremes, name);
+            for (told, (value, time)) in [one.min, one.max].into_iter().zip(values.into_iter().zip(times)) {
+                assert!(is_near(told[0], value), "{method:?} {name}: {one:?}");
+                assert!(time.is_nan() || is_near(told[1], time), "{method:?} {name}: {one:?}");
+            }
+            let is_like = |told: f64, mean: f64| told.is_nan() && mean.is_nan() || told == mean;
+            let is_known = name != "whole" && name != "chosen";
+            let like = is_like(one.mean, means[0]) && is_like(one.rms, means[1]);
+            assert_eq!(like, is_known, "{method:?} {name}: {one:?}");
+        }
+        // The integral of sin(x)/x up to 0.7 and 1.3, by its series, and of 1/x.
+        let series = |x: f64| {
+            (0..12).fold((0.0, x), |(sum, term), k| {
+                let n = f64::from(2 * k + 1);
+                (sum + term / n, -term * x * x / ((n + 1.0) * (n + 2.0)))
+            })
+        };
+        let [whole, chosen] = ["whole", "chosen"].map(|name| found(&outcome.extremes, name).mean);
+        assert!((whole - 0.5 * (series(0.7).0 + series(1.3).0)).abs() < 1e-9, "{whole}");
+        assert!((chosen - 0.5 * (2.4 + 13.0_f64.ln())).abs() < 1e-9, "{chosen}");
+    }
+}
+
 /// A root of what becomes negative has no mean.
 #[test]
 fn what_has_no_value_at_some_times_has_no_mean() {

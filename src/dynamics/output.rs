@@ -1,7 +1,9 @@
 //! The outputs of a scene, evaluated: formulas of the state and of what parts carry.
 
 mod active;
+mod branches;
 
+use self::branches::OutputExpression;
 use super::compile::CompileError;
 use super::configuration::{Configuration, Values};
 use super::constraint::{Aim, ConstraintArguments, ConstraintEquation, Site};
@@ -10,15 +12,7 @@ use super::indeterminate::JointForces;
 use super::kernel::Kernel;
 use super::{Mechanism, Time};
 use crate::arithmetic::Complex;
-use crate::scene::formula::Formula;
 use crate::scene::{BoundOutput, Component, Meaning, OutputNames, Quantity, Scene, Source};
-
-/// A formula with what its names stand for.
-#[derive(Clone, Debug, PartialEq)]
-struct OutputExpression {
-    formula: Formula,
-    sources: Vec<Source<Site>>,
-}
 
 /// An output.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,7 +90,7 @@ impl Outputs {
                 Source::State(meaning) => Source::State(Meaning::with_points(meaning, site)),
                 Source::Carried(quantity) => Source::Carried(Quantity::with_points(quantity, site)),
             };
-            OutputExpression { formula, sources: sources.into_iter().map(placed).collect() }
+            OutputExpression::new(formula, sources.into_iter().map(placed).collect())
         };
         let mut signals = Vec::new();
         for signal in &scene.signals {
@@ -183,57 +177,13 @@ impl Outputs {
         self.list.iter().map(|output| output.expression.sources.iter().any(is_open)).collect()
     }
 
-    /// How many conditions choose the branches of their formulas and of the signals'.
-    pub fn condition_count(&self) -> usize {
-        let all = self.list.iter().map(|output| &output.expression).chain(&self.signals);
-        all.map(|expression| expression.formula.conditions()).sum()
-    }
-
-    /// Appends their values at a moment on these branches; on those that hold there if none are given.
-    pub fn evaluate(
-        &self,
-        at: &Moment,
-        scratch: &mut OutputScratch,
-        branches: &[bool],
-        values: &mut Vec<f64>,
-    ) {
-        let mut branches = branches;
-        self.visit(at, scratch, values, |formula, sources| match branches.is_empty() {
-            true => formula.value(sources),
-            false => formula.evaluate(sources, next(&mut branches, formula)),
-        });
-    }
-
-    /// The branches that hold at a moment, where these conditions are zero, whatever rounding makes of them.
-    pub fn branches(&self, at: &Moment, scratch: &mut OutputScratch, zeros: &[bool]) -> Vec<bool> {
-        let (mut zeros, mut found) = (zeros, Vec::new());
-        self.visit(at, scratch, &mut Vec::new(), |formula, sources| {
-            let own = formula.modes_beside_zeros(sources, next(&mut zeros, formula));
-            let value = formula.evaluate(sources, &own);
-            found.extend(own);
-            value
-        });
-        found
-    }
-
-    /// The conditions at a moment on these branches.
-    pub fn conditions(&self, at: &Moment, scratch: &mut OutputScratch, branches: &[bool]) -> Vec<f64> {
-        let (mut branches, mut found) = (branches, Vec::new());
-        self.visit(at, scratch, &mut Vec::new(), |formula, sources| {
-            let own = next(&mut branches, formula);
-            formula.condition_values(sources, own, &mut found);
-            formula.evaluate(sources, own)
-        });
-        found
-    }
-
     /// Appends what comes of their formulas at a moment, signals first, which is what these have.
     fn visit(
         &self,
         at: &Moment,
         scratch: &mut OutputScratch,
         values: &mut Vec<f64>,
-        mut of: impl FnMut(&Formula, &[f64]) -> f64,
+        mut of: impl FnMut(&OutputExpression, &[f64]) -> f64,
     ) {
         let Moment { mechanism, time, omega, kernel, .. } = *at;
         let OutputScratch { centres, forces, needed, signals, sources } = scratch;
@@ -261,20 +211,13 @@ impl Outputs {
             sources.clear();
             sources.extend(expression.sources.iter().map(source));
             // The zero of an absolute value has no sign: -0.0 + 0.0 is 0.0.
-            of(&expression.formula, sources) + 0.0
+            of(expression, sources) + 0.0
         };
         for signal in &self.signals {
             signals.push(value(signal, signals));
         }
         values.extend(self.list.iter().map(|output| value(&output.expression, signals)));
     }
-}
-
-/// The branches of a formula, taken off those of it and of all that come after it.
-fn next<'a>(branches: &mut &'a [bool], formula: &Formula) -> &'a [bool] {
-    let (own, rest) = branches.split_at(formula.conditions().min(branches.len()));
-    *branches = rest;
-    own
 }
 
 impl Forces {

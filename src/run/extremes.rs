@@ -10,6 +10,7 @@ mod found;
 mod irregular;
 mod limits;
 mod parts;
+mod poles;
 mod singular;
 
 use self::found::Found;

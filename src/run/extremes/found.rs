@@ -66,14 +66,15 @@ impl Found {
 
     /// Mean and root of the mean square over so long a time \[s\].
     pub fn means(&self, span: f64) -> [f64; 2] {
-        match [self.min[0], self.max[0]].map(f64::is_finite) {
-            [true, true] => {
-                [self.integral.hi / span, (self.square.hi / span).clamp(0.0, f64::INFINITY).sqrt()]
-            }
+        let known = [self.integral.hi / span, (self.square.hi / span).clamp(0.0, f64::INFINITY).sqrt()];
+        let [mean, rms] = match [self.min[0], self.max[0]].map(f64::is_finite) {
+            [true, true] => known,
             [true, false] if self.max[0] > 0.0 => [f64::INFINITY; 2],
             [false, true] if self.min[0] < 0.0 => [f64::NEG_INFINITY, f64::INFINITY],
             _ if self.min[0].is_nan() => [f64::NAN; 2],
             _ => [f64::NAN, f64::INFINITY],
-        }
+        };
+        // Where an integral over what is without bound may be finite, it is not known.
+        [if known[0].is_nan() { f64::NAN } else { mean }, if known[1].is_nan() { f64::NAN } else { rms }]
     }
 }

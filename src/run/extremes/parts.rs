@@ -1,9 +1,10 @@
 //! Parts of a step between the corners and jumps of the outputs.
 //!
 //! A formula with `if`, `min`, `max`, `abs`, `sign` or a table is smooth as long as none of its conditions
-//! changes sign.  The conditions are evaluated on the branches that hold where a part begins, interpolated as
-//! outputs are, and the first of their zeros ends the part; within it the outputs are evaluated on these
-//! branches up to both ends.
+//! changes sign, and quotients, roots and logarithms between the zeros of what they are taken of, which are
+//! conditions as well.  The conditions are evaluated on the branches that hold where a part begins,
+//! interpolated as outputs are, and the first of their zeros ends the part; within it the outputs are
+//! evaluated on these branches up to both ends.
 
 use super::super::halvings::turns;
 use super::super::observer::Inside;
@@ -39,7 +40,7 @@ const SOON: f64 = 1e-2;
 const HALVINGS: u32 = 10;
 const ROUNDS: usize = 48;
 /// Changes that are looked for before one beyond which conditions have no value, and the share by which the
-/// search ends before it.
+/// search ends before it; shorter parts are rounding.
 const BEFORE: usize = 8;
 const SHORT: f64 = 1e-9;
 
@@ -120,26 +121,34 @@ impl ExtremesDetector {
     /// Looks at a part, up to as near its ends as all outputs are finite.
     fn look_at_part(&mut self, inside: &mut dyn Inside, ahead: &PendingStep, [from, to]: [f64; 2]) {
         let (begin, span) = (ahead.time(from), (to - from) * ahead.span);
-        let by = self.inwards(inside, begin, span).unwrap_or(0.0);
-        self.look_at(inside, begin + by * span, span - 2.0 * by * span);
+        // What rounding has led beyond the end of a root at an impact is no part of its own.
+        let is_known = |values: Vec<f64>| values.into_iter().all(f64::is_finite);
+        if to - from <= SHORT && !is_known(self.values_at(inside.at(begin + 0.5 * span))) {
+            return;
+        }
+        let [first, last] = self.inwards(inside, begin, span).unwrap_or_default();
+        let before = self.memory.found.clone();
+        self.look_at(inside, begin + first * span, span - (first + last) * span);
+        self.look_at_poles(inside, (begin, span), &before);
     }
 
-    /// By which share of a span its ends are to be moved inwards, until as many outputs are finite there as
-    /// in the middle; `None` where no share is enough.
-    fn inwards(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<f64> {
+    /// By which shares of a span its beginning and its end are to be moved inwards, until as many outputs are
+    /// finite there as in the middle; `None` where no share is enough.
+    fn inwards(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<[f64; 2]> {
         let mut finite = |after: f64| {
             let values = self.values_at(inside.at(begin + after));
             values.iter().filter(|value| value.is_finite()).count()
         };
         let most = finite(0.5 * span);
-        let mut is_enough = |by: f64| finite(by * span) >= most && finite(span - by * span) >= most;
-        INWARDS.into_iter().find(|&by| is_enough(by))
+        let first = INWARDS.into_iter().find(|by| finite(by * span) >= most)?;
+        let last = INWARDS.into_iter().find(|by| finite(span - by * span) >= most)?;
+        Some([first, last])
     }
 
     /// The same until no output jumps between its ends and what is next to them, on the branches given:
     /// where both arguments of `atan2` are zero, rounding leads beyond that to angles that are half a turn
     /// or more off.
-    fn inwards_of_jumps(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<f64> {
+    fn inwards_of_jumps(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<[f64; 2]> {
         let mut both_ends =
             |by: f64| [by, 1.0 - by].map(|share| self.values_at(inside.at(begin + share * span)));
         let [next, later] = NEXT.map(&mut both_ends);
@@ -151,7 +160,7 @@ impl ExtremesDetector {
                 })
             })
         };
-        INWARDS.into_iter().find(|&by| leads_on(by))
+        INWARDS.into_iter().find(|&by| leads_on(by)).map(|by| [by; 2])
     }
 
     /// Looks at a step of outputs that have no value at its ends and do inside, as a root at an impact may,
@@ -172,8 +181,8 @@ impl ExtremesDetector {
             false if !is_resolved => self.inwards_of_jumps(inside, begin, span),
             _ => None,
         };
-        let Some(by) = by.filter(|&by| by > 0.0) else { return false };
-        self.look(inside, begin + by * span, span - 2.0 * by * span, 1);
+        let Some([first, last]) = by.filter(|by| *by != [0.0; 2]) else { return false };
+        self.look(inside, begin + first * span, span - (first + last) * span, 1);
         true
     }
 
@@ -220,7 +229,7 @@ impl ExtremesDetector {
         has_grown(&mut self.memory.rounding, &found)
     }
 
-    fn conditions(&mut self, motion: &Motion) -> Vec<f64> {
+    pub(super) fn conditions(&mut self, motion: &Motion) -> Vec<f64> {
         let branches = std::mem::take(&mut self.branches);
         let found = self
             .with_outputs(motion, |outputs, moment, scratch| outputs.conditions(moment, scratch, &branches));

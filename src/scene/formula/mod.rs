@@ -13,6 +13,7 @@ mod branches;
 mod error;
 mod exact;
 mod parse;
+mod poles;
 mod sign;
 mod table;
 pub mod unit;
@@ -22,6 +23,7 @@ use branches::{Branches, BySign, GivenBranches, Noted, WatchedBranches};
 pub use error::FormulaError;
 pub(crate) use error::meant;
 pub(crate) use exact::Numbers;
+pub(crate) use poles::Pole;
 pub use table::{Interpolant, POINTS};
 use unit::{Dimension, Mismatch};
 
@@ -282,35 +284,44 @@ impl Formula {
         number: &impl Fn(Origin, f64) -> S,
         branches: &mut impl Branches<S>,
     ) -> S {
-        for (place, &node) in self.nodes.iter().enumerate() {
-            let at = |node: usize| results[node];
-            results[place] = match node {
-                Node::Name(number) => values.get(number).copied().unwrap_or(S::ZERO),
-                Node::Flip(condition, a) => {
-                    if branches.is_positive(condition, at(self.conditions[condition])) {
-                        at(a)
-                    } else {
-                        -at(a)
-                    }
-                }
-                Node::Select(condition, a, b) => {
-                    if branches.is_positive(condition, at(self.conditions[condition])) {
-                        at(a)
-                    } else {
-                        at(b)
-                    }
-                }
-                Node::Table(number_of, first, a) => {
-                    let table = &self.tables[number_of];
-                    let knot = |point: usize| table.knot(number_of, point, number);
-                    let piece = branches.piece(first, &table.knots(), at(a), knot);
-                    table.value(number_of, piece, at(a), number)
-                }
-                Node::Number(value) => number(Origin::Node(place), value),
-                node => self.smooth(node, at),
-            };
+        for place in 0..self.nodes.len() {
+            results[place] = self.operation(place, results, values, number, branches);
         }
         results.last().copied().unwrap_or(S::ZERO)
+    }
+
+    /// What an operation comes to, by the results of those before it.
+    #[inline]
+    fn operation<S: Scalar>(
+        &self,
+        place: usize,
+        results: &[S],
+        values: &[S],
+        number: &impl Fn(Origin, f64) -> S,
+        branches: &mut impl Branches<S>,
+    ) -> S {
+        let at = |node: usize| results[node];
+        match self.nodes[place] {
+            Node::Name(number) => values.get(number).copied().unwrap_or(S::ZERO),
+            Node::Flip(condition, a) => {
+                if branches.is_positive(condition, at(self.conditions[condition])) {
+                    at(a)
+                } else {
+                    -at(a)
+                }
+            }
+            Node::Select(condition, a, b) => {
+                if branches.is_positive(condition, at(self.conditions[condition])) { at(a) } else { at(b) }
+            }
+            Node::Table(number_of, first, a) => {
+                let table = &self.tables[number_of];
+                let knot = |point: usize| table.knot(number_of, point, number);
+                let piece = branches.piece(first, &table.knots(), at(a), knot);
+                table.value(number_of, piece, at(a), number)
+            }
+            Node::Number(value) => number(Origin::Node(place), value),
+            node => self.smooth(node, at),
+        }
     }
 
     /// What one operation without a condition comes to; `at` gives the results of earlier ones.
