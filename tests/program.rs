@@ -605,6 +605,27 @@ fn charts_are_drawn_for_what_the_scene_has() {
     assert!(read("mechanism.gif").starts_with(b"GIF89a"));
 }
 
+/// Of a body that turns 80 times between two rows beside one that does not there is no path, and rows alone
+/// are those of the whole run.
+#[test]
+fn rows_too_far_apart_are_told_beside_a_slow_body() {
+    let program = Program::new();
+    let text = r#"{"name": "ff", "gravity": [0, -9.81],
+        "bars": [{"name": "a", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1},
+            {"name": "b", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}],
+        "start": {"a": {"phi": 0, "omega": 0, "origin": [0, 0], "velocity": [1e-9, 0]},
+            "b": {"phi": 0, "omega": 1000, "origin": [0, 1], "velocity": [0, 0]}}, "until": 5, "every": 0.5}"#;
+    std::fs::write(program.path("ff.json"), text).expect("a file");
+    program.run("run ff.json -q --out a --trust off --chart-format svg --method taylor --rtol 1e-9").exits(0);
+    let words = |file: &str| {
+        let path = program.path(&format!("a/ff/taylor-1e-9/{file}"));
+        std::fs::read_to_string(path).expect("a picture")
+    };
+    let [mechanism, angles] = ["mechanism.svg", "angles.svg"].map(words);
+    assert!(mechanism.contains("too far apart for one") && !mechanism.contains("last 0 s"), "{mechanism}");
+    assert!(angles.contains("rows alone") && !angles.contains("first 0.5 s"), "{angles}");
+}
+
 #[test]
 fn several_stabilizations_are_run_one_after_another_and_overlaid() {
     let program = Program::with_scenes(&["motor_sine"]);

@@ -29,6 +29,9 @@ const NEAR: f64 = 1e-2;
 const CROWD: usize = 6;
 const HIGHER: f64 = 60.0;
 
+/// Rings around a point on the lower edge in which there may be words.
+const STACKED: u32 = 32;
+
 /// One method at several settings.
 #[derive(Clone, Debug, Default)]
 pub struct WorkSeries {
@@ -240,6 +243,8 @@ fn along(
     let [left, top, right, bottom] = panel.bounds;
     let room = [left, top, right + 20.0, bottom - 3.0];
     let count = points.len();
+    // Lines along the lower edge lie on one another: their words are stacked above it.
+    let rings = if points.iter().all(|at| at[1] >= bottom) { STACKED } else { 2 };
     // The finest setting, then the coarsest, then what is between.
     let ranks = points.iter().enumerate().map(|(k, at)| {
         (
@@ -254,7 +259,7 @@ fn along(
         )
     });
     let places = ranks.map(|(rank, &at)| {
-        let (bounds, cost) = place(at, 6.5, 2, size, room, &[], occupied);
+        let (bounds, cost) = place(at, 6.5, rings, size, room, &[], occupied);
         (bounds, cost + rank)
     });
     let Some((bounds, _)) = places.min_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(()) };

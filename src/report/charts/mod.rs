@@ -144,6 +144,8 @@ pub fn motion(scene: &Scene, mechanism: &Mechanism, outcome: &Outcome) -> Motion
 
 /// Most it may turn in a window of time that shows single swings \[rad\], and how much is shown instead.
 const CROWDED: [f64; 2] = [40.0 * TAU, 12.0 * TAU];
+/// Rows of a window, too far apart for curves, of which fewer are not shown alone: those of the run are.
+const ROWS: usize = 12;
 /// How far the fastest body turns along the path shown \[rad\].
 const PATH: f64 = 4.0 * TAU;
 /// What captions say of rows between which a body turns too far.
@@ -216,6 +218,9 @@ impl Finished<'_> {
             }
             window.push(sample);
         }
+        if window.len() < ROWS && is_coarse(&window, self.angle_count()) {
+            return (whole, None);
+        }
         let said = part_of("first", span(&window), self.outcome.last.t);
         (window, Some(said))
     }
@@ -275,7 +280,8 @@ impl Finished<'_> {
                 by_angle += turned(sample, after, self.angle_count());
                 by_any += furthest(sample, after);
             }
-            if by_angle > PATH || by_any > PATH && path.len() >= MOVED {
+            // Two rows tell whether they are too far apart for a path.
+            if path.len() > 1 && (by_angle > PATH || by_any > PATH && path.len() >= MOVED) {
                 break;
             }
             path.push(sample);
