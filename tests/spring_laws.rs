@@ -4,7 +4,9 @@
 use super::common::shipped;
 use super::formulas::scene;
 use super::taylor::{distance, end, on};
-use driftless::scene::Scene;
+use driftless::Simulation;
+use driftless::run::{MethodId, Request, Status, Sweep, SweepPoint, sweep};
+use driftless::scene::{Scene, Template};
 use driftless::stepping::Taylor;
 use driftless::stepping::taylor::ExpansionKernel;
 
@@ -112,5 +114,85 @@ fn small_oscillations_about_equilibrium_keep_their_steps() {
         let found = distance(&exact, &end(&scene, on(ExpansionKernel::Fastest, 1e-9, 20), 20.0));
         // The frequency is about 169 rad/s, the rate 1.7e-5 rad/s.
         assert!(found < 1e-6, "{found:e}");
+    }
+}
+
+/// A cart on a rail that runs past the other end of its spring at a distance.
+fn passing(spring: &str, distance: f64) -> String {
+    format!(
+        r#"{{"name": "passing", "gravity": [0, 0], "until": 1, "every": 0.25,
+        "bars": [{{"name": "cart", "mass": 2, "centre": [0, 0], "inertia": 0.1, "length": 0.3}}],
+        "sliders": [{{"name": "s", "point": {{"body": "cart", "point": [0, 0]}},
+            "rail": {{"body": "ground", "point": [0, 0], "direction": [1, 0]}}, "angle": "locked"}}],
+        "springs": [{{"name": "S", "between": [{{"body": "ground", "point": [-1, {distance}]}},
+            {{"body": "cart", "point": [0, 0]}}], {spring}}}],
+        "start": {{"cart": {{"phi": 0, "omega": 0, "origin": [0.3, 0], "velocity": [-3, 0]}}}}}}"#
+    )
+}
+
+/// The pull T = k (L - 0.9) alone, until the ends meet and from there on the other side.
+const PULLS: [&str; 3] = [
+    r#""tension": "2.7*(length-0.9)""#,
+    r#""potential": "1.35*(length-0.9)^2""#,
+    r#""stiffness": 2.7, "free_length": 0.9"#,
+];
+
+/// The time the ends would meet at, and the place of the cart at 1 s.
+fn passed() -> (f64, f64) {
+    let (w, free) = ((2.7_f64 / 2.0).sqrt(), 0.9);
+    let length = |t: f64| free + 0.4 * (w * t).cos() - 3.0 / w * (w * t).sin();
+    let speed = |t: f64| 0.4 * w * (w * t).sin() + 3.0 * (w * t).cos();
+    let met = (0..8).fold(0.4, |t, _| t + length(t) / speed(t));
+    let left = 1.0 - met;
+    (met, -1.0 - (free - free * (w * left).cos() + speed(met) / w * (w * left).sin()))
+}
+
+#[test]
+fn springs_whose_ends_nearly_meet_turn_their_pull_round() {
+    let (_, expected) = passed();
+    for pull in PULLS {
+        let outcome = Simulation::new(&scene(&passing(pull, 1e-6))).expect("equations").run().expect("a run");
+        assert_eq!(outcome.stop, None, "{pull}");
+        let x = outcome.last.centre[0][0];
+        assert!((x - expected).abs() < 2e-5, "{pull}: {x} for {expected}");
+    }
+}
+
+#[test]
+fn laws_whose_ends_meet_stop_where_a_spring_does() {
+    let (met, _) = passed();
+    for pull in PULLS {
+        let outcome = Simulation::new(&scene(&passing(pull, 0.0))).expect("equations").run().expect("a run");
+        let stop = outcome.stop.unwrap_or_else(|| panic!("{pull}: it went through"));
+        assert_eq!(stop.cause.word(), "spring_without_length", "{pull}: {stop}");
+        assert!((stop.t - met).abs() < 1e-6, "{pull}: {} for {met}", stop.t);
+    }
+}
+
+#[test]
+fn points_of_a_sweep_whose_ends_nearly_meet_are_runs() {
+    let (met, expected) = passed();
+    for pull in PULLS {
+        let swept = |distance: f64| {
+            let template = Template::new(passing(pull, distance), "passing".into(), &[]);
+            let vary = vec!["bars.cart.inertia=0.1..0.2:3".parse().expect("a range")];
+            let request = Request { method: Some(MethodId::Taylor), ..Request::default() };
+            let (mut points, plan) = (Vec::new(), Sweep::new(&template, vary, &request).expect("a sweep"));
+            sweep(&plan, 1, &mut |point: &SweepPoint| {
+                points.push(point.clone());
+                Ok(())
+            })
+            .expect("all points");
+            points
+        };
+        for point in swept(1e-6) {
+            let x = point.centres[0][0][0];
+            assert!((x - expected).abs() < 2e-5, "{pull}: {x} for {expected}, {point:?}");
+        }
+        for point in swept(0.0) {
+            let Status::Stopped(stop) = &point.status else { panic!("{pull}: {point:?}") };
+            assert_eq!(stop.cause.word(), "spring_without_length", "{pull}: {stop}");
+            assert!((stop.t - met).abs() < 1e-6, "{pull}: {} for {met}", stop.t);
+        }
     }
 }

@@ -3,42 +3,32 @@
 //!
 //! A power series takes sqrt(|D|²) through zero to a negative length, and a fixed step does not see the jump
 //! of the force at all; both come out on the other side with another energy, or nearly the same.  Where the
-//! two ends of a spring with a free length can meet, the driver shows every step to a [`SpringGuard`]: the
+//! two ends of a spring that pulls there can meet, the driver shows every step to a [`SpringGuard`]: the
 //! [search](crate::stepping::search) for all events looks on its dense output for zeros of the squared length
 //!
 //! ```text
-//! g = (|D| / 1e-6 L0)² - 1,     |g''| <= (2 |D'|² + 2 |D| |D''|) / (1e-6 L0)²
+//! g = (|D| / L_0)² - 1,     |g''| <= (2 |D'|² + 2 |D| |D''|) / L_0²
 //! ```
+//!
+//! where L_0 is 1e-6 of the free length, or for a law by a formula 1e-9 of the lengths its span is made of.
 //!
 //! Mechanisms whose springs are too far from their places for that are integrated without.
 
 use crate::arithmetic::Complex;
-use crate::dynamics::force::CompiledSpring;
+use crate::dynamics::force::meeting::{MeetingSpan, can_meet};
 use crate::dynamics::{BodyAngles, Mechanism};
 use crate::stepping::search::{Chebyshev, Crossing, Curve, IntervalBounds, crossing, interpolated};
-use crate::stepping::{Cause, StepError};
+use crate::stepping::{StepError, without_length};
 
-/// A length below this share of the free length is none.
-const NONE: f64 = 1e-6;
 /// Degrees of the interpolants of a span inside a step, and what the last coefficients may be of a length
 /// that counts as none.
 const DEGREES: [usize; 3] = [8, 16, 32];
 const RESOLVED: f64 = 1e-3;
 
-/// True where the two ends of a spring can meet.
-fn can_shrink(spring: &CompiledSpring) -> bool {
-    let parts = std::iter::once(&spring.span.root).chain(spring.span.terms.iter().map(|term| &term.1));
-    let lengths: Vec<f64> = parts.map(|part| part.norm_squared().sqrt()).collect();
-    let (all, most) = (lengths.iter().sum::<f64>(), lengths.iter().copied().fold(0.0, f64::max));
-    let pulls = spring.free_length > 0.0 && (spring.stiffness > 0.0 || spring.damping > 0.0);
-    // Rounding must not open a gap that is none.
-    pulls && (!spring.span.shifts.is_empty() || 2.0 * most <= all * (1.0 + 1e-9))
-}
-
 /// Watches the springs that can lose their length.
 #[derive(Default)]
 pub(super) struct SpringGuard {
-    springs: Vec<CompiledSpring>,
+    springs: Vec<MeetingSpan>,
     /// Number of bodies of the mechanism.
     bodies: usize,
     /// The beginning of the step to come.
@@ -53,24 +43,6 @@ pub(super) struct WithoutLength {
     name: String,
     /// After the beginning of the step \[s\].
     after: f64,
-}
-
-/// D and D' of a spring of a mechanism \[m, m/s\].
-fn ends(
-    spring: &CompiledSpring,
-    bodies: usize,
-    at: &BodyAngles,
-    z: &mut Vec<Complex<f64>>,
-) -> [Complex<f64>; 2] {
-    z.clear();
-    z.extend(at.phi[..bodies].iter().map(|&phi| Complex::unit(phi)));
-    // The translational coordinates of bodies that hang on nothing are where the first of their coordinates
-    // is.
-    z.extend(
-        (bodies..at.phi.len())
-            .map(|x| Complex::new(at.phi[x], at.phi.get(x + 1).copied().unwrap_or_default())),
-    );
-    [spring.span.position(z), spring.span.velocity(z, &at.omega)]
 }
 
 /// The square of |D| over what counts as none, less 1: D's components over that.
@@ -97,20 +69,11 @@ impl Curve for Length {
     }
 }
 
-/// True where the ends of a spring may meet in a step, if they are at most twice as fast on the way as at its
-/// ends.
-fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) -> bool {
-    let size = |x: Complex<f64>| x.norm_squared().sqrt();
-    let reach = time * (size(a[1]).max(size(b[1])) + size(b[1] - a[1]));
-    let nearest = size(a[0]).min(size(b[0]));
-    nearest <= reach || reach.is_nan()
-}
-
 impl SpringGuard {
     /// One for the springs of a mechanism; `None` where none of them can lose its length.
     pub fn new(mechanism: &Mechanism) -> Option<Self> {
-        let springs: Vec<CompiledSpring> =
-            mechanism.springs.iter().filter(|spring| can_shrink(spring)).cloned().collect();
+        let mut springs = MeetingSpan::all(mechanism);
+        springs.retain(|spring| spring.none > 0.0);
         (!springs.is_empty()).then(|| Self { springs, bodies: mechanism.bodies.len(), ..Self::default() })
     }
 
@@ -118,9 +81,9 @@ impl SpringGuard {
     /// after its beginning.
     pub fn step(&mut self, span: f64, at: &mut dyn FnMut(f64) -> BodyAngles) -> Option<WithoutLength> {
         let Self { springs, bodies, before, now, z } = self;
-        let mut first: Option<(f64, &CompiledSpring)> = None;
+        let mut first: Option<(f64, &MeetingSpan)> = None;
         for spring in &*springs {
-            let [a, b] = [&*before, &*now].map(|at| ends(spring, *bodies, at, z));
+            let [a, b] = [&*before, &*now].map(|at| spring.ends(*bodies, at, z));
             let found = if can_meet(a, b, span) { searched(spring, *bodies, span, at, z) } else { None };
             let found = found.map(|after| (after, spring));
             first = [first, found].into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
@@ -132,16 +95,15 @@ impl SpringGuard {
 
 /// How long after the beginning of a step a spring loses its length, by the motion inside it \[s\].
 fn searched(
-    spring: &CompiledSpring,
+    spring: &MeetingSpan,
     bodies: usize,
     span: f64,
     at: &mut dyn FnMut(f64) -> BodyAngles,
     z: &mut Vec<Complex<f64>>,
 ) -> Option<f64> {
-    let none = NONE * spring.free_length;
     let ends_at = |share: f64, row: &mut Vec<f64>| {
-        let [here, _] = ends(spring, bodies, &at(share * span), z);
-        row.extend([here.re / none, here.im / none]);
+        let [here, _] = spring.ends(bodies, &at(share * span), z);
+        row.extend([here.re / spring.none, here.im / spring.none]);
     };
     let length = Length(interpolated(&DEGREES, ends_at, |_, part, _| part.tail() < RESOLVED).curves);
     match crossing(&length, 1.0) {
@@ -154,13 +116,6 @@ fn searched(
 impl WithoutLength {
     /// The stop of a method whose step of `span` \[s\] began at `t` \[s\].
     pub fn stop(&self, method: &str, t: f64, span: f64) -> StepError {
-        StepError {
-            cause: Cause::SpringWithoutLength,
-            method: method.to_owned(),
-            t: t + self.after,
-            step: span,
-            what: format!("spring `{}` has no length there, and its force no direction", self.name),
-            hint: "move an end or the start, or set free_length to 0 if the ends are meant to meet".into(),
-        }
+        without_length(&self.name, method, t + self.after, span)
     }
 }

@@ -23,6 +23,7 @@ pub mod radau;
 #[doc(hidden)]
 pub mod rattle;
 pub(crate) mod search;
+mod stops;
 #[doc(hidden)]
 pub mod taylor;
 #[doc(hidden)]
@@ -32,6 +33,8 @@ pub use dp5::Dp5;
 pub use dp8::Dp8;
 pub use explicit::Tolerance;
 pub use radau::Radau;
+use stops::at_rest;
+pub(crate) use stops::without_length;
 pub use taylor::Taylor;
 pub use windows::{Dop853, Dopri5};
 
@@ -413,21 +416,6 @@ fn finest(state: &State, time_unit: f64) -> f64 {
 /// What to do about a stop where something is not finite.
 pub(crate) const NOT_FINITE: &str = "look for a spring of length zero, a position without inertia, or a \
     formula without a value or a derivative here, as atan2(0, 0)";
-
-/// The stop of a step \[s\] in which a point came to rest on its wall.
-fn at_rest(method: &str, state: &State, step: f64) -> StepError {
-    StepError {
-        cause: Cause::RestingContact,
-        method: method.into(),
-        t: state.time.hi,
-        step,
-        what: "a point has come to rest on a wall".into(),
-        hint:
-            "raise the restitution of the wall, or change what presses the point against it; a wall must not \
-               move on to where the point cannot go"
-                .into(),
-    }
-}
 
 /// The adaptive methods integrate forwards only; a time behind by no more than rounding has been reached.
 fn refuse_the_past(method: &str, state: &State, until: Time, time_unit: f64) -> Result<(), StepError> {

@@ -27,6 +27,7 @@
 //! Taylor methods*, Experimental Mathematics 14 (2005), section 3.2, for steps from the last powers; their
 //! two are five here.
 
+mod approach;
 pub mod batch;
 mod bodies;
 mod confirm;
@@ -42,19 +43,21 @@ mod springs;
 mod step_size;
 mod swinging;
 mod terms;
+mod walls;
 mod wide;
 
+use self::approach::Approach;
 pub use self::batch::Batch;
 use self::expansion::Expansion;
 use self::fast::Fast;
 use self::singular::SingularPassage;
+use self::walls::{trace, walls_known};
 use super::event::FirstEvent;
 use super::search::{self, PowerSeries};
 use super::{Cause, Integrator, Statistics, StepError, Tolerance};
 use crate::arithmetic::DoubleDouble;
 use crate::dynamics;
-use crate::dynamics::impact::Contact;
-use crate::dynamics::series::{Coefficient, Series, powers};
+use crate::dynamics::series::Coefficient;
 use crate::dynamics::{Coordinates, Form, Mechanism, MotionPowers, OdeSystem, State, Time};
 
 /// Highest order of the code that has room of a fixed size.
@@ -101,6 +104,7 @@ pub struct Taylor<T: Coefficient> {
     powers: Vec<f64>,
     gaps: Vec<f64>,
     inside: State,
+    approach: Approach,
 }
 
 impl<T: Coefficient> Taylor<T> {
@@ -119,6 +123,7 @@ impl<T: Coefficient> Taylor<T> {
             powers: Vec::new(),
             gaps: Vec::new(),
             inside: State::default(),
+            approach: Approach::default(),
         }
     }
 }
@@ -161,6 +166,7 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
     fn begin(&mut self, problem: &mut P, state: &mut State, until: Time) -> Result<(), StepError> {
         super::refuse_the_past("taylor", state, until, problem.time_unit())?;
         self.choose(problem, state)?;
+        self.approach.take_in(problem.mechanism());
         state.memory.clear();
         Ok(())
     }
@@ -175,6 +181,7 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
         let left = until - state.time;
         statistics.check("taylor", state.time.hi, 0.0)?;
         statistics.evaluations += 1;
+        self.approach.begin(state);
         let quick = self.fast.as_mut().and_then(|fast| fast.step(state, left.hi));
         self.by_series = quick.is_none();
         let (wanted, mut h) = quick.unwrap_or_else(|| self.expand(problem, state, left.hi));
@@ -205,6 +212,9 @@ impl<T: Coefficient, P: OdeSystem + Form + ?Sized> Integrator<P> for Taylor<T> {
                 "the series converges in ever smaller circles".into(),
                 hint,
             ));
+        }
+        if !self.approach.is_empty() {
+            h = self.before_meeting(problem, state, h);
         }
         let mut event = None;
         if self.by_series {
@@ -409,42 +419,5 @@ impl<T: Coefficient> Taylor<T> {
             best = moved;
         }
         best
-    }
-}
-
-/// How far ahead the series of the laws of walls are known to rounding \[s\].
-fn walls_known<T: Coefficient>(mechanism: &Mechanism, t: Time, series: &Series<T>) -> f64 {
-    let order = series.order();
-    let known = |contact: &Contact| {
-        let powers = match (&contact.row.law, &contact.row.aim) {
-            _ if contact.is_off => return None,
-            (_, Some(aim)) => series.aim(aim).iter().map(|power| power.value()).collect(),
-            (Some(law), None) => powers(law, t, order + 1),
-            (None, None) => return None,
-        };
-        let last = powers.iter().enumerate().skip(order.saturating_sub(3).max(3));
-        last.map(|(m, power)| (f64::EPSILON * contact.length / power.abs()).powf(1.0 / m as f64))
-            .reduce(f64::min)
-    };
-    mechanism.contacts.iter().filter_map(known).fold(f64::INFINITY, f64::min)
-}
-
-/// Powers of an event function along the series: the gap of a wall over its contact's length, or the force on
-/// a point held there over its contact's force.
-fn trace<T: Coefficient, P: Form + ?Sized>(
-    problem: &P,
-    expansion: &Expansion<T>,
-    t: Time,
-    contact: usize,
-    powers: &mut Vec<f64>,
-) {
-    let mechanism = problem.mechanism();
-    let series = expansion.series();
-    match mechanism.held.iter().position(|&held| held == contact) {
-        None => series.gap(&mechanism.contacts[contact], t, powers),
-        Some(place) => {
-            powers.clear();
-            powers.extend((0..series.order()).map(|m| expansion.pressure(place, m)));
-        }
     }
 }

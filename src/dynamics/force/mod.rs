@@ -3,6 +3,7 @@
 pub mod action;
 pub(crate) mod formula;
 mod law;
+pub(crate) mod meeting;
 mod recorder;
 pub(crate) mod span;
 pub mod spring;

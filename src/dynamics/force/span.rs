@@ -89,6 +89,11 @@ impl<C: Real> SpanLaw<C> {
         tape.results(|input| if input == LENGTH { length } else { rate }, |slots| slots[*slot as usize])
     }
 
+    /// T where the ends meet at rest \[N\], at time zero.
+    pub fn tension_without_length(&self) -> f64 {
+        self.tape.results(|_| 0.0, |slots| slots[self.tension as usize])
+    }
+
     /// Adds the generalized forces \[N·m, N\]; returns the power accounted as work \[W\].
     #[inline]
     pub fn pull<T: Over<C>>(&self, time: T, at: ConstraintArguments<T>, load: &mut [T]) -> T {

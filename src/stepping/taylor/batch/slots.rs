@@ -6,9 +6,10 @@ use super::{Batch, BatchMember, BatchObserver, Going, LaneKernel, TakenStep};
 use crate::arithmetic::eight::{LANES, Octet};
 use crate::arithmetic::lanes::wide::EightLanes;
 use crate::dynamics::{Motion, State, Time};
+use crate::stepping::taylor::approach::Approach;
 use crate::stepping::taylor::step_size;
 use crate::stepping::taylor::stop;
-use crate::stepping::{Cause, Statistics, StepError};
+use crate::stepping::{Cause, Statistics, StepError, without_length};
 use std::cell::RefCell;
 
 /// Lanes, and which trajectories are in them.
@@ -19,6 +20,9 @@ pub(super) struct LaneSlots<T> {
     pub(super) kernel: Box<T>,
     /// True where events may end the motion.
     has_stops: [bool; LANES],
+    /// Springs whose ends can meet, and those that have no length now.
+    approaches: [Approach; LANES],
+    without_length: [Option<String>; LANES],
     /// True where one is in the step, which is not taken: the trajectory leaves.
     is_leaving: [bool; LANES],
     /// Lanes whose step cannot be taken.
@@ -35,6 +39,8 @@ impl<T: LaneKernel> LaneSlots<T> {
             clock: LaneClock::new(batch.tolerance, batch.order, until),
             kernel: Box::new(kernel),
             has_stops: [false; LANES],
+            approaches: Default::default(),
+            without_length: Default::default(),
             is_leaving: [false; LANES],
             is_failing: [false; LANES],
             inside: RefCell::default(),
@@ -66,6 +72,8 @@ impl<T: LaneKernel> LaneSlots<T> {
         let longest = self.kernel.take_in(lane, member, batch.order);
         self.clock.start(lane, member.state.time, member.mechanism.units.time, longest);
         self.has_stops[lane] = member.mechanism.has_stops();
+        self.approaches[lane].take_in(member.mechanism);
+        self.without_length[lane] = None;
     }
 
     /// Frees a lane.
@@ -103,6 +111,7 @@ impl<T: LaneKernel> LaneSlots<T> {
         members: &[BatchMember],
         observer: &mut dyn BatchObserver,
     ) {
+        self.shorten_approaches(order, members);
         let Self { clock, kernel, inside, .. } = self;
         for lane in 0..LANES {
             self.is_leaving[lane] = false;
@@ -122,6 +131,26 @@ impl<T: LaneKernel> LaneSlots<T> {
             if self.is_leaving[lane] {
                 clock.taken.0[lane] = 0.0;
             }
+        }
+    }
+
+    /// Shortens the steps in which the ends of a spring come near each other, and finds those that meet.
+    fn shorten_approaches(&mut self, order: usize, members: &[BatchMember]) {
+        let Self { clock, kernel, inside, approaches, without_length, .. } = self;
+        for lane in 0..LANES {
+            let (from, step, approach) = (clock.at(lane), clock.taken.0[lane], &mut approaches[lane]);
+            let Some(index) = self.members[lane].filter(|_| !approach.is_empty() && step > 0.0) else {
+                continue;
+            };
+            let (member, inside) = (&members[index], inside.get_mut());
+            inside.forget();
+            let mut motion = Motion::default();
+            let least = finest(from, clock.step(lane).unit).min(step);
+            clock.taken.0[lane] = approach.shortened(step, least, |after, angles| {
+                inside.look::<T>(kernel, member, InLane { order, lane, from }, after, &mut motion);
+                angles.take(&motion);
+            });
+            without_length[lane] = approach.without_length().map(str::to_owned);
         }
     }
 
@@ -197,9 +226,11 @@ impl<T: LaneKernel> LaneSlots<T> {
         let hint = "look for a position without inertia";
         let stop =
             |cause, what: &str| stop(cause, &State { time, ..State::default() }, taken, what.into(), hint);
-        if wanted.is_nan() {
+        if let Some(name) = &self.without_length[lane] {
+            Err(without_length(name, "taylor", time.hi, taken))
+        } else if wanted.is_nan() {
             Err(stop(Cause::NotFinite, "the series is not finite"))
-        } else if wanted < 1e-14 * time.hi.abs().max(1e-3 * unit) {
+        } else if wanted < finest(time, unit) {
             Err(stop(Cause::StepTooSmall, "the series converges in ever smaller circles"))
         } else {
             statistics.check("taylor", time.hi, taken)
@@ -235,4 +266,9 @@ fn next(fits: &[bool], members: &[BatchMember], waiting: &mut usize, until: Time
         }
     }
     None
+}
+
+/// Steps \[s\] below this are lost in the resolution of time.
+fn finest(time: Time, unit: f64) -> f64 {
+    1e-14 * time.hi.abs().max(1e-3 * unit)
 }
