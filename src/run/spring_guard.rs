@@ -10,7 +10,7 @@
 //! g = (|D| / L_0)² - 1,     |g''| <= (2 |D'|² + 2 |D| |D''|) / L_0²
 //! ```
 //!
-//! where L_0 is 1e-6 of the free length, or for a law by a formula 1e-9 of the lengths its span is made of.
+//! where L_0 is 1e-6 of the free length, or for a law by a formula 1e-7 of the lengths its span is made of.
 //!
 //! Mechanisms whose springs are too far from their places for that are integrated without.
 

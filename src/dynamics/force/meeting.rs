@@ -8,8 +8,9 @@ use crate::dynamics::{BodyAngles, Mechanism};
 
 /// A length below this share of the free length is none.
 const NONE: f64 = 1e-6;
-/// The same of the reach of the ends, for laws that know no free length.
-const NONE_OF_REACH: f64 = 1e-9;
+/// The same of the reach of the ends, for laws that know no free length; powers about shorter ones, which
+/// grow with their inverse, are rounding or too large for doubles.
+const NONE_OF_REACH: f64 = 1e-7;
 
 /// The span of a spring, built-in or by a formula, whose ends can meet.
 #[derive(Clone, Debug)]
@@ -19,6 +20,8 @@ pub(crate) struct MeetingSpan {
     span: Point,
     /// A length that counts as none \[m\]; zero where the force vanishes with the length.
     pub none: f64,
+    /// The least length a series is taken from as from another one \[m\].
+    pub least: f64,
 }
 
 impl MeetingSpan {
@@ -27,24 +30,24 @@ impl MeetingSpan {
         let unit = mechanism.units.length;
         let laws = mechanism.forces.iter().filter_map(|force| Some((&force.name, force.span.as_deref()?)));
         let laws = laws.filter_map(|(name, law)| Self::of_law(name, law, unit));
-        mechanism.springs.iter().filter_map(Self::of_spring).chain(laws).collect()
+        mechanism.springs.iter().filter_map(|spring| Self::of_spring(spring, unit)).chain(laws).collect()
     }
 
-    fn of_spring(spring: &CompiledSpring) -> Option<Self> {
+    fn of_spring(spring: &CompiledSpring, unit: f64) -> Option<Self> {
         let pulls = spring.needs_length() && (spring.stiffness > 0.0 || spring.damping > 0.0);
         (pulls && can_vanish(&spring.span)).then(|| Self {
             name: spring.name.clone(),
             span: spring.span.clone(),
             none: NONE * spring.free_length,
+            least: least(&spring.span, unit),
         })
     }
 
     fn of_law(name: &str, law: &SpanLaw, unit: f64) -> Option<Self> {
         can_vanish(&law.span).then(|| {
-            let reach: f64 = lengths(&law.span).sum();
-            let vanishes = law.tension_without_length() == 0.0;
-            let none = if vanishes { 0.0 } else { NONE_OF_REACH * if reach > 0.0 { reach } else { unit } };
-            Self { name: name.to_owned(), span: law.span.clone(), none }
+            let least = least(&law.span, unit);
+            let none = if law.tension_without_length() == 0.0 { 0.0 } else { least };
+            Self { name: name.to_owned(), span: law.span.clone(), none, least }
         })
     }
 
@@ -75,6 +78,12 @@ pub(crate) fn can_meet(a: [Complex<f64>; 2], b: [Complex<f64>; 2], time: f64) ->
 fn lengths(span: &Point) -> impl Iterator<Item = f64> {
     let parts = std::iter::once(&span.root).chain(span.terms.iter().map(|term| &term.1));
     parts.map(|part| part.norm_squared().sqrt())
+}
+
+/// A length that is none beside those a span is made of, or the unit of length \[m\].
+fn least(span: &Point, unit: f64) -> f64 {
+    let reach: f64 = lengths(span).sum();
+    NONE_OF_REACH * if reach > 0.0 { reach } else { unit }
 }
 
 /// True where a span can have no length.

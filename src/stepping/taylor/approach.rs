@@ -64,7 +64,7 @@ impl Approach {
         at(h, there);
         for span in &*spans {
             let begin = span.ends(*bodies, start, z);
-            if !can_meet(begin, span.ends(*bodies, there, z), h) {
+            if size(begin[0]) <= span.least || !can_meet(begin, span.ends(*bodies, there, z), h) {
                 continue;
             }
             let allowed = LEFT * size(begin[0]);
