@@ -1183,3 +1183,28 @@ fn what_has_no_known_derivative_is_told() {
     assert!(why(0).is_empty() || why(0).contains("higher power"), "{:?}", found.measures[0]);
     assert!(why(1).is_empty() || why(1).contains("constant but for rounding"), "{:?}", found.measures[1]);
 }
+
+/// A slow pendulum whose angle does not depend on the integral beside it.
+fn slow_pendulum(integrals: &str) -> Template {
+    template(&format!(
+        r#"{{"name": "slow", "gravity": [0, -9.81e-6],
+        "bars": [{{"name": "bar", "mass": 1, "centre": [0.5, 0], "inertia": 0.1, "length": 1}}],
+        "hinges": [{{"name": "A", "between": [{{"body": "ground", "point": [0, 0]}},
+            {{"body": "bar", "point": [0, 0]}}]}}], "integrals": {{{integrals}}},
+        "start": {{"bar": {{"phi": 0.3, "omega": 0}}}}, "until": 5000, "every": 5000}}"#
+    ))
+}
+
+#[test]
+fn an_integral_of_any_size_leaves_the_derivatives_of_the_motion_alone() {
+    let slopes = |integrals: &str| {
+        let to = ["bars.bar.mass", "start.bar.phi"];
+        derived(&slow_pendulum(integrals), &["bar.phi"], &to, 5000.0).measures[0].slopes.clone()
+    };
+    let alone = slopes("");
+    for integral in [r#""I": "1e6*(1+bar.sin^2)""#, r#""I": "1e9*(1+bar.sin^2)""#] {
+        for (found, expected) in slopes(integral).iter().zip(&alone) {
+            assert_near(*found, *expected, 1e-6, integral);
+        }
+    }
+}

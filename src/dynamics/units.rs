@@ -59,11 +59,16 @@ impl Units {
     }
 }
 
+/// The unit of an unknown that no error is measured by, 2⁵⁰⁰.
+const UNCOUNTED: f64 = f64::from_bits((1023 + 500) << 52);
+
 impl Mechanism {
     /// The unit of unknown `i` of a form that has so many coordinates, the first ones angles, then as many
     /// rates, then energies.
     pub(super) fn unit_of(&self, i: usize, coordinates: usize, angles: usize) -> f64 {
         match i {
+            // Of a rotor that carries an integral the rate counts alone.
+            i if (angles.saturating_sub(self.integrals)..angles).contains(&i) => UNCOUNTED,
             i if i < coordinates => self.units.coordinate(i, angles),
             i if i < 2 * coordinates => self.units.coordinate(i - coordinates, angles) / self.units.time,
             _ => self.energy_scale,

@@ -197,7 +197,7 @@ pub(super) fn cross(passage: &Discontinuity, columns: &mut [Delta]) -> Result<Cr
                 impact_at(jump, contact, late, column)?;
             }
             if let Some(switch) = &jump.switch {
-                let before = Side::resting(&jump.before);
+                let before = Side::resting(&jump.mechanism, &jump.before);
                 if let Some(set) = set_at(passage, switch, &before, late, column)? {
                     passed.set.get_or_insert_default().push(set);
                 }
@@ -370,7 +370,7 @@ fn strike(
     late: f64,
     column: &mut Delta,
 ) -> Result<(), String> {
-    let side = Side::resting(before);
+    let side = Side::resting(mechanism, before);
     let rates = |of: &Arc<Mechanism>, motion: &Motion| {
         let [phi, omega] = motion.rounded();
         let impact = striking(of, &mechanism.held).impact_at(contact, motion.time, &phi, &omega);
@@ -385,8 +385,9 @@ fn strike(
 /// The differences at which the point of a wall still moves along its normal as it does, for a column that is
 /// there so much later \[s\].
 fn reach(mechanism: &Arc<Mechanism>, contact: usize, side: &Side, late: f64, column: &Delta) -> f64 {
-    let speed =
-        |motion: &Motion| Side::resting(motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()]);
+    let speed = |motion: &Motion| {
+        Side::resting(mechanism, motion).gap_rate(mechanism, contact, &mut vec![0.0; side.phi.len()])
+    };
     let most = column.entries.iter().fold(late.abs(), |most, entry| most.max(entry.abs()));
     let scale = |entry: f64| if most > 0.0 { entry / most } else { 0.0 };
     let unit: Vec<f64> = column.entries.iter().map(|&entry| scale(entry)).collect();
@@ -403,7 +404,7 @@ fn close_at(jump: &Jump, late: f64, column: &mut Delta) -> Result<(), String> {
     let closing = striking(&jump.mechanism, held);
     let rates =
         |of: &Arc<Mechanism>, motion: &Motion| plastic(&striking(of, held), motion).map(|(rates, ..)| rates);
-    change(&closing, &Side::resting(&jump.before), [late, f64::INFINITY], column, &rates)
+    change(&closing, &Side::resting(&jump.mechanism, &jump.before), [late, f64::INFINITY], column, &rates)
         .ok_or_else(|| "what closes leaves neighbouring motions no rates".into())
 }
 
@@ -414,7 +415,7 @@ fn is_hold(jump: &Jump) -> bool {
 
 /// The rates of a column after contacts are held, which takes off what speed the last impact has left.
 fn hold_at(before: &Mechanism, jump: &Jump, late: f64, column: &mut Delta) -> Result<(), String> {
-    let (mechanism, side) = (&jump.mechanism, Side::resting(&jump.before));
+    let (mechanism, side) = (&jump.mechanism, Side::resting(&jump.mechanism, &jump.before));
     let new: Vec<usize> =
         mechanism.held.iter().copied().filter(|contact| !before.held.contains(contact)).collect();
     // Bounces that are left out matter to friction alone, and neighbours must make them as well.

@@ -99,6 +99,11 @@ impl Mechanism {
         self.constraints.iter().chain(walls).filter_map(|row| row.aim.as_deref())
     }
 
+    /// True for the coordinate of a rotor that carries an integral.
+    pub fn is_integral(&self, coordinate: usize) -> bool {
+        (self.own_bodies().len()..self.bodies.len()).contains(&coordinate)
+    }
+
     /// Names of the scene's integrals, and the coordinates whose rates they are.
     pub fn integrals(&self) -> impl Iterator<Item = (&str, usize)> {
         let own = self.own_bodies().len();

@@ -83,8 +83,9 @@ pub trait Columns: Debug + Send {
     fn rate(&self, m: usize, coordinate: usize) -> Number;
 
     /// The largest derivative of each power of the rates from [`LEADING`] on in a step of `h` \[s\], over
-    /// what is integrated: coordinates with these derivatives, and the powers below.
-    fn shares(&self, u: &[Number], h: f64, shares: &mut Vec<f64>);
+    /// what is integrated: of some coordinates, whose places `u` count where there are any, and the powers
+    /// below.
+    fn shares(&self, some: &[usize], u: &[Number], h: f64, shares: &mut Vec<f64>);
 
     /// Takes the derivatives of coordinates and rates on by `h` \[s\], along powers 0 … `order`.
     fn advance(&self, order: usize, h: f64, own: &mut [Vec<Number>; 2]);
@@ -258,6 +259,7 @@ impl<S: Slots, E: ColumnExpansion<S>> SlotTask for ExpandColumns<'_, '_, S, E> {
 
 struct Shares<'a, S, E> {
     columns: &'a InColumns<S, E>,
+    some: &'a [usize],
     u: &'a [Number],
     h: f64,
     shares: &'a mut Vec<f64>,
@@ -276,15 +278,16 @@ impl<S: Slots, E: ColumnExpansion<S>> SlotTask for Shares<'_, S, E> {
 
     #[inline(always)]
     fn perform(self) {
-        let Self { columns: InColumns { expansion, .. }, u, h, shares } = self;
-        let f = u.len();
+        let Self { columns: InColumns { expansion, .. }, some, u, h, shares } = self;
         let (mut whole, mut power) = ([0.0; LANES], 1.0);
-        for u in u {
-            note::<S>(&mut whole, &u.slope, 1.0 / h);
+        if !u.is_empty() {
+            for &c in some {
+                note::<S>(&mut whole, &u[c].slope, 1.0 / h);
+            }
         }
         for m in 0..=expansion.order() {
             if m < LEADING {
-                for c in 0..f {
+                for &c in some {
                     note::<S>(&mut whole, &expansion.slope(m, c).array(), power);
                 }
                 if m + 1 == LEADING {
@@ -294,7 +297,7 @@ impl<S: Slots, E: ColumnExpansion<S>> SlotTask for Shares<'_, S, E> {
                 }
             } else {
                 let (mut sizes, mut share) = ([0.0; LANES], 0.0);
-                for c in 0..f {
+                for &c in some {
                     note::<S>(&mut sizes, &expansion.slope(m, c).array(), power);
                 }
                 for lane in 0..S::COUNT {
@@ -359,9 +362,9 @@ impl<S: Slots + Send, E: ColumnExpansion<S>> Columns for InColumns<S, E> {
         Number::new(self.expansion.value(m, coordinate), self.expansion.slope(m, coordinate).array())
     }
 
-    fn shares(&self, u: &[Number], h: f64, shares: &mut Vec<f64>) {
+    fn shares(&self, some: &[usize], u: &[Number], h: f64, shares: &mut Vec<f64>) {
         shares.clear();
-        S::perform(Shares { columns: self, u, h, shares });
+        S::perform(Shares { columns: self, some, u, h, shares });
     }
 
     fn advance(&self, order: usize, h: f64, own: &mut [Vec<Number>; 2]) {

@@ -20,6 +20,8 @@ pub(in crate::run) struct Side {
     pub phi: Vec<f64>,
     pub omega: Vec<f64>,
     pub acceleration: Vec<f64>,
+    /// Rotors of integrals, whose angles nothing depends on.
+    rotors: std::ops::Range<usize>,
 }
 
 /// Finer differences are each by this factor shorter than the one before, as many at most.
@@ -28,7 +30,7 @@ const LEVELS: usize = 6;
 
 impl Side {
     pub fn new(mechanism: &Mechanism, motion: &Motion) -> Self {
-        let mut side = Self::resting(motion);
+        let mut side = Self::resting(mechanism, motion);
         let mut kernel = Kernel::<f64>::new(mechanism);
         kernel.accelerations(mechanism, motion.time, &side.phi, &side.omega, Bias::default());
         side.acceleration = kernel.load;
@@ -36,9 +38,10 @@ impl Side {
     }
 
     /// The same without accelerations.
-    pub fn resting(motion: &Motion) -> Self {
+    pub fn resting(mechanism: &Mechanism, motion: &Motion) -> Self {
         let [phi, omega] = motion.rounded();
-        Self { motion: motion.clone(), acceleration: Vec::new(), phi, omega }
+        let rotors = mechanism.own_bodies().len()..mechanism.bodies.len();
+        Self { motion: motion.clone(), acceleration: Vec::new(), phi, omega, rotors }
     }
 
     /// The motion itself as a column: rates, then accelerations.
@@ -59,11 +62,13 @@ impl Side {
         let (along, rates) = column.split_at(self.phi.len());
         let largest = |most: f64, x: f64| most.max(x.abs());
         // A rate that passes through zero is as large as it soon becomes beside the fastest one.
-        let fastest = self.omega.iter().copied().fold(1.0, largest);
+        let own = |k: &usize| !self.rotors.contains(k);
+        let fastest = (0..self.omega.len()).filter(own).map(|k| self.omega[k]).fold(1.0, largest);
         let by = self.acceleration.iter().map(|by| SOON * by.abs() / fastest).chain(std::iter::repeat(0.0));
         let sizes = self.omega.iter().zip(by).map(|(rate, by)| 1.0 + rate.abs() + by);
         let rates = rates.iter().zip(sizes).map(|(x, size)| x / size);
-        let most = along.iter().copied().chain(rates).fold(late.abs(), largest);
+        let angles = (0..along.len()).filter(own).map(|k| along[k]);
+        let most = angles.chain(rates).fold(late.abs(), largest);
         let longest = if most > 0.0 { DIFFERENCE.min(share) / most } else { 1.0 };
         // What it is to move along, over the size of what moves: that is rounded too.
         let far = self.phi.iter().copied().fold(self.motion.time.hi.abs(), largest);

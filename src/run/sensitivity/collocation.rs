@@ -56,10 +56,13 @@ pub(super) struct Collocation {
     /// What the last three Legendre coefficients take of every stage.
     last: [Vec<f64>; 3],
     system: Vec<f64>,
+    /// The rotors of integrals.
+    rotors: Vec<usize>,
 }
 
 impl Collocation {
-    pub fn new() -> Self {
+    /// The method for coordinates of which these are the rotors of integrals.
+    pub fn new(rotors: Vec<usize>) -> Self {
         let [nodes, weights, coupling] = collocation(STAGES);
         let entry = |k: usize| {
             (0..STAGES).map(|j| coupling[k / STAGES * STAGES + j] * coupling[j * STAGES + k % STAGES]).sum()
@@ -70,7 +73,7 @@ impl Collocation {
                 .map(|(node, weight)| (2 * degree + 1) as f64 * weight * legendre(degree, 2.0 * node - 1.0))
                 .collect()
         });
-        Self { nodes, weights, coupling: [coupling, square], last, system: Vec::new() }
+        Self { nodes, weights, coupling: [coupling, square], last, system: Vec::new(), rotors }
     }
 
     /// Solves for a step of columns (dq, dw) of n coordinates; `pull` has B and C at the nodes, n × 2n row by
@@ -91,19 +94,26 @@ impl Collocation {
         if !eliminate(size, width, &mut self.system) {
             return None;
         }
-        let Self { last, system, .. } = self;
+        let Self { last, system, rotors, .. } = self;
         let stage = |i: usize, row: usize, k: usize| system[(i * n + row) * width + size + k];
-        for (k, (column, &ColumnLimits { floor, noise })) in columns.iter().zip(limits).enumerate() {
+        // An integral has a size of its own, and the angle of its rotor none.
+        let own: Vec<usize> = (0..n).filter(|row| !rotors.contains(row)).collect();
+        let groups = || std::iter::once(&own[..]).chain(rotors.chunks(1));
+        let all = columns.iter().zip(limits).enumerate();
+        for ((k, (column, &ColumnLimits { floor, noise })), rows) in
+            all.flat_map(|column| groups().map(move |rows| (column, rows)))
+        {
             let (mut left, mut earlier, mut whole, mut rates) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
-            for row in 0..n {
+            for &row in rows {
                 let part = |last: &[f64]| (0..STAGES).map(|i| last[i] * stage(i, row, k)).sum::<f64>().abs();
                 let [before, but_one, highest] = last.each_ref().map(|last| part(last));
                 let highest = (highest - NOISE * noise).max(0.0);
                 (left, earlier) = (left.max(highest), earlier.max(before).max(but_one));
                 let most = (0..STAGES).fold(0.0, |most: f64, i| most.max(stage(i, row, k).abs()));
                 let rate = (h * most).max(column[n + row].abs());
-                whole = whole.max(rate).max(column[row].abs() / h);
-                rates = rates.max(rate).max(column[row].abs() / h.max(unit));
+                let place = if rotors.contains(&row) { 0.0 } else { column[row].abs() };
+                whole = whole.max(rate).max(place / h);
+                rates = rates.max(rate).max(place / h.max(unit));
             }
             if whole.is_nan() || left.is_nan() {
                 return None;
@@ -187,7 +197,7 @@ mod tests {
         // x'' = -4 x + cos t, x(0) = 0.3, x'(0) = 0.1: x = cos t / 3 + (0.3 - 1/3) cos 2t + 0.05 sin 2t.
         let error = |steps: usize| {
             let h = 2.0 / steps as f64;
-            let (mut method, mut columns) = (Collocation::new(), vec![vec![0.3, 0.1]]);
+            let (mut method, mut columns) = (Collocation::new(Vec::new()), vec![vec![0.3, 0.1]]);
             for k in 0..steps {
                 let forcing =
                     method.nodes.iter().map(|node| libm::cos((k as f64 + node) * h)).collect::<Vec<_>>();
@@ -205,7 +215,7 @@ mod tests {
 
     #[test]
     fn the_last_coefficient_of_a_polynomial_of_lower_degree_is_zero() {
-        let method = Collocation::new();
+        let method = Collocation::new(Vec::new());
         let sum = |degree: i32| {
             let powers = method.nodes.iter().map(|node| node.powi(degree));
             powers.zip(&method.last[2]).map(|(power, last)| power * last).sum::<f64>()

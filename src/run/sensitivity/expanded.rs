@@ -190,8 +190,11 @@ struct Block {
     /// The independent ones, and what the leading part leaves out of the coordinates.
     own: [Vec<Number>; 2],
     rest: Vec<Number>,
-    /// What powers come to in a step.
+    /// What powers come to in a step, and those of a group of coordinates.
     shares: Vec<f64>,
+    of_group: Vec<f64>,
+    /// The coordinates but for the rotors of integrals, and each of these, which have sizes of their own.
+    groups: Vec<Vec<usize>>,
     jacobian: Vec<Number>,
 }
 
@@ -223,7 +226,13 @@ impl Block {
         let series = columns(&mechanism.terms(), coordinates, ORDER, count);
         let room = |count: usize| vec![Number::ZERO; count];
         let f = series.coordinates();
+        let bodies = &mechanism.partition.independent;
+        let body = |c: usize| if coordinates == Coordinates::All { c } else { bodies[c] };
+        let (rotors, own): (Vec<_>, Vec<_>) = (0..f).partition(|&c| structure.is_integral(body(c)));
+        let groups = std::iter::once(own).chain(rotors.into_iter().map(|rotor| vec![rotor])).collect();
         Ok(Self {
+            groups,
+            of_group: Vec::new(),
             series,
             order: ORDER,
             coordinates,
@@ -278,7 +287,16 @@ impl Block {
     /// step is worth expanding.
     fn tail(&mut self, h: f64) -> (f64, usize) {
         let order = self.series.order();
-        self.series.shares(&self.own[0], h, &mut self.shares);
+        let Self { series, own, shares, of_group, groups, .. } = self;
+        for (number, group) in groups.iter().enumerate() {
+            // Nothing depends on the angle of a rotor.
+            let places = if number == 0 { &own[0][..] } else { &[] };
+            let found = if number == 0 { &mut *shares } else { &mut *of_group };
+            series.shares(group, places, h, found);
+            if number > 0 {
+                shares.iter_mut().zip(&*of_group).for_each(|(share, &other)| *share = larger(*share, other));
+            }
+        }
         let (mut small, mut enough) = (0, None);
         for (m, &share) in (LEADING..).zip(&self.shares) {
             small = if share <= ENOUGH { small + 1 } else { 0 };

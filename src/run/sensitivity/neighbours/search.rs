@@ -222,9 +222,17 @@ impl DistanceSearch<'_> {
         let (place, rate) = (units.length.min(1.0), 1.0 / units.time);
         match group.checked_sub(STARTS) {
             None => [1.0, rate][group],
-            Some(rest) if rest % 4 == 0 => self.unconstrained(rest / 4),
-            Some(rest) => [place, place * rate, place][rest % 4 - 1],
+            Some(rest) => match rest % self.groups() {
+                0 => self.unconstrained(rest / self.groups()),
+                // The integrand of an integral has a size of its own.
+                group => [place, place * rate, place].get(group - 1).copied().unwrap_or_default(),
+            },
         }
+    }
+
+    /// Groups of values of a state.
+    fn groups(&self) -> usize {
+        4 + self.base.0.integrals
     }
 
     /// The largest acceleration \[rad/s², m/s²\] that forces alone would cause at a state; zero where they
@@ -237,7 +245,9 @@ impl DistanceSearch<'_> {
         let (t, phi, omega) = self.state(state);
         let metric = ContactMetric::at(mechanism, t, &phi, &omega);
         let accelerations = metric.map(|metric| metric.rates(&metric.unconstrained()));
-        accelerations.unwrap_or_default().iter().fold(0.0, |most, a| most.max(a.abs()))
+        let accelerations = accelerations.unwrap_or_default();
+        let own = accelerations.iter().enumerate().filter(|(k, _)| !mechanism.is_integral(*k));
+        own.fold(0.0, |most, (_, a)| most.max(a.abs()))
     }
 
     /// The states everything is derived at: that of the start, and two that are like no other.
@@ -248,7 +258,8 @@ impl DistanceSearch<'_> {
         (Time::from(share * self.until), phi.collect(), omega.collect())
     }
 
-    /// The start in [`STARTS`] groups; then for each state accelerations, constraints, their rates and gaps.
+    /// The start in [`STARTS`] groups; then for each state accelerations, constraints, their rates and gaps,
+    /// and what each integral integrates.
     fn values(&self, candidate: &Candidate) -> Vec<Vec<f64>> {
         let n = self.base.0.coordinates();
         let Candidate { mechanism, start } = candidate;
@@ -259,11 +270,14 @@ impl DistanceSearch<'_> {
         let mut kernel = Kernel::<f64>::new(mechanism);
         for (t, phi, omega) in (0..STATES.len()).map(|number| self.state(number)) {
             kernel.accelerations(mechanism, t, &phi, &omega, Bias::default());
-            groups.push(kernel.load.clone());
+            let loads = kernel.load.iter().copied().enumerate();
+            let (integrands, own): (Vec<_>, Vec<_>) = loads.partition(|(k, _)| mechanism.is_integral(*k));
+            groups.push(own.into_iter().map(|(_, acceleration)| acceleration).collect());
             let (positions, rates) = residuals(mechanism, t, &phi, &omega);
             groups.extend([positions, rates]);
             let z = mechanism.elements(&phi);
             groups.push(mechanism.contacts.iter().map(|contact| contact.row.gap(&z)).collect());
+            groups.extend(integrands.into_iter().map(|(_, integrand)| vec![integrand]));
         }
         groups
     }
