@@ -54,6 +54,9 @@ const LONG_TOLERANCE: f64 = 1e-13;
 const EXTENDED: &str = "invariants were asked for, and with its first orders in double-double its series \
     keeps them best for the time";
 
+/// Why a symplectic method is chosen there.
+const SYMPLECTIC: &str = "invariants were asked for, and a symplectic method keeps them best";
+
 /// What matters more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -113,8 +116,33 @@ pub(super) fn choose(
     rate: f64,
 ) -> Choice {
     let (method, why) = chosen(mechanism, request, stiffness, until, rate);
+    let is_met = why == EXTENDED || why == SYMPLECTIC;
     let extended = request.extended || why == EXTENDED;
-    Choice { method, extended, why: format!("{method}: {why}") }
+    let unmet = match request.prefer {
+        Some(Prefer::Invariants) if !is_met && !extended => {
+            format!("; invariants were asked for, but {}", obstacle(mechanism, request))
+        }
+        _ => String::new(),
+    };
+    Choice { method, extended, why: format!("{method}: {why}{unmet}") }
+}
+
+/// Why no method is chosen for the sake of invariants.
+fn obstacle(mechanism: &Mechanism, request: &Request) -> &'static str {
+    let kept = request.stabilize.unwrap_or(usual(mechanism));
+    if request.step.is_some() || request.rtol.or(request.atol).is_some() {
+        "a step or a tolerance decides how well they are kept"
+    } else if !mechanism.contacts.is_empty() || !mechanism.frictions.is_empty() {
+        "walls and dry friction decide"
+    } else if mechanism.is_damped() {
+        "dampers take energy"
+    } else if mechanism.is_switched() {
+        "events or branches change what acts"
+    } else if !mechanism.constraints.is_empty() && kept != Stabilization::Elimination {
+        "constraints are kept by projection, and not eliminated"
+    } else {
+        "what acts or how many coordinates there are decides first"
+    }
 }
 
 /// The tolerance of a method for a run to `until` \[s\] where nobody names one.  What truncation leaves adds
@@ -281,15 +309,12 @@ impl Situation<'_> {
         let keeps = self.tolerance().is_none()
             && !mechanism.is_damped()
             && !mechanism.is_switched()
-            && is_eliminated
-            && is_bearable;
-        (self.request.prefer == Some(Prefer::Invariants) && keeps).then(|| match self.n > FEW_COORDINATES {
-            true => (
-                MethodId::Gauss(8),
-                "invariants were asked for, and a symplectic method keeps them best".into(),
-            ),
+            && is_eliminated;
+        let method = || match self.n > FEW_COORDINATES && is_bearable {
+            true => (MethodId::Gauss(8), SYMPLECTIC.into()),
             false => (MethodId::Taylor, EXTENDED.into()),
-        })
+        };
+        (self.request.prefer == Some(Prefer::Invariants) && keeps).then(method)
     }
 
     /// For all others: the series, where it pays.
@@ -404,5 +429,22 @@ mod tests {
         let (method, told) = why("stress/spring_1e6", &[], Request::default());
         assert!(method == "taylor" && told.contains("undamped"), "{method}: {told}");
         assert_eq!(why("stress/spring_damped_1e2", &[], Request::default()).0, "taylor");
+    }
+
+    #[test]
+    fn invariants_that_are_asked_for_decide_or_what_does_is_told() {
+        let asked = || Request { prefer: Some(Prefer::Invariants), ..Request::default() };
+        // Too far for a fixed step, but not for a series.
+        let far = Request { until: Some(1e7), ..asked() };
+        let (method, told) = why("scenes/chain8", &[], far);
+        assert!(method == "taylor" && told.ends_with(EXTENDED), "{method}: {told}");
+        for (scene, request, obstacle) in [
+            ("scenes/free", Request { rtol: Some(1e-9), ..asked() }, "a tolerance decides"),
+            ("scenes/wall", asked(), "walls and dry friction decide"),
+            ("scenes/four_bars", asked(), "kept by projection"),
+        ] {
+            let (_, told) = why(scene, &[], request);
+            assert!(told.contains("invariants were asked for, but") && told.contains(obstacle), "{told}");
+        }
     }
 }
