@@ -253,13 +253,7 @@ impl Mechanism {
         rows.extend(parts::rods(scene, &forest));
         let springs = parts::springs(scene, &forest);
         let torsions = parts::torsions(scene);
-        let mut contacts: Vec<Contact> = (scene.walls.iter())
-            .map(|wall| {
-                let normal = Complex::new(wall.normal[0], wall.normal[1]);
-                let (row, point) = along_wall(&forest, wall, normal, wall.law.clone());
-                Contact { point, on: wall.on, ..Contact::new(row, normal, wall.restitution) }
-            })
-            .collect();
+        let mut contacts = parts::contacts(scene, &forest);
         let roots = forest.roots();
         let ground_energy =
             bodies.iter().zip(&roots).fold(0.0, |sum, (body, &root)| sum - body.mass * gravity.dot(root));

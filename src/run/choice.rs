@@ -306,10 +306,8 @@ impl Situation<'_> {
         let is_eliminated = !self.has_rows || self.kept == Stabilization::Elimination;
         let fastest = self.stiffness.map_or(rate, |stiffness| stiffness.fastest.max(rate));
         let is_bearable = self.until * fastest / STEP <= MANY_STEPS;
-        let keeps = self.tolerance().is_none()
-            && !mechanism.is_damped()
-            && !mechanism.is_switched()
-            && is_eliminated;
+        let keeps =
+            self.tolerance().is_none() && !mechanism.is_damped() && !mechanism.is_switched() && is_eliminated;
         let method = || match self.n > FEW_COORDINATES && is_bearable {
             true => (MethodId::Gauss(8), SYMPLECTIC.into()),
             false => (MethodId::Taylor, EXTENDED.into()),

@@ -13,6 +13,16 @@ use crate::dynamics::point::Point;
 use crate::dynamics::quadratic::Quadratic;
 use crate::scene::{Coupled, Coupling, Place, Scene, Slider, Wall};
 
+/// The contacts of a scene, one a wall.
+pub(super) fn contacts(scene: &Scene, forest: &Forest) -> Vec<Contact> {
+    let contact = |wall: &Wall| {
+        let normal = Complex::new(wall.normal[0], wall.normal[1]);
+        let (row, point) = along_wall(forest, wall, normal, wall.law.clone());
+        Contact { point, on: wall.on, ..Contact::new(row, normal, wall.restitution) }
+    };
+    scene.walls.iter().map(contact).collect()
+}
+
 /// The bodies, counted from the points they hang on.
 pub(super) fn bodies<C: Real>(scene: &Scene<C>, forest: &Forest<C>) -> Vec<Body<C>> {
     (scene.bars.iter().zip(&forest.hangs))

@@ -181,7 +181,7 @@ const AT_ONCE: f64 = 1e-12;
 
 /// How the time of an impact moves that is about to happen at a motion, if one is.
 pub(super) fn impact_slopes(variation: &Variation, motion: &Motion) -> Option<Vec<f64>> {
-    let (mechanism, side) = (&variation.mechanism, Side::resting(motion));
+    let (mechanism, side) = (&variation.mechanism, Side::resting(&variation.mechanism, motion));
     let z = mechanism.elements(&side.phi);
     let mut gradient = vec![0.0; side.phi.len()];
     let mut rate = 0.0;
