@@ -11,7 +11,7 @@ mod turns;
 
 use super::assembly::Assembly;
 use super::constraint::{self, ConstraintEquation, Site};
-use super::fingerprint::Origin;
+use super::fingerprint::CompiledScene;
 use super::force::formula::{DrivenPart, Formulas};
 use super::force::{AppliedAction, CompiledSpring, Torsion, UserForce, Vibration};
 use super::forest::Forest;
@@ -45,7 +45,7 @@ const UNROLLED: usize = 6;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mechanism {
     /// The scene, which tells it from others.
-    pub(crate) origin: Origin,
+    pub(crate) origin: CompiledScene,
     /// Bodies in the order of the scene's bars.
     pub bodies: Vec<Body>,
     /// How many of the last bodies are the rotors of integrals, which are shown as numbers only.
@@ -262,7 +262,7 @@ impl Mechanism {
             check_lines(&frictions, &contacts)?;
         }
         Ok(Self {
-            origin: Origin(Arc::new(scene.clone())),
+            origin: CompiledScene(Arc::new(scene.clone())),
             ground_energy,
             tree: constants(&bodies, &forest, gravity),
             actions: actions(scene, &forest),

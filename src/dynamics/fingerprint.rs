@@ -16,9 +16,9 @@ const OF_THE_RUN: [&str; 4] = ["name", "description", "until", "every"];
 
 /// The scene of a mechanism; mechanisms are the same by their equations, from whatever scenes.
 #[derive(Clone, Debug)]
-pub(crate) struct Origin(pub Arc<Scene>);
+pub(crate) struct CompiledScene(pub Arc<Scene>);
 
-impl PartialEq for Origin {
+impl PartialEq for CompiledScene {
     fn eq(&self, _: &Self) -> bool {
         true
     }

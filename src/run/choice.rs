@@ -433,7 +433,7 @@ mod tests {
     fn invariants_that_are_asked_for_decide_or_what_does_is_told() {
         let asked = || Request { prefer: Some(Prefer::Invariants), ..Request::default() };
         // Too far for a fixed step, but not for a series.
-        let far = Request { until: Some(1e7), ..asked() };
+        let far = Request { until: Some(1e7), every: Some(1e6), ..asked() };
         let (method, told) = why("scenes/chain8", &[], far);
         assert!(method == "taylor" && told.ends_with(EXTENDED), "{method}: {told}");
         for (scene, request, obstacle) in [

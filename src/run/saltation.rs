@@ -311,7 +311,9 @@ pub(super) fn late_at_zero(
     let rate = here.slope(&here.ahead(), 1.0, f64::INFINITY, &mut |motion| value(mechanism, motion));
     let rate = rate.ok_or(unknown)?[0];
     if rate == 0.0 || !rate.is_finite() {
-        return Err("the rate of an event function is zero at its zero: how neighbouring motions come there is not known".into());
+        let what = "the rate of an event function is zero at its zero: how neighbouring motions come there is \
+            not known";
+        return Err(what.into());
     }
     let late = |column: &Delta| {
         let change = derivative(mechanism, here, column, [0.0, f64::INFINITY], value).ok_or(unknown)?;

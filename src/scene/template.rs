@@ -115,7 +115,8 @@ impl Template {
     /// The scene with these values of these variables.
     ///
     /// # Errors
-    /// As [`parse_scene`](super::parse_scene): a value out of its range, or one that does not go with the rest of the scene.
+    /// As [`parse_scene`](super::parse_scene): a value out of its range, or one that does not go with the
+    /// rest of the scene.
     pub fn filled(&self, variables: &[Variable], values: &[f64]) -> Result<Scene, SceneError> {
         let filled = variables
             .iter()

@@ -117,8 +117,8 @@ impl<T: Real> TapeSeries<T> {
     }
 }
 
-/// Sum of the terms, from zero: a loop over numbers below an end is compiled with its terms, while a fold over
-/// an inclusive range calls each of them.
+/// Sum of the terms, from zero: a loop over numbers below an end is compiled with its terms, while a fold
+/// over an inclusive range calls each of them.
 #[inline(always)]
 fn sum<T: Real>(range: std::ops::RangeInclusive<usize>, term: impl Fn(usize) -> T) -> T {
     let mut sum = T::ZERO;

@@ -45,13 +45,13 @@ impl<const W: usize> Probe<W> {
 }
 
 /// The motion in doubles inside a step that is next.
-struct InDoubles<'a, const W: usize> {
+struct RoundedStep<'a, const W: usize> {
     motion: &'a DigitsMotion<W>,
     step: f64,
     shown: Motion,
 }
 
-impl<const W: usize> Inside for InDoubles<'_, W> {
+impl<const W: usize> Inside for RoundedStep<'_, W> {
     fn span(&self) -> (Time, Time) {
         (Time::from(0.0), Time::from(self.step))
     }
@@ -78,7 +78,7 @@ fn limited<const W: usize>(motion: &DigitsMotion<W>, step: f64) -> f64 {
         return step;
     }
     let times = (LN_2 * motion.precision.bits as f64 / ENTERED).max(1.0);
-    let mut inside = InDoubles { motion, step, shown: Motion::default() };
+    let mut inside = RoundedStep { motion, step, shown: Motion::default() };
     let (changed, _) = first_change(structure, &mut inside, times);
     changed.map_or(step, |time| time.hi).max(LEAST * step)
 }

@@ -149,18 +149,21 @@ impl ExtremesDetector {
     /// where both arguments of `atan2` are zero, rounding leads beyond that to angles that are half a turn
     /// or more off.
     fn inwards_of_jumps(&mut self, inside: &mut dyn Inside, begin: Time, span: f64) -> Option<[f64; 2]> {
-        let mut both_ends =
-            |by: f64| [by, 1.0 - by].map(|share| self.values_at(inside.at(begin + share * span)));
-        let [next, later] = NEXT.map(&mut both_ends);
-        let mut leads_on = |by: f64| {
-            both_ends(by).iter().zip(next.iter().zip(&later)).all(|(end, (next, later))| {
-                end.iter().zip(next.iter().zip(later)).all(|(end, (next, later))| {
+        let mut of_end = |is_last: bool| {
+            let mut at = |by: f64| {
+                let share = if is_last { 1.0 - by } else { by };
+                self.values_at(inside.at(begin + share * span))
+            };
+            let [next, later] = NEXT.map(&mut at);
+            let mut leads_on = |by: f64| {
+                at(by).iter().zip(next.iter().zip(&later)).all(|(end, (next, later))| {
                     let most = STEEPER * (later - next).abs() + MARGIN * end.abs().max(next.abs());
                     (end - next).abs() <= most || !(end - next).is_finite()
                 })
-            })
+            };
+            INWARDS.into_iter().find(|&by| leads_on(by))
         };
-        INWARDS.into_iter().find(|&by| leads_on(by)).map(|by| [by; 2])
+        Some([of_end(false)?, of_end(true)?])
     }
 
     /// Looks at a step of outputs that have no value at its ends and do inside, as a root at an impact may,

@@ -210,8 +210,8 @@ fn extreme(number: usize, asked: &Query, t: f64, at: &RecordedTime) -> Result<(f
     }
     let corner = || {
         format!(
-            "the extreme at {t} s is none of a smooth curve: it is at a corner, an impact or an event, or where \
-             the output is constant but for rounding"
+            "the extreme at {t} s is none of a smooth curve: it is at a corner, an impact or an event, or \
+             where the output is constant but for rounding"
         )
     };
     let (side, late) = match &at.moves {
