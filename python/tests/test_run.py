@@ -523,8 +523,13 @@ def test_charts_and_numbers_that_are_none_are_refused(free):
 def test_a_stream_is_interrupted_within_a_row(free, method):
     rows = free.stream(until=1e5, every=1e5, method=method)
     next(rows)
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
-    begin = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        next(rows)
-    assert time.monotonic() - begin < 10
+    # Whoever started the tests may have them ignore it.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        begin = time.monotonic()
+        with pytest.raises(KeyboardInterrupt):
+            next(rows)
+        assert time.monotonic() - begin < 10
+    finally:
+        signal.signal(signal.SIGINT, before)
