@@ -1081,8 +1081,9 @@ fn poles_and_ends_of_roots_have_their_limits() {
             })
         };
         let [whole, chosen] = ["whole", "chosen"].map(|name| found(&outcome.extremes, name).mean);
-        assert!((whole - 0.5 * (series(0.7).0 + series(1.3).0)).abs() < 1e-9, "{whole}");
-        assert!((chosen - 0.5 * (2.4 + 13.0_f64.ln())).abs() < 1e-9, "{chosen}");
+        // Next to a pole of another output a share of 1e-7 of the part is left out.
+        assert!((whole - 0.5 * (series(0.7).0 + series(1.3).0)).abs() < 1e-7, "{whole}");
+        assert!((chosen - 0.5 * (2.4 + 13.0_f64.ln())).abs() < 1e-6, "{chosen}");
     }
 }
 
