@@ -311,8 +311,7 @@ pub(super) fn late_at_zero(
     let rate = here.slope(&here.ahead(), 1.0, f64::INFINITY, &mut |motion| value(mechanism, motion));
     let rate = rate.ok_or(unknown)?[0];
     if rate == 0.0 || !rate.is_finite() {
-        let what = "the rate of an event function is zero at its zero: how neighbouring motions come there \
-            is not known";
+        let what = "the rate of an event function is zero at its zero: how that moves is not known";
         return Err(what.into());
     }
     let late = |column: &Delta| {
