@@ -272,8 +272,7 @@ impl Raw {
     /// positions.
     fn kept(&self) -> Vec<usize> {
         let mechanism = &self.scene.get().mechanism;
-        let (own, bodies) = (mechanism.own_bodies().len(), mechanism.bodies.len());
-        (0..own).chain(bodies..mechanism.coordinates()).collect()
+        (0..mechanism.coordinates()).filter(|&k| !mechanism.is_integral(k)).collect()
     }
 }
 

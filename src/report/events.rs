@@ -37,7 +37,7 @@ pub(super) fn numbers<'a, T>(
     phi: &'a [T],
     omega: &'a [T],
 ) -> impl Iterator<Item = &'a T> {
-    let rotors = mechanism.own_bodies().len()..mechanism.bodies.len();
+    let rotors = mechanism.rotors();
     let both = phi.iter().zip(omega).enumerate();
     both.flat_map(move |(k, (phi, omega))| [Some(phi).filter(|_| !rotors.contains(&k)), Some(omega)])
         .flatten()

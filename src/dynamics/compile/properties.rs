@@ -9,6 +9,7 @@ use crate::dynamics::forest::{BodyOrigin, Hang};
 use crate::dynamics::point::Point;
 use crate::dynamics::{State, Time};
 use std::borrow::Cow;
+use std::ops::Range;
 
 impl Mechanism {
     /// Number of coordinates: the bodies' angles, and two for every origin that moves freely.
@@ -99,15 +100,19 @@ impl Mechanism {
         self.constraints.iter().chain(walls).filter_map(|row| row.aim.as_deref())
     }
 
+    /// The rotors that carry integrals, by number, as bodies and as coordinates.
+    pub fn rotors(&self) -> Range<usize> {
+        self.own_bodies().len()..self.bodies.len()
+    }
+
     /// True for the coordinate of a rotor that carries an integral.
     pub fn is_integral(&self, coordinate: usize) -> bool {
-        (self.own_bodies().len()..self.bodies.len()).contains(&coordinate)
+        self.rotors().contains(&coordinate)
     }
 
     /// Names of the scene's integrals, and the coordinates whose rates they are.
     pub fn integrals(&self) -> impl Iterator<Item = (&str, usize)> {
-        let own = self.own_bodies().len();
-        self.bodies.iter().enumerate().skip(own).map(|(k, rotor)| (rotor.name.as_str(), k))
+        self.rotors().map(|k| (self.bodies[k].name.as_str(), k))
     }
 
     /// Names of the scene's events.

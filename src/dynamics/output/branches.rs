@@ -90,9 +90,7 @@ impl Outputs {
             let own = formula.modes_beside_zeros(sources, zeros);
             let value = formula.evaluate(sources, &own);
             beside.clear();
-            if !poles.is_empty() {
-                formula.pole_values(sources, &own, poles, &mut beside);
-            }
+            formula.pole_values(sources, &own, poles, &mut beside);
             let is_zero = |k: usize| zeros.get(own.len() + k).is_some_and(|&is_zero| is_zero);
             let signs: Vec<bool> = (0..beside.len()).map(|k| beside[k] > 0.0 && !is_zero(k)).collect();
             found.extend(own.into_iter().chain(signs));
@@ -108,9 +106,7 @@ impl Outputs {
             let OutputExpression { formula, poles, .. } = expression;
             let own = next(&mut branches, expression);
             formula.condition_values(sources, own, &mut found);
-            if !poles.is_empty() {
-                formula.pole_values(sources, own, poles, &mut found);
-            }
+            formula.pole_values(sources, own, poles, &mut found);
             formula.evaluate(sources, own)
         });
         found

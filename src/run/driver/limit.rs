@@ -143,7 +143,8 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             _ => target,
         };
         let (mechanism, steps) = (Arc::clone(mechanism), self.statistics.steps);
-        for cuts in 0.. {
+        let mut cuts = 0;
+        loop {
             let event = self.step_to(until)?;
             let span = (self.state.time - from).hi;
             if span <= 0.0 {
@@ -153,6 +154,7 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
             let least = (SHORT * span).max(INSTANT * from.hi.abs());
             match changed.filter(|time| cuts < CUTS && (*time - from).hi > least) {
                 Some(time) => {
+                    cuts += 1;
                     self.statistics.steps = steps;
                     self.statistics.rejected += 1;
                     self.state.clone_from(&self.from);
@@ -169,7 +171,6 @@ impl<P: Form + Send + ?Sized, M: Integrator<P> + Send> StepLoop<P, M> {
                 }
             }
         }
-        Ok(None)
     }
 
     fn step_to(&mut self, until: Time) -> Result<Option<usize>, StepError> {

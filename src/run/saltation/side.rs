@@ -40,8 +40,7 @@ impl Side {
     /// The same without accelerations.
     pub fn resting(mechanism: &Mechanism, motion: &Motion) -> Self {
         let [phi, omega] = motion.rounded();
-        let rotors = mechanism.own_bodies().len()..mechanism.bodies.len();
-        Self { motion: motion.clone(), acceleration: Vec::new(), phi, omega, rotors }
+        Self { motion: motion.clone(), acceleration: Vec::new(), phi, omega, rotors: mechanism.rotors() }
     }
 
     /// The motion itself as a column: rates, then accelerations.

@@ -157,7 +157,7 @@ impl Variation {
             jumped: Vec::new(),
             jumps: JumpLog::with_switches(),
             moment: None,
-            method: Collocation::new(mechanism.integrals().map(|(_, rotor)| rotor).collect()),
+            method: Collocation::new(mechanism.rotors().collect()),
             pull: Vec::new(),
             forcing,
             now: 0.0,

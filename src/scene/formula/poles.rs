@@ -25,12 +25,11 @@ impl Formula {
                 // What holds on either side of a change is another branch.
                 _ => operands.into_iter().any(|operand| depends[operand]),
             };
-            let power = |exponent: usize| self.constants[exponent];
             match node {
                 Node::Quotient(_, b) => self.add_zeros(b, &mut found),
                 Node::Logarithm(a) => self.add_zeros(a, &mut found),
                 Node::Root(a) if self.range(a)[0] < 0.0 => found.push(Pole::Result(a)),
-                Node::Power(a, b) => match power(b) {
+                Node::Power(a, b) => match self.constants[b] {
                     Some(power) if power < 0.0 => self.add_zeros(a, &mut found),
                     Some(power) if power.fract() == 0.0 => {}
                     _ if self.range(a)[0] >= 0.0 => {}
@@ -40,9 +39,7 @@ impl Formula {
                 _ => {}
             }
         }
-        found.retain(|pole| match *pole {
-            Pole::Result(node) | Pole::Cosine(node) => depends[node],
-        });
+        found.retain(|pole| depends[pole.node()]);
         found
     }
 
@@ -62,6 +59,9 @@ impl Formula {
 
     /// Appends what is zero at these poles, on these branches.
     pub(crate) fn pole_values(&self, values: &[f64], bits: &[bool], poles: &[Pole], all: &mut Vec<f64>) {
+        if poles.is_empty() {
+            return;
+        }
         let results = self.results(values, bits, None);
         all.extend(poles.iter().map(|pole| match (*pole, self.nodes.get(pole.node())) {
             (Pole::Cosine(_), Some(Node::Tangent(angle))) => results[*angle].cos(),

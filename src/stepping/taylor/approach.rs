@@ -1,7 +1,7 @@
 //! Springs whose ends nearly meet inside a step.
 //!
 //! Where the span D of a spring goes past zero at a distance d, its length has singularities in complex time
-//! that weigh as d²: a series about a moment before them shows nothing of a near miss, and continues the
+//! of strength d²: a series about a moment before them shows nothing of a near miss, and continues the
 //! length through zero to negative ones.  A step therefore ends before a length falls below a tenth of what
 //! it is at the beginning: from there on the powers tell of the singularity.
 
